@@ -1,0 +1,3 @@
+"""Multi-contact planning for humanoids, validated in simulation."""
+
+__version__ = "0.1.0"

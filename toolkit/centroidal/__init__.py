@@ -1,0 +1,1 @@
+"""The centroidal momentum optimiser: problem, solvers, independent residual check; static balance."""

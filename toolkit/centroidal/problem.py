@@ -1,0 +1,165 @@
+"""The centroidal momentum problem of a contact sequence, as plain arrays.
+
+Both solvers, the residual check and the training data speak of a motion in these terms. Time is cut into N intervals
+("steps") with constant contact wrenches; knots 0..N bound them. Since the wrench is constant on an interval, the
+linear dynamics and the moment about the world origin integrate exactly:
+
+    l_{t+1} = l_t + dt (sum f + m g)
+    r_{t+1} = r_t + dt l_t / m + dt^2 / (2 m) (sum f + m g)
+    L_{t+1} = L_t + dt sum (p x f + tau) + (dt r_t + dt^2 l_t / (2 m) + dt^3 / (6 m) (sum f + m g)) x m g
+    k_t     = L_t - r_t x l_t
+
+with L the angular momentum about the world origin, linear in the wrenches, and k the one about the CoM: the paper's
+Eq. 3 without discretisation error. (p, tau): wrench at the centre of the patch, tau = R (z x R^T f) + tau_n n.
+
+The objective is the paper's weighted sum of squares (Sec. IV), each step weighted by dt / 0.2 s, so that it is an
+integral over time and equals the paper's sum at the paper's step:
+
+    sum_t dt_t / 0.2 ( w_l |l_{t+1}|^2 + w_ldot |sum f + m g|^2 + w_k |k_{t+1}|^2 + w_kdot |(k_{t+1} - k_t) / dt|^2
+        + sum_contacts ( w_f |f|^2 / (m g)^2 + w_tau tau_n^2 + w_lateral |f_lateral|^2 / (m g)^2
+                         + w_cop |(z_x / (2 h_x), z_y / (2 h_y))|^2 ) )
+
+with h the half extents of the patch (the paper divides by the lengths of the support region). Forces are normalised
+by the weight, torques are not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Objective weights; the defaults are the paper's (Sec. VII)."""
+
+    linear_momentum: float = 0.2
+    linear_momentum_rate: float = 0.01
+    angular_momentum: float = 1.0
+    angular_momentum_rate: float = 0.3
+    force: float = 0.01
+    torque: float = 1.0
+    lateral_force: float = 10.0
+    cop: float = 1.0
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How much tighter than physics the plan's constraints are. Plan inside controller inside simulation.
+
+    Attributes:
+        friction: factor on the friction coefficient.
+        cop: (2,) m taken off each half extent of a sole (scaled to at most half of it for small patches).
+        yaw: factor on the yaw moment that friction can hold.
+    """
+
+    friction: float = 1.0
+    cop: tuple[float, float] = (0.0, 0.0)
+    yaw: float = 1.0
+
+
+@dataclass(frozen=True)
+class CentroidalProblem:
+    """One motion: N steps, 4 limbs (indexed by `Limb`), world frame, SI units.
+
+    Attributes:
+        mass: kg.
+        dt: (N,) s.
+        active: (N, 4) bool; limb in contact during the step.
+        position: (N, 4, 3) m; centre of the patch (last known or zero where not active).
+        rotation: (N, 4, 3, 3); world_from_contact, z the surface normal.
+        friction: (N, 4); the surface's coefficient, margins not applied.
+        half_size: (4, 2) m; patch half extents, margins not applied.
+        max_normal_force: (4,) N.
+        yaw: (N + 1,) rad; heading of the base assumed at each knot (mean of the feet in contact or just left).
+        com: (3,) m initial CoM.
+        com_velocity: (3,) m/s initial.
+        angular_momentum: (3,) kg m^2/s initial, about the CoM.
+        root_in_com: (4, 3) m; hip / shoulder centre relative to the CoM, in the yaw frame.
+        tip_in_contact: (4, 3) m; ankle centre / palm patch in the contact frame.
+        max_reach: (4,) m; bound on |root - tip| at every knot for each limb in contact in a step that touches the knot.
+        min_height: m; the CoM stays at least this much above the lowest foot in contact at every knot.
+        final_center: (3,) m and
+        final_half_size: (3,) m: box in the world for the last CoM position, axes of the final yaw frame.
+        final_at_rest: whether the last CoM velocity must be zero.
+        weights, margins: see the classes.
+    """
+
+    mass: float
+    dt: np.ndarray
+    active: np.ndarray
+    position: np.ndarray
+    rotation: np.ndarray
+    friction: np.ndarray
+    half_size: np.ndarray
+    max_normal_force: np.ndarray
+    yaw: np.ndarray
+    com: np.ndarray
+    com_velocity: np.ndarray
+    angular_momentum: np.ndarray
+    root_in_com: np.ndarray
+    tip_in_contact: np.ndarray
+    max_reach: np.ndarray
+    min_height: float
+    final_center: np.ndarray
+    final_half_size: np.ndarray
+    final_at_rest: bool
+    weights: Weights = field(default_factory=Weights)
+    margins: Margins = field(default_factory=Margins)
+
+    @property
+    def steps(self) -> int:
+        """Number of intervals N."""
+        return len(self.dt)
+
+    @property
+    def times(self) -> np.ndarray:
+        """(N + 1,) s; knot times from 0."""
+        return np.concatenate([[0.0], np.cumsum(self.dt)])
+
+
+@dataclass(frozen=True)
+class CentroidalMotion:
+    """Result of an optimisation; meaningless where `feasible` is False except for `status`.
+
+    Attributes:
+        problem: what was solved.
+        feasible: the residual check passed, not merely the solver's flag.
+        status: the solver's word, for messages.
+        com: (N + 1, 3) m.
+        linear_momentum: (N + 1, 3) kg m/s.
+        angular_momentum: (N + 1, 3) kg m^2/s about the CoM.
+        force: (N, 4, 3) N in the world, zero where not active.
+        cop: (N, 4, 2) m in the contact frame.
+        yaw_torque: (N, 4) N m about the contact's normal, at the CoP.
+        objective: value of the paper's objective, recomputed in NumPy.
+        seconds: wall-clock time, everything counted.
+        iterations: of the solver.
+    """
+
+    problem: CentroidalProblem
+    feasible: bool
+    status: str
+    com: np.ndarray
+    linear_momentum: np.ndarray
+    angular_momentum: np.ndarray
+    force: np.ndarray
+    cop: np.ndarray
+    yaw_torque: np.ndarray
+    objective: float
+    seconds: float
+    iterations: int
+
+    def sample(self, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """CoM position, velocity and acceleration (3,) at a time in s, exact between knots, clamped at the ends."""
+        problem, times = self.problem, self.problem.times
+        time = min(max(time, 0.0), times[-1])
+        step = min(int(np.searchsorted(times, time, side="right")) - 1, problem.steps - 1)
+        tau = time - times[step]
+        acceleration = self.force[step].sum(0) / problem.mass + GRAVITY
+        velocity = self.linear_momentum[step] / problem.mass
+        position = self.com[step] + tau * velocity + 0.5 * tau**2 * acceleration
+        return position, velocity + tau * acceleration, acceleration

@@ -1,0 +1,1 @@
+"""Contacts, stances, contact transitions and sequences; transition models, projection and reach."""

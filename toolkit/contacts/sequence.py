@@ -1,0 +1,64 @@
+"""Contact transitions, and sequences of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.geometry.limb import Limb
+from toolkit.world.timing import Timing
+
+
+@dataclass(frozen=True)
+class ContactTransition:
+    """One limb moves to a new contact, or a palm breaks its contact.
+
+    Attributes:
+        limb: the limb that moves.
+        contact: the new contact; None where a palm contact is broken.
+        timing: shift and swing time.
+    """
+
+    limb: Limb
+    contact: Contact | None
+    timing: Timing = Timing()
+
+    def __post_init__(self):
+        if self.contact is None and self.limb.is_foot:
+            raise ValueError("a foot contact cannot be broken without a new one")
+        if self.contact is not None and self.contact.limb != self.limb:
+            raise ValueError(f"{self.limb.label} cannot move to a contact of {self.contact.limb.label}")
+
+    def apply(self, stance: Stance) -> Stance:
+        """The stance after the transition."""
+        return stance.without(self.limb) if self.contact is None else stance.replace(self.contact)
+
+    def during_swing(self, stance: Stance) -> tuple[Contact, ...]:
+        """Contacts of `stance` that stay while the limb moves."""
+        return tuple(contact for contact in stance.contacts if contact.limb != self.limb)
+
+
+@dataclass(frozen=True)
+class ContactSequence:
+    """A start stance and the transitions from it.
+
+    Attributes:
+        start: the stance at rest in which the robot starts.
+        transitions: in order; may be empty.
+    """
+
+    start: Stance
+    transitions: tuple[ContactTransition, ...]
+
+    @property
+    def stances(self) -> tuple[Stance, ...]:
+        """(len(transitions) + 1,) stances: the start, then the one after each transition."""
+        stances = [self.start]
+        for transition in self.transitions:
+            stances.append(transition.apply(stances[-1]))
+        return tuple(stances)
+
+    @property
+    def duration(self) -> float:
+        """Seconds of all transitions."""
+        return sum(transition.timing.shift + transition.timing.swing for transition in self.transitions)

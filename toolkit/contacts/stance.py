@@ -1,0 +1,79 @@
+"""Contact and stance: which limbs rest where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.geometry.pose import Pose
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A limb's patch resting on a surface.
+
+    Attributes:
+        limb: the limb in contact.
+        pose: world_from_contact; origin at the centre of the patch, z along the outward normal of the surface, for
+            feet x along the toes. The limb's site in the robot model coincides with this frame.
+        friction: Coulomb coefficient of the surface.
+        surface: index of the surface in `World.surfaces`; -1 where there is none.
+    """
+
+    limb: Limb
+    pose: Pose
+    friction: float
+    surface: int = -1
+
+
+@dataclass(frozen=True)
+class Stance:
+    """A set of contacts: both feet always, palms or none.
+
+    Attributes:
+        contacts: in the order of `Limb`, at most one per limb.
+    """
+
+    contacts: tuple[Contact, ...]
+
+    def __post_init__(self):
+        limbs = [contact.limb for contact in self.contacts]
+        if limbs != sorted(set(limbs)) or limbs[:2] != list(FEET):
+            raise ValueError(f"a stance needs both feet, each limb once and in order; got {[x.label for x in limbs]}")
+
+    def __getitem__(self, limb: Limb) -> Contact:
+        for contact in self.contacts:
+            if contact.limb == limb:
+                return contact
+        raise KeyError(limb.label)
+
+    def __contains__(self, limb: Limb) -> bool:
+        return any(contact.limb == limb for contact in self.contacts)
+
+    @property
+    def limbs(self) -> tuple[Limb, ...]:
+        """Limbs in contact, in order."""
+        return tuple(contact.limb for contact in self.contacts)
+
+    @property
+    def palms(self) -> tuple[Limb, ...]:
+        """Palms in contact, in order."""
+        return tuple(limb for limb in PALMS if limb in self)
+
+    @property
+    def mean_feet(self) -> Pose:
+        """Upright frame at the mean of the feet with the circular mean of their headings (world_from_feet)."""
+        left, right = (self[limb].pose for limb in FEET)
+        heading = np.array([np.cos(left.yaw) + np.cos(right.yaw), np.sin(left.yaw) + np.sin(right.yaw)])
+        return Pose.from_yaw((left.position + right.position) / 2, float(np.arctan2(heading[1], heading[0])))
+
+    def replace(self, contact: Contact) -> Stance:
+        """The stance with `contact` made, in place of the limb's old one if there is one."""
+        kept = [old for old in self.contacts if old.limb != contact.limb]
+        return Stance(tuple(sorted([*kept, contact], key=lambda item: item.limb)))
+
+    def without(self, limb: Limb) -> Stance:
+        """The stance with a palm's contact broken."""
+        return Stance(tuple(contact for contact in self.contacts if contact.limb != limb))

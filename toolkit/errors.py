@@ -1,0 +1,43 @@
+"""Errors of the toolkit: one base class, typed children.
+
+A message names the file or thing at fault, the offending value and the remedy in one line. Command lines print
+that line and exit with `exit_code`.
+"""
+
+
+class ToolkitError(Exception):
+    """Base of every error that a user can cause or can do something about."""
+
+    exit_code = 2
+
+
+class InputError(ToolkitError):
+    """An argument or a file given by the user cannot be used."""
+
+
+class WorldError(InputError):
+    """A world file is broken, incomplete, or asks for something unsupported."""
+
+
+class RobotError(InputError):
+    """A robot folder is missing, broken, or inconsistent."""
+
+
+class DatasetError(InputError):
+    """A training data set is truncated, or belongs to another robot or problem."""
+
+
+class NetworkError(InputError):
+    """A network file is missing, or its shapes or metadata do not fit."""
+
+
+class PlanningError(ToolkitError):
+    """Planning honestly ended without a result."""
+
+    exit_code = 1
+
+
+class ExecutionError(ToolkitError):
+    """The simulated execution could not be carried out."""
+
+    exit_code = 1

@@ -1,0 +1,149 @@
+"""Rigid transforms, spelled so that neighbours cancel: `world_from_foot @ point_in_foot`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+
+
+def rotation_from_quaternion(quaternion_wxyz: np.ndarray) -> np.ndarray:
+    """Rotation matrices of unit quaternions.
+
+    Args:
+        quaternion_wxyz: (..., 4) float, scalar first (MuJoCo's order); normalised here.
+
+    Returns:
+        (..., 3, 3) float rotation matrices.
+    """
+    q = np.asarray(quaternion_wxyz, float)
+    w, x, y, z = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
+    """Unit quaternion, scalar first and not negative, of one rotation matrix.
+
+    Args:
+        rotation: (3, 3) float.
+
+    Returns:
+        (4,) float wxyz.
+    """
+    r = np.asarray(rotation, float)
+    # Bar-Itzhack: the dominant eigenvector of a symmetric 4 x 4 matrix; accurate near every singular case.
+    k = np.array(
+        [
+            [r[0, 0] - r[1, 1] - r[2, 2], 0, 0, 0],
+            [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], 0, 0],
+            [r[2, 0] + r[0, 2], r[2, 1] + r[1, 2], r[2, 2] - r[0, 0] - r[1, 1], 0],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], r[0, 0] + r[1, 1] + r[2, 2]],
+        ]
+    )
+    _, vectors = np.linalg.eigh(k)  # reads the lower triangle
+    x, y, z, w = vectors[:, -1]
+    q = np.array([w, x, y, z])
+    return -q if w < 0 else q
+
+
+def rotation_about_z(angle: np.ndarray | float) -> np.ndarray:
+    """Rotation matrices (..., 3, 3) about z by `angle` (...,) in rad."""
+    angle = np.asarray(angle, float)
+    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    return np.stack([np.stack([c, -s, zero], -1), np.stack([s, c, zero], -1), np.stack([zero, zero, one], -1)], -2)
+
+
+def yaw_of(rotation: np.ndarray) -> np.ndarray | float:
+    """Heading (...,) in rad of the x axis of `rotation` (..., 3, 3), projected on the horizontal plane."""
+    return np.arctan2(rotation[..., 1, 0], rotation[..., 0, 0])
+
+
+def rotation_on_surface(normal: np.ndarray, yaw: np.ndarray | float) -> np.ndarray:
+    """Frames with z along a surface normal and x along a heading projected on the surface.
+
+    Args:
+        normal: (..., 3) float unit normals in the world, not horizontal.
+        yaw: (...,) float heading in rad.
+
+    Returns:
+        (..., 3, 3) float world_from_contact rotations.
+    """
+    normal = np.asarray(normal, float)
+    heading = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(np.asarray(yaw, float))], -1)
+    heading, normal = np.broadcast_arrays(heading, normal)
+    # The vertical plane through the heading cuts the surface in x: its yaw is the heading, exactly.
+    x = heading * normal[..., 2:3]
+    x = x - np.concatenate([np.zeros_like(normal[..., :2]), (heading * normal).sum(-1, keepdims=True)], -1)
+    x = x * np.where(normal[..., 2:3] < 0, -1.0, 1.0)
+    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
+    return np.stack([x, np.cross(normal, x), normal], axis=-1)
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A rigid transform `a_from_b`: maps points in frame b to points in frame a.
+
+    Attributes:
+        rotation: (3, 3) float.
+        position: (3,) float, m; the origin of b in a.
+    """
+
+    rotation: np.ndarray
+    position: np.ndarray
+
+    @classmethod
+    def identity(cls) -> Pose:
+        """The transform that changes nothing."""
+        return cls(np.eye(3), np.zeros(3))
+
+    @classmethod
+    def from_quaternion(cls, position: np.ndarray, quaternion_wxyz: np.ndarray) -> Pose:
+        """Pose of a (3,) position and a (4,) quaternion, scalar first."""
+        return cls(rotation_from_quaternion(quaternion_wxyz), np.asarray(position, float))
+
+    @classmethod
+    def from_yaw(cls, position: np.ndarray, yaw: float) -> Pose:
+        """Upright pose at (3,) `position` with heading `yaw` in rad."""
+        return cls(rotation_about_z(yaw), np.asarray(position, float))
+
+    @overload
+    def __matmul__(self, other: Pose) -> Pose: ...
+    @overload
+    def __matmul__(self, other: np.ndarray) -> np.ndarray: ...
+    def __matmul__(self, other):
+        """Compose with a pose, or map points (..., 3)."""
+        if isinstance(other, Pose):
+            return Pose(self.rotation @ other.rotation, self.rotation @ other.position + self.position)
+        return np.asarray(other) @ self.rotation.T + self.position
+
+    def inverse(self) -> Pose:
+        """The transform the other way, `b_from_a`."""
+        return Pose(self.rotation.T, -self.rotation.T @ self.position)
+
+    @property
+    def quaternion_wxyz(self) -> np.ndarray:
+        """(4,) float unit quaternion, scalar first."""
+        return quaternion_from_rotation(self.rotation)
+
+    @property
+    def yaw(self) -> float:
+        """Heading of the x axis in rad."""
+        return float(yaw_of(self.rotation))
+
+    @property
+    def normal(self) -> np.ndarray:
+        """(3,) float z axis: the surface normal of a contact frame."""
+        return self.rotation[:, 2]
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """(4, 4) float homogeneous matrix."""
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.rotation, self.position
+        return matrix

@@ -1,0 +1,1 @@
+"""Networks that predict what the centroidal optimiser would say: features, inference, data, training."""

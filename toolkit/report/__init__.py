@@ -1,0 +1,1 @@
+"""What a person looks at: recording, tables, plots, pictures, files."""

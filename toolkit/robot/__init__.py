@@ -1,0 +1,1 @@
+"""Robot descriptions: one compiled model for MuJoCo, Pinocchio and placo."""

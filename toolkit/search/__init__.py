@@ -1,0 +1,1 @@
+"""Anytime contact search: ANA*, heuristic, planner, baselines."""

@@ -1,0 +1,1 @@
+"""Execution in MuJoCo: controller, run, measurements, verdict."""

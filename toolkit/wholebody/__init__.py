@@ -1,0 +1,1 @@
+"""Whole-body trajectories: swing paths, inverse kinematics, limit checks."""

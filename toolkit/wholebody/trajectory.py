@@ -1,0 +1,43 @@
+"""WholeBodyTrajectory: joint trajectories with what the controller needs beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class WholeBodyTrajectory:
+    """A whole-body motion on a uniform time grid of T samples, MuJoCo conventions (robot compiled alone).
+
+    Attributes:
+        times: (T,) s.
+        qpos: (T, 7 + n); base position, base quaternion wxyz, joints.
+        qvel: (T, 6 + n); base linear velocity in the world, base angular velocity in the body, joint velocities.
+        torque: (T, n) N m; inverse dynamics with the planned wrenches.
+        limb_pose: (T, 4, 7); planned pose of each limb's patch, position and quaternion wxyz (contact frame; palms that
+            the robot has not: NaN).
+        limb_velocity: (T, 4, 6); planned velocity of each limb's patch, linear then angular, in the world.
+        in_contact: (T, 4) bool; planned contact.
+        max_position_error: m, over CoM and contacts, recomputed with MuJoCo.
+        max_orientation_error: rad, over contacts.
+        limits_respected: joint position, velocity and torque limits hold everywhere.
+        feasible: all of the checks above passed and no unplanned collision.
+        reason: one line where not feasible, else "".
+        seconds: wall-clock.
+    """
+
+    times: np.ndarray
+    qpos: np.ndarray
+    qvel: np.ndarray
+    torque: np.ndarray
+    limb_pose: np.ndarray
+    limb_velocity: np.ndarray
+    in_contact: np.ndarray
+    max_position_error: float
+    max_orientation_error: float
+    limits_respected: bool
+    feasible: bool
+    reason: str
+    seconds: float

@@ -1,0 +1,1 @@
+"""Worlds: MJCF scenes, the surfaces they offer, and random terrain."""
