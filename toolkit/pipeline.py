@@ -1,0 +1,236 @@
+"""From a world to a verdict: the only module that knows all stages.
+
+    world -> surfaces -> contact sequence -> centroidal motion -> whole-body trajectory -> execution -> verdict
+
+The search proposes contact sequences; each is tested from the newest (cheapest) to the oldest by the centroidal
+optimiser, by inverse kinematics and by the simulation, and the first that passes everything is the plan.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from toolkit.centroidal.build import initial_com
+from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.centroidal.sequence import SequenceConfig, optimise
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.robot.model import RobotModel
+from toolkit.search.planner import ContactPlanner, PlannerConfig
+from toolkit.search.result import SearchResult, Solution
+from toolkit.simulation.check import Check, Result
+from toolkit.simulation.execution import Execution
+from toolkit.simulation.run import ExecutionConfig, execute
+from toolkit.wholebody.plan import WholeBodyConfig, whole_body
+from toolkit.wholebody.trajectory import WholeBodyTrajectory
+from toolkit.world.world import World
+
+
+class Observer(Protocol):
+    """Is told how a run goes, for display; never decides anything."""
+
+    def started(self, stage: str, detail: str = "") -> None:
+        """A stage begins."""
+        ...
+
+    def progress(self, stage: str, fraction: float | None, detail: str = "") -> None:
+        """A stage goes on; `fraction` in [0, 1] where known."""
+        ...
+
+    def finished(self, stage: str, passed: bool, seconds: float, detail: str = "") -> None:
+        """A stage ended."""
+        ...
+
+
+class SilentObserver:
+    """Watches without a word."""
+
+    def started(self, stage: str, detail: str = "") -> None:
+        """Ignore."""
+
+    def progress(self, stage: str, fraction: float | None, detail: str = "") -> None:
+        """Ignore."""
+
+    def finished(self, stage: str, passed: bool, seconds: float, detail: str = "") -> None:
+        """Ignore."""
+
+
+@dataclass(frozen=True)
+class PipelineConfig:
+    """Settings of one run.
+
+    Attributes:
+        seed: of every random draw.
+        time_limit: s for the contact search; the search also ends after its own number of expansions, so that the
+            same seed gives the same plan on any machine fast enough.
+        candidates: most contact sequences to test before giving up.
+        initial_rest, final_rest: s at rest before the first transition and after the last one.
+        planner, sequence, wholebody, execution: settings of the stages.
+    """
+
+    seed: int = 0
+    time_limit: float = 30.0
+    candidates: int = 6
+    initial_rest: float = 0.4
+    final_rest: float = 1.0
+    planner: PlannerConfig = field(default_factory=PlannerConfig)
+    sequence: SequenceConfig = field(default_factory=SequenceConfig)
+    wholebody: WholeBodyConfig = field(default_factory=WholeBodyConfig)
+    execution: ExecutionConfig = field(default_factory=ExecutionConfig)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One contact sequence and how far it came; later stages are None where an earlier one rejected it."""
+
+    solution: Solution
+    schedule: ContactSchedule
+    motion: CentroidalMotion | None = None
+    trajectory: WholeBodyTrajectory | None = None
+    execution: Execution | None = None
+    reason: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the execution was measured and every check of it passed."""
+        return self.execution is not None and all(check.result == Result.PASS for check in self.execution.checks)
+
+    @property
+    def stages_passed(self) -> int:
+        """How far it came, to keep the most telling failure."""
+        return sum(stage is not None for stage in (self.motion, self.trajectory, self.execution)) + self.passed
+
+
+@dataclass(frozen=True)
+class PipelineResult:
+    """Everything a run made.
+
+    Attributes:
+        robot, world: what it ran on.
+        search: result of the contact search.
+        trial: the one that passed, or else the one that came furthest; None without a plan.
+        tested: contact sequences tested.
+        reason: one line where the verdict is FAIL, else "".
+    """
+
+    robot: RobotModel
+    world: World
+    search: SearchResult
+    trial: Trial | None
+    tested: int
+    reason: str
+
+    @property
+    def passed(self) -> bool:
+        """The verdict."""
+        return self.trial is not None and self.trial.passed
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        """Checks of the verdict; empty where nothing was executed."""
+        return self.trial.execution.checks if self.trial is not None and self.trial.execution is not None else ()
+
+
+def test_solution(
+    robot: RobotModel, world: World, solution: Solution, config: PipelineConfig, observer: Observer
+) -> Trial:
+    """Put one contact sequence through optimiser, inverse kinematics and simulation; stop at the first that fails."""
+    schedule = ContactSchedule.of(solution.sequence, initial_rest=config.initial_rest, final_rest=config.final_rest)
+    start = solution.sequence.start
+
+    observer.started("dynamics")
+    motion = optimise(robot, schedule, initial_com(robot, start), np.zeros(3), config=config.sequence)
+    observer.finished("dynamics", motion.feasible, motion.seconds, motion.status)
+    if not motion.feasible:
+        return Trial(solution, schedule, motion, reason=f"no feasible centroidal motion: {motion.status}")
+
+    observer.started("wholebody")
+    trajectory = whole_body(robot, world, schedule, motion, config.wholebody)
+    observer.finished("wholebody", trajectory.feasible, trajectory.seconds, trajectory.reason)
+    if not trajectory.feasible:
+        return Trial(solution, schedule, motion, trajectory, reason=f"no whole-body motion: {trajectory.reason}")
+
+    observer.started("execution")
+    began = time.perf_counter()
+    execution = execute(
+        robot,
+        world,
+        solution.sequence,
+        schedule,
+        motion,
+        trajectory,
+        config=config.execution,
+        rng=np.random.default_rng([config.seed, 1]),
+        observer=lambda fraction, detail="": observer.progress("execution", fraction, detail),
+    )
+    trial = Trial(solution, schedule, motion, trajectory, execution, failure(execution))
+    observer.finished("execution", trial.passed, time.perf_counter() - began, trial.reason)
+    return trial
+
+
+def failure(execution: Execution) -> str:
+    """One line on the first check that did not pass, "" where all did."""
+    if execution.fell:
+        return f"the robot fell: {execution.fall_reason}"
+    for check in execution.checks:
+        if check.result == Result.NOT_CHECKED:
+            return f"{check.name} was not checked"
+        if check.result == Result.FAIL:
+            return f"{check.name} is {check.value:.3g} {check.unit}".rstrip() + f", the limit is {check.limit:.3g}"
+    return ""
+
+
+def run(
+    robot: RobotModel,
+    world: World,
+    planner: ContactPlanner,
+    config: PipelineConfig,
+    observer: Observer | None = None,
+) -> PipelineResult:
+    """Plan, test and execute.
+
+    Args:
+        robot: the robot.
+        world: the world.
+        planner: contact planner for both.
+        config: settings.
+        observer: told of every stage.
+
+    Returns:
+        The result, PASS or not; see `PipelineResult`.
+
+    Raises:
+        ToolkitError: the input cannot be used at all (no start stance, nothing leads to the goal).
+    """
+    observer = observer or SilentObserver()
+    observer.started("planning")
+    search = planner.search(
+        np.random.default_rng(config.seed),
+        config.time_limit,
+        observer=lambda progress: observer.progress("planning", None, str(progress)),
+    )
+    found = len(search.solutions)
+    observer.finished("planning", found > 0, search.seconds, search.reason or f"{found} sequences")
+
+    best: Trial | None = None
+    tested = 0
+    for solution in reversed(search.solutions):  # newest, cheapest first
+        if tested == config.candidates:
+            break
+        tested += 1
+        trial = test_solution(robot, world, solution, config, observer)
+        if best is None or trial.passed or trial.stages_passed > best.stages_passed:
+            best = trial
+        if trial.passed:
+            break
+    reason = search.reason if best is None else best.reason
+    return PipelineResult(robot, world, search, best, tested, reason)
+
+
+def default_output(world: Path, robot: str) -> Path:
+    """Folder of a run that was not given one."""
+    return Path("runs") / f"{world.stem}-{robot}-{time.strftime('%Y%m%d-%H%M%S')}"

@@ -1,0 +1,174 @@
+"""Data sets of labelled transitions: a manifest and numbered shards, each written whole or not at all.
+
+    DIR/manifest.json      what was asked for: robot, fingerprint, seed, versions, settings
+    DIR/shard-000000.npz   per category c: features_c (n, d) float32, feasible_c (n,) bool, targets_c (n, 7) float32
+
+Shard i depends on the manifest and on i alone. So a collection that was killed goes on with the shards that are
+missing, and nothing is lost or doubled.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from toolkit.contacts.category import Category
+from toolkit.errors import DatasetError
+from toolkit.prediction.features import TARGETS, feature_size
+
+SCHEMA = "transition-data-1"
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a data set was asked for.
+
+    Attributes:
+        schema: of the files.
+        robot: name; fingerprint: of its dynamics.
+        seed: of all shards.
+        settings: of the collection, as plain values.
+        versions: of the libraries at the start.
+    """
+
+    schema: str
+    robot: str
+    fingerprint: str
+    seed: int
+    settings: dict
+    versions: dict
+
+    def write(self, folder: Path) -> None:
+        """Write `folder/manifest.json`, whole or not at all."""
+        temporary = folder / "manifest.json.part"
+        temporary.write_text(json.dumps(asdict(self), indent=2))
+        os.replace(temporary, folder / "manifest.json")
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Labelled transitions of one category.
+
+    Attributes:
+        features: (n, d) float32, canonical, see `features.encode`.
+        feasible: (n,) bool.
+        targets: (n, 7) float32; objective, CoM (m), CoM velocity (m/s); zero where not feasible.
+    """
+
+    features: np.ndarray
+    feasible: np.ndarray
+    targets: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.features)
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Manifest of a data set.
+
+    Raises:
+        DatasetError: there is none, or it cannot be read.
+    """
+    path = folder / "manifest.json"
+    if not path.is_file():
+        raise DatasetError(
+            f"{folder}: no data set here (manifest.json is missing); make one with: python -m toolkit.train collect"
+        )
+    try:
+        manifest = Manifest(**json.loads(path.read_text()))
+    except (json.JSONDecodeError, TypeError) as error:
+        raise DatasetError(f"{path}: not a manifest ({error}); collect into another folder") from None
+    if manifest.schema != SCHEMA:
+        raise DatasetError(f"{path}: schema {manifest.schema!r}, expected {SCHEMA!r}; collect the data again")
+    return manifest
+
+
+def shard_path(folder: Path, index: int) -> Path:
+    """File of shard `index`."""
+    return folder / f"shard-{index:06d}.npz"
+
+
+def write_shard(folder: Path, index: int, samples: dict[Category, Samples]) -> None:
+    """Write a shard, whole or not at all."""
+    arrays = {}
+    for category, group in samples.items():
+        arrays[f"features_{int(category)}"] = group.features
+        arrays[f"feasible_{int(category)}"] = group.feasible
+        arrays[f"targets_{int(category)}"] = group.targets
+    path = shard_path(folder, index)
+    temporary = path.with_suffix(".part")
+    with temporary.open("wb") as file:
+        np.savez(file, **arrays)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(temporary, path)
+
+
+def read_shard(path: Path) -> dict[Category, Samples]:
+    """Samples of one shard by category.
+
+    Raises:
+        DatasetError: the file is truncated, or its arrays do not fit.
+    """
+    remedy = "delete it and run the collection again to refill it"
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise DatasetError(f"{path}: truncated or not a shard ({error}); {remedy}") from None
+    samples = {}
+    for category in Category:
+        names = [f"{part}_{int(category)}" for part in ("features", "feasible", "targets")]
+        if not any(name in arrays for name in names):
+            continue
+        if not all(name in arrays for name in names):
+            raise DatasetError(f"{path}: incomplete arrays for category {int(category)}; {remedy}")
+        group = Samples(*(arrays[name] for name in names))
+        n = len(group.feasible)
+        expected = [(n, feature_size(category)), (n,), (n, TARGETS)]
+        shapes = [array.shape for array in (group.features, group.feasible, group.targets)]
+        if shapes != expected:
+            raise DatasetError(f"{path}: category {int(category)} has shapes {shapes}, expected {expected}; {remedy}")
+        if not (np.isfinite(group.features).all() and np.isfinite(group.targets).all()):
+            raise DatasetError(f"{path}: category {int(category)} holds NaN or infinite values; {remedy}")
+        samples[category] = group
+    return samples
+
+
+def read_dataset(folder: Path, fingerprint: str, *, limit: int | None = None) -> dict[Category, Samples]:
+    """All samples of a data set by category, in the order of the shards.
+
+    Args:
+        folder: the data set.
+        fingerprint: of the robot that they must belong to.
+        limit: at most so many samples per category.
+
+    Raises:
+        DatasetError: another robot's data, no shards, or a broken one.
+    """
+    manifest = read_manifest(folder)
+    if manifest.fingerprint != fingerprint:
+        raise DatasetError(
+            f"{folder}: collected for robot {manifest.robot!r} with fingerprint "
+            f"{manifest.fingerprint[:12]}, not {fingerprint[:12]}; collect again for this robot"
+        )
+    paths = sorted(folder.glob("shard-*.npz"))
+    if not paths:
+        raise DatasetError(f"{folder}: holds no shards yet; run python -m toolkit.train collect")
+    groups: dict[Category, list[Samples]] = {}
+    for path in paths:
+        for category, samples in read_shard(path).items():
+            groups.setdefault(category, []).append(samples)
+    return {
+        category: Samples(
+            np.concatenate([item.features for item in items])[:limit],
+            np.concatenate([item.feasible for item in items])[:limit],
+            np.concatenate([item.targets for item in items])[:limit],
+        )
+        for category, items in sorted(groups.items())
+    }

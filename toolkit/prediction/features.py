@@ -1,0 +1,159 @@
+"""Features: a contact transition as the vector that the networks see, and back.
+
+Every transition is brought into one canonical form: the frame of the parent stance (mean of the feet, yaw only), and
+mirrored where a right limb moves, so that the moving limb is always a left one (paper, Sec. VI). Each contact enters
+with its position and the x and z axes of its frame (9 numbers). The axes are continuous over all orientations, so the
+paper's copies of samples at +-2 pi are not needed; `tait_bryan` gives the paper's angles for comparison.
+
+Order: left foot, right foot, (left palm), (right palm), (new contact), CoM, CoM velocity, shift, swing, friction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.contacts.category import Category, category_of
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.pose import Pose
+
+MIRROR = np.array([1.0, -1.0, 1.0])
+CONTACT = 9  # numbers per contact
+TARGETS = 7  # objective, CoM, CoM velocity
+
+# Limbs in contact before the transition, in canonical (mirrored) form, and the limb that moves; None: broken.
+LAYOUT: dict[Category, tuple[tuple[Limb, ...], bool]] = {
+    Category.MOVE_FOOT: (FEET, True),
+    Category.ADD_PALM: (FEET, True),
+    Category.MOVE_INNER_FOOT_WITH_PALM: ((*FEET, Limb.LEFT_PALM), True),
+    Category.MOVE_OUTER_FOOT_WITH_PALM: ((*FEET, Limb.RIGHT_PALM), True),
+    Category.BREAK_ONLY_PALM: ((*FEET, Limb.LEFT_PALM), False),
+    Category.MOVE_ONLY_PALM: ((*FEET, Limb.LEFT_PALM), True),
+    Category.ADD_OTHER_PALM: ((*FEET, Limb.RIGHT_PALM), True),
+    Category.MOVE_FOOT_WITH_PALMS: ((*FEET, Limb.LEFT_PALM, Limb.RIGHT_PALM), True),
+    Category.BREAK_ONE_PALM: ((*FEET, Limb.LEFT_PALM, Limb.RIGHT_PALM), False),
+    Category.MOVE_ONE_PALM: ((*FEET, Limb.LEFT_PALM, Limb.RIGHT_PALM), True),
+}
+
+
+def contact_count(category: Category) -> int:
+    """Contacts in a transition: those before it, and the new one if there is one."""
+    limbs, makes = LAYOUT[category]
+    return len(limbs) + makes
+
+
+def feature_size(category: Category) -> int:
+    """Length of the feature vector of a category."""
+    return CONTACT * contact_count(category) + 9
+
+
+@dataclass(frozen=True)
+class Canonical:
+    """The change of frame that brought transitions into canonical form.
+
+    Attributes:
+        world_from_parent: upright frame at the mean of the parent's feet.
+        mirrored: whether y was negated afterwards.
+    """
+
+    world_from_parent: Pose
+    mirrored: bool
+
+    def vector(self, vectors: np.ndarray) -> np.ndarray:
+        """Directions (..., 3) from the world into canonical form."""
+        local = vectors @ self.world_from_parent.rotation
+        return local * MIRROR if self.mirrored else local
+
+    def point(self, points: np.ndarray) -> np.ndarray:
+        """Points (..., 3) from the world into canonical form."""
+        return self.vector(points - self.world_from_parent.position)
+
+    def vector_back(self, vectors: np.ndarray) -> np.ndarray:
+        """Directions (..., 3) from canonical form into the world."""
+        local = vectors * MIRROR if self.mirrored else vectors
+        return local @ self.world_from_parent.rotation.T
+
+    def point_back(self, points: np.ndarray) -> np.ndarray:
+        """Points (..., 3) from canonical form into the world."""
+        return self.vector_back(points) + self.world_from_parent.position
+
+    def contact(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Contacts (n, 3), (n, 3, 3) in the world as (n, 9): position, x axis, z axis, canonical.
+
+        A mirrored contact frame keeps its x and z axes mirrored; y follows from them.
+        """
+        return np.concatenate(
+            [self.point(positions), self.vector(rotations[..., :, 0]), self.vector(rotations[..., :, 2])], axis=-1
+        )
+
+
+def encode(
+    stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+) -> tuple[Canonical, np.ndarray]:
+    """Features of transitions of ONE category by the same limb out of one parent state.
+
+    Args:
+        stance: the parent's stance.
+        com: (3,) m, world.
+        com_velocity: (3,) m/s, world.
+        transitions: n transitions, all of one category and limb.
+
+    Returns:
+        The canonical frame and (n, feature_size) float64 features.
+
+    Raises:
+        ValueError: the transitions are of several categories or limbs.
+    """
+    limb = transitions[0].limb
+    category = category_of(stance, transitions[0])
+    makes = LAYOUT[category][1]
+    if any(item.limb != limb or (item.contact is not None) != makes for item in transitions):
+        raise ValueError("transitions of one call must share their limb and category")
+    frame = Canonical(stance.mean_feet, not limb.is_left)
+    order = [limb_in.mirrored if frame.mirrored else limb_in for limb_in in LAYOUT[category][0]]
+    old = [stance[item] for item in order]
+    parent = frame.contact(
+        np.array([contact.pose.position for contact in old]), np.array([contact.pose.rotation for contact in old])
+    )
+    n = len(transitions)
+    features = np.empty((n, feature_size(category)))
+    features[:, : parent.size] = parent.ravel()
+    column = parent.size
+    friction = np.full(n, min(contact.friction for contact in old))
+    if makes:
+        new: list[Contact] = [item.contact for item in transitions if item.contact is not None]
+        features[:, column : column + CONTACT] = frame.contact(
+            np.array([contact.pose.position for contact in new]), np.array([contact.pose.rotation for contact in new])
+        )
+        column += CONTACT
+        friction = np.minimum(friction, [contact.friction for contact in new])
+    features[:, column : column + 3] = frame.point(np.asarray(com, float))
+    features[:, column + 3 : column + 6] = frame.vector(np.asarray(com_velocity, float))
+    features[:, column + 6] = [item.timing.shift for item in transitions]
+    features[:, column + 7] = [item.timing.swing for item in transitions]
+    features[:, column + 8] = friction
+    return frame, features
+
+
+def tait_bryan(features: np.ndarray, category: Category) -> np.ndarray:
+    """The paper's encoding: each contact's axes replaced by yaw, pitch and roll in [-pi, pi).
+
+    Args:
+        features: (n, feature_size) as `encode` gives them.
+        category: of the transitions.
+
+    Returns:
+        (n, 6 * contacts + 9) float.
+    """
+    count = contact_count(category)
+    contacts = features[:, : CONTACT * count].reshape(len(features), count, CONTACT)
+    x, z = contacts[..., 3:6], contacts[..., 6:9]
+    y = np.cross(z, x)
+    yaw = np.arctan2(x[..., 1], x[..., 0])
+    pitch = np.arctan2(-x[..., 2], np.hypot(x[..., 0], x[..., 1]))
+    roll = np.arctan2(y[..., 2], z[..., 2])
+    poses = np.concatenate([contacts[..., :3], np.stack([yaw, pitch, roll], -1)], axis=-1)
+    return np.concatenate([poses.reshape(len(features), -1), features[:, CONTACT * count :]], axis=1)

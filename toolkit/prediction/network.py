@@ -1,0 +1,128 @@
+"""Networks: a classifier and a regressor per category, evaluated in NumPy, stored as safetensors."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+
+from toolkit.contacts.category import Category
+from toolkit.errors import NetworkError
+from toolkit.prediction.features import TARGETS, feature_size
+
+SCHEMA = "transition-network-1"
+HIDDEN = 256
+LAYERS = 4  # three hidden ones and the output
+
+
+@dataclass(frozen=True)
+class Perceptron:
+    """ReLU layers; the z-scoring of the inputs is folded into the first one, that of the outputs into the last.
+
+    Attributes:
+        weights: layer by layer, (inputs, outputs) float32.
+        biases: layer by layer, (outputs,) float32.
+    """
+
+    weights: tuple[np.ndarray, ...]
+    biases: tuple[np.ndarray, ...]
+
+    def __call__(self, inputs: np.ndarray) -> np.ndarray:
+        """Outputs (n, k) float32 for inputs (n, d)."""
+        x = np.asarray(inputs, np.float32)
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            x = x @ weight
+            x += bias
+            np.maximum(x, 0.0, out=x)
+        return x @ self.weights[-1] + self.biases[-1]
+
+
+@dataclass(frozen=True)
+class TransitionNetwork:
+    """The two networks of one category.
+
+    Attributes:
+        category: which transitions they judge.
+        classifier: features -> (n, 1) log-odds of being feasible (a softmax over two classes is their logistic).
+        regressor: features -> (n, 7): objective (before its ReLU), CoM (m) and CoM velocity (m/s), canonical frame.
+        lower, upper: (d,) range of the training features; timing and friction outside it are extrapolation.
+        metadata: what the file says of its training.
+    """
+
+    category: Category
+    classifier: Perceptron
+    regressor: Perceptron
+    lower: np.ndarray
+    upper: np.ndarray
+    metadata: dict[str, str]
+
+    def feasible(self, features: np.ndarray) -> np.ndarray:
+        """(n,) bool for features (n, d)."""
+        return self.classifier(features)[:, 0] > 0.0
+
+    def predict(self, features: np.ndarray) -> np.ndarray:
+        """(n, 7) float32 objective (not negative), CoM and velocity for features (n, d)."""
+        outputs = self.regressor(features)
+        np.maximum(outputs[:, 0], 0.0, out=outputs[:, 0])
+        return outputs
+
+
+def network_path(folder: Path, category: Category) -> Path:
+    """File of a category in a robot's `networks/` folder."""
+    return folder / f"category_{int(category)}.safetensors"
+
+
+def load_network(path: Path, category: Category, fingerprint: str) -> TransitionNetwork:
+    """Load and check one file.
+
+    Args:
+        path: the safetensors file.
+        category: expected category.
+        fingerprint: of the robot that will use it.
+
+    Raises:
+        NetworkError: missing or truncated file, wrong schema, category, robot or shapes, values that are not finite.
+    """
+    remedy = "train it with: python -m toolkit.train collect, then fit"
+    if not path.is_file():
+        raise NetworkError(f"{path}: no such network; {remedy}")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            metadata = dict(file.metadata() or {})
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (not a mapping)
+    except (SafetensorError, OSError) as error:
+        raise NetworkError(f"{path}: not a readable safetensors file ({error}); {remedy}") from None
+    expected = {"schema": SCHEMA, "category": str(int(category)), "robot": fingerprint}
+    for key, value in expected.items():
+        if metadata.get(key) != value:
+            raise NetworkError(f"{path}: {key} is {metadata.get(key)!r}, expected {value!r}; {remedy}")
+    size = feature_size(category)
+    parts = []
+    for name, outputs in (("classifier", 1), ("regressor", TARGETS)):
+        widths = [size, *[HIDDEN] * (LAYERS - 1), outputs]
+        weights, biases = [], []
+        for layer in range(LAYERS):
+            weights.append(_tensor(path, tensors, f"{name}.{layer}.weight", (widths[layer], widths[layer + 1])))
+            biases.append(_tensor(path, tensors, f"{name}.{layer}.bias", (widths[layer + 1],)))
+        parts.append(Perceptron(tuple(weights), tuple(biases)))
+    lower, upper = (_tensor(path, tensors, f"features.{name}", (size,)) for name in ("lower", "upper"))
+    return TransitionNetwork(category, parts[0], parts[1], lower, upper, metadata)
+
+
+def _tensor(path: Path, tensors: dict[str, np.ndarray], name: str, shape: tuple[int, ...]) -> np.ndarray:
+    if name not in tensors:
+        raise NetworkError(f"{path}: tensor {name} is missing; train the networks again")
+    tensor = np.ascontiguousarray(tensors[name], np.float32)
+    if tensor.shape != shape:
+        raise NetworkError(f"{path}: tensor {name} is {tensor.shape}, expected {shape}; train the networks again")
+    if not np.isfinite(tensor).all():
+        raise NetworkError(f"{path}: tensor {name} holds values that are not finite; train the networks again")
+    return tensor
+
+
+def training_summary(network: TransitionNetwork) -> dict:
+    """What the file says of its training, as a dictionary."""
+    return json.loads(network.metadata.get("training", "{}"))

@@ -1,0 +1,104 @@
+"""NetworkEvaluator: judges transitions with the learned networks (paper, Sec. VI)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from toolkit.contacts.category import Category, category_of
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Stance
+from toolkit.errors import NetworkError
+from toolkit.geometry.limb import Limb
+from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
+from toolkit.prediction.features import encode
+from toolkit.prediction.network import TransitionNetwork, load_network, network_path
+from toolkit.robot.model import RobotModel
+
+TIMING_AND_FRICTION = slice(-3, None)
+
+
+def load_networks(robot: RobotModel, folder: Path | None = None) -> dict[Category, TransitionNetwork]:
+    """The networks of every category that the robot can perform.
+
+    Args:
+        robot: whose `networks/` folder is read unless `folder` is given.
+        folder: another folder of networks.
+
+    Raises:
+        NetworkError: see `load_network`.
+    """
+    folder = folder or robot.folder / "networks"
+    categories = list(Category) if robot.arms else [Category.MOVE_FOOT]
+    return {
+        category: load_network(network_path(folder, category), category, robot.fingerprint) for category in categories
+    }
+
+
+@dataclass
+class NetworkEvaluator:
+    """Judges by networks; hands transitions that lie outside the trained timings and frictions to another judge.
+
+    Attributes:
+        networks: by category.
+        outside: judges what the networks have not been trained for; None: the networks judge all the same.
+        outside_count: transitions that lay outside so far.
+    """
+
+    networks: dict[Category, TransitionNetwork]
+    outside: TransitionEvaluator | None = None
+    outside_count: int = field(default=0, init=False)
+
+    def evaluate(
+        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+    ) -> TransitionBatch:
+        """Judge transitions; see `TransitionEvaluator`.
+
+        Raises:
+            NetworkError: the state or a contact is not finite, or there is no network for a category.
+        """
+        n = len(transitions)
+        feasible, objective = np.zeros(n, bool), np.zeros(n)
+        end_com, end_velocity = np.zeros((n, 3)), np.zeros((n, 3))
+        groups: dict[tuple[Limb, bool], list[int]] = {}
+        for index, transition in enumerate(transitions):
+            groups.setdefault((transition.limb, transition.contact is None), []).append(index)
+        for indices in groups.values():
+            rows = np.array(indices)
+            category = category_of(stance, transitions[indices[0]])
+            network = self.networks.get(category)
+            if network is None:
+                raise NetworkError(f"no network for category {int(category)} ({category.name.lower()}) is loaded")
+            frame, features = encode(stance, com, com_velocity, [transitions[i] for i in indices])
+            if not np.isfinite(features).all():
+                raise NetworkError(f"a query of category {int(category)} holds NaN or infinite values")
+            inside = self._inside(network, features)
+            rows_out = rows[~inside]
+            if len(rows_out):
+                self.outside_count += len(rows_out)
+                if self.outside is not None:
+                    batch = self.outside.evaluate(stance, com, com_velocity, [transitions[i] for i in rows_out])
+                    feasible[rows_out], objective[rows_out] = batch.feasible, batch.objective
+                    end_com[rows_out], end_velocity[rows_out] = batch.com, batch.com_velocity
+                    rows, features = rows[inside], features[inside]
+                    if not len(rows):
+                        continue
+            accepted = network.feasible(features)
+            feasible[rows] = accepted
+            if accepted.any():
+                outputs = network.predict(features[accepted]).astype(float)
+                kept = rows[accepted]
+                objective[kept] = outputs[:, 0]
+                end_com[kept] = frame.point_back(outputs[:, 1:4])
+                end_velocity[kept] = frame.vector_back(outputs[:, 4:7])
+        return TransitionBatch(feasible, objective, end_com, end_velocity)
+
+    @staticmethod
+    def _inside(network: TransitionNetwork, features: np.ndarray) -> np.ndarray:
+        """(n,) bool: timing and friction within the training range, with 1 % to spare."""
+        lower, upper = network.lower[TIMING_AND_FRICTION], network.upper[TIMING_AND_FRICTION]
+        slack = 0.01 * (upper - lower) + 1e-6
+        values = features[:, TIMING_AND_FRICTION]
+        return ((values >= lower - slack) & (values <= upper + slack)).all(1)
