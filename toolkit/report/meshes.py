@@ -1,0 +1,162 @@
+"""Triangle meshes of MuJoCo geoms, for drawing only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+SHOWN_GROUPS = range(3)  # MuJoCo's viewer shows geom groups 0-2; by custom collision-only geoms are in group 3
+
+
+@dataclass(frozen=True)
+class TriangleMesh:
+    """A triangle mesh with vertex normals.
+
+    Attributes:
+        vertices: (n, 3) float, m.
+        triangles: (m, 3) int, counterclockwise seen from outside.
+        normals: (n, 3) float unit outward normals.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    normals: np.ndarray
+
+
+def shown_geoms(model: mujoco.MjModel, geoms: np.ndarray) -> np.ndarray:
+    """Those of `geoms` (k,) int that a viewer shows: visible groups, not fully transparent; all where none is left."""
+    geoms = np.asarray(geoms, int)
+    shown = np.isin(model.geom_group[geoms], list(SHOWN_GROUPS))
+    shown &= np.array([geom_rgba(model, geom)[3] > 0.01 for geom in geoms], bool)
+    return geoms[shown] if shown.any() else geoms
+
+
+def static_bodies(model: mujoco.MjModel) -> np.ndarray:
+    """(nbody,) bool: bodies that cannot move, the world body among them."""
+    return model.body_weldid == 0
+
+
+def geom_rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """(4,) float in 0..1; the geom's own colour, or its material's where it has one and kept the default colour."""
+    material = model.geom_matid[geom]
+    default = np.allclose(model.geom_rgba[geom], [0.5, 0.5, 0.5, 1.0])
+    return np.array(model.mat_rgba[material] if material >= 0 and default else model.geom_rgba[geom], float)
+
+
+def name_of(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
+    """Name of an object, or `type#id` where it has none."""
+    return mujoco.mj_id2name(model, kind, index) or f"{kind.name.removeprefix('mjOBJ_').lower()}#{index}"
+
+
+def mesh_of_geom(model: mujoco.MjModel, geom: int, *, plane_extent: float = 10.0) -> TriangleMesh:
+    """Mesh of a geom in the geom's own frame.
+
+    Args:
+        model: compiled model.
+        geom: index of the geom.
+        plane_extent: m; half size drawn for a plane that is infinite.
+
+    Returns:
+        The mesh; empty for a kind of geom that has no shape of its own.
+    """
+    kind, size = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_PLANE:
+        x, y = (half if half > 0 else plane_extent for half in size[:2])
+        corners = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]])
+        return TriangleMesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.tile([0.0, 0, 1], (4, 1)))
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return _box(size)
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        return _compiled_mesh(model, model.geom_dataid[geom])
+    if kind == mujoco.mjtGeom.mjGEOM_HFIELD:
+        return _height_field(model, model.geom_dataid[geom])
+    angles = np.linspace(-np.pi / 2, np.pi / 2, 13)
+    arc, rise = np.cos(angles), np.sin(angles)
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return _revolve(arc * size[0], rise * size[0], arc, rise)
+    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+        ball = _revolve(arc, rise, arc, rise)
+        normals = ball.normals / size
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        return TriangleMesh(ball.vertices * size, ball.triangles, normals)
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        shift = size[1] * np.sign(rise)
+        middle = len(angles) // 2
+        radius = np.insert(arc, middle, 1.0) * size[0]
+        shift[middle] = size[1]
+        height = np.insert(rise * size[0] + shift, middle, -size[1])
+        return _revolve(radius, height, np.insert(arc, middle, 1.0), np.insert(rise, middle, 0.0))
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        radius, half = size[0], size[1]
+        profile = np.array([[0, -half, 0, -1], [radius, -half, 0, -1], [radius, -half, 1, 0]])
+        profile = np.concatenate([profile, [[radius, half, 1, 0], [radius, half, 0, 1], [0, half, 0, 1]]])
+        return _revolve(*profile.T)
+    return TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros((0, 3)))
+
+
+def _box(half: np.ndarray) -> TriangleMesh:
+    """Box with four vertices a face, so that its edges look sharp."""
+    vertices, normals = [], []
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], float)
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            face = np.empty((4, 3))
+            face[:, axis] = sign
+            face[:, [(axis + 1) % 3, (axis + 2) % 3]] = square[:: int(sign)]
+            vertices.append(face * half)
+            normals.append(np.tile(sign * np.eye(3)[axis], (4, 1)))
+    triangles = (np.arange(6)[:, None, None] * 4 + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    return TriangleMesh(np.concatenate(vertices), triangles, np.concatenate(normals))
+
+
+def _revolve(
+    radius: np.ndarray, height: np.ndarray, normal_r: np.ndarray, normal_z: np.ndarray, sides: int = 24
+) -> TriangleMesh:
+    """Surface of revolution about z of a profile (k,) given from bottom to top."""
+    angle = np.arange(sides) * 2 * np.pi / sides
+    c, s = np.cos(angle), np.sin(angle)
+
+    def swept(r: np.ndarray, z: np.ndarray) -> np.ndarray:
+        return np.stack([np.outer(r, c), np.outer(r, s), np.repeat(z[:, None], sides, 1)], -1).reshape(-1, 3)
+
+    ring, column = np.meshgrid(np.arange(len(radius) - 1) * sides, np.arange(sides), indexing="ij")
+    after = (column + 1) % sides
+    a, b, d, e = ring + column, ring + after, ring + sides + after, ring + sides + column
+    triangles = np.concatenate([np.stack([a, b, d], -1), np.stack([a, d, e], -1)]).reshape(-1, 3)
+    return TriangleMesh(swept(radius, height), triangles, swept(normal_r, normal_z))
+
+
+def _flat_shaded(vertices: np.ndarray, triangles: np.ndarray) -> TriangleMesh:
+    """A mesh whose triangles own their vertices, each with the triangle's normal; degenerate triangles are dropped."""
+    corners = vertices[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    corners, normal = corners[length > 0], normal[length > 0] / length[length > 0, None]
+    return TriangleMesh(
+        corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), np.repeat(normal, 3, axis=0)
+    )
+
+
+def _compiled_mesh(model: mujoco.MjModel, mesh: int) -> TriangleMesh:
+    """A mesh asset as MuJoCo compiled it."""
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    vertices = np.array(model.mesh_vert[first : first + count], float)
+    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    return _flat_shaded(vertices, np.array(model.mesh_face[first : first + count], int))
+
+
+def _height_field(model: mujoco.MjModel, field: int) -> TriangleMesh:
+    """The top of a height field."""
+    rows, columns = model.hfield_nrow[field], model.hfield_ncol[field]
+    half_x, half_y, top, _ = model.hfield_size[field]
+    first = model.hfield_adr[field]
+    z = np.array(model.hfield_data[first : first + rows * columns], float).reshape(rows, columns) * top
+    x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
+    row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
+    a = (row * columns + column).ravel()
+    triangles = np.concatenate(
+        [np.stack([a, a + 1, a + columns + 1], -1), np.stack([a, a + columns + 1, a + columns], -1)]
+    )
+    return _flat_shaded(np.stack([x, y, z], -1).reshape(-1, 3), triangles)
