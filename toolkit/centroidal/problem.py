@@ -86,6 +86,10 @@ class CentroidalProblem:
         final_half_size: (3,) m: box in the world for the last CoM position, axes of the final yaw frame.
         final_at_rest: whether the last CoM velocity must be zero.
         weights, margins: see the classes.
+        landing_limb: limb that makes contact at the last knot, -1 for none. Its contact bears no force in any step, but
+            the last knot respects its reach (and, for a foot, the least height above it).
+        landing_position: (3,) m and
+        landing_rotation: (3, 3): that contact, as in `position` and `rotation`; None without one.
     """
 
     mass: float
@@ -109,11 +113,19 @@ class CentroidalProblem:
     final_at_rest: bool
     weights: Weights = field(default_factory=Weights)
     margins: Margins = field(default_factory=Margins)
+    landing_limb: int = -1
+    landing_position: np.ndarray | None = None
+    landing_rotation: np.ndarray | None = None
 
     @property
     def steps(self) -> int:
         """Number of intervals N."""
         return len(self.dt)
+
+    @property
+    def reduced_half_size(self) -> np.ndarray:
+        """(4, 2) m; half extents that bound the CoP and the yaw moment: the CoP margin taken off, at most half."""
+        return self.half_size - np.minimum(self.margins.cop, self.half_size / 2)
 
     @property
     def times(self) -> np.ndarray:

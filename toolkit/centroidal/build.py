@@ -1,0 +1,248 @@
+"""Centroidal problems of one contact transition and of whole schedules.
+
+Data collection builds millions of transition problems, so plain floats and preallocated arrays do the work here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from toolkit.centroidal.problem import CentroidalProblem, Margins, Weights
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.errors import InputError
+from toolkit.geometry.limb import FEET
+from toolkit.robot.model import RobotModel
+
+STANDARD_GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class ProblemConfig:
+    """What a problem assumes beyond robot, contacts and timing.
+
+    Attributes:
+        steps: intervals per phase (the paper: 1 s in steps of 0.2 s).
+        max_dt: s; long phases of a schedule get more steps than `steps` to stay below this.
+        final_half_size: (3,) m; half sizes of the box for the last CoM, around the home height above the mean feet.
+        min_height: the CoM stays this part of the home height above the lowest foot in contact.
+        max_normal_force: bound on the normal force of each limb in multiples of the robot's weight, applied on top of
+            the limb's own limit: legs do not push with arbitrary force, however short the step.
+        max_velocity: m/s; the initial CoM velocity may not be faster (a guard against wrong units).
+        weights: of the objective.
+        margins: of the constraints.
+    """
+
+    steps: int = 5
+    max_dt: float = 0.2
+    final_half_size: tuple[float, float, float] = (0.15, 0.10, 0.10)
+    min_height: float = 0.7
+    max_normal_force: float = 3.0
+    max_velocity: float = 20.0
+    weights: Weights = field(default_factory=Weights)
+    margins: Margins = field(default_factory=Margins)
+
+
+def initial_com(robot: RobotModel, stance: Stance) -> np.ndarray:
+    """(3,) m; the CoM of a robot standing at rest: home height above the mean of the feet."""
+    return stance.mean_feet.position + np.array([0.0, 0.0, robot.com_height])
+
+
+def transition_problem(
+    robot: RobotModel,
+    stance: Stance,
+    com: np.ndarray,
+    com_velocity: np.ndarray,
+    transition: ContactTransition,
+    *,
+    config: ProblemConfig | None = None,
+    final_at_rest: bool = False,
+) -> CentroidalProblem:
+    """Problem of one contact transition: `config.steps` equal steps of shift, as many of swing.
+
+    The last knot must be within reach of the new contact too.
+
+    Args:
+        robot: mass, patches and reach.
+        stance: contacts before the transition.
+        com: (3,) m initial CoM in the world.
+        com_velocity: (3,) m/s.
+        transition: the limb that moves, its new contact and the timing.
+        config: see the class; its defaults where None.
+        final_at_rest: whether the CoM must be at rest at the end.
+
+    Raises:
+        InputError: CoM or velocity are not finite, a duration is not positive, or the robot has no such limb.
+    """
+    config = config or ProblemConfig()
+    timing = transition.timing
+    if not (timing.shift > 0.0 and timing.swing > 0.0):
+        raise InputError(f"transition timing must be positive, got shift {timing.shift} s and swing {timing.swing} s")
+    n = config.steps
+    before, after = stance.contacts, transition.apply(stance).contacts
+    dt = np.empty(2 * n)
+    dt[:n], dt[n:] = timing.shift / n, timing.swing / n
+    # A moving foot turns the heading from the mean of the old feet to the mean of the new ones.
+    start, end = _heading(before), _heading(after)
+    yaw = np.empty(2 * n + 1)
+    yaw[: n + 1] = start
+    yaw[n + 1 :] = start + _wrap(end - start) / n * np.arange(1, n + 1)
+    arrays = _contact_arrays(2 * n)
+    for contact in before:
+        moves = contact.limb == transition.limb
+        _put(arrays, contact, 0, n if moves else 2 * n, 2 * n)
+    return _problem(robot, config, arrays, dt, yaw, com, com_velocity, after, final_at_rest, landing=transition.contact)
+
+
+def sequence_problem(
+    robot: RobotModel,
+    schedule: ContactSchedule,
+    com: np.ndarray,
+    com_velocity: np.ndarray,
+    *,
+    config: ProblemConfig | None = None,
+) -> CentroidalProblem:
+    """Problem of a whole schedule, which ends at rest.
+
+    Every phase gets `config.steps` equal steps, or more where they would be longer than `config.max_dt`.
+
+    Args:
+        robot: mass, patches and reach.
+        schedule: phases; the last one has both feet in contact.
+        com: (3,) m initial CoM in the world.
+        com_velocity: (3,) m/s.
+        config: see the class; its defaults where None.
+
+    Raises:
+        InputError: the schedule ends with a foot in the air, or as in `transition_problem`.
+    """
+    config = config or ProblemConfig()
+    phases = schedule.phases
+    last = phases[-1].contacts
+    if [contact.limb for contact in last[:2]] != list(FEET):
+        raise InputError("a schedule must end with both feet in contact: give it a final rest longer than 0 s")
+    counts = [max(config.steps, math.ceil(phase.duration / config.max_dt - 1e-9)) for phase in phases]
+    total = sum(counts)
+    dt, yaw = np.empty(total), np.empty(total + 1)
+    arrays = _contact_arrays(total)
+    yaw[0] = heading = _heading(phases[0].contacts)
+    begin = 0
+    for index, (phase, count) in enumerate(zip(phases, counts, strict=True)):
+        if not phase.duration > 0.0:
+            raise InputError(f"phase {index} of the schedule lasts {phase.duration} s; it must be positive")
+        end = begin + count
+        dt[begin:end] = phase.duration / count
+        feet_stay = phase.swing is None or not phase.swing.is_foot
+        target = heading if feet_stay else _heading(phases[index + 1].contacts)
+        yaw[begin + 1 : end + 1] = heading + _wrap(target - heading) / count * np.arange(1, count + 1)
+        heading = float(yaw[end])
+        for contact in phase.contacts:
+            _put(arrays, contact, begin, end, total)
+        begin = end
+    return _problem(robot, config, arrays, dt, yaw, com, com_velocity, last, True, landing=None)
+
+
+def _contact_arrays(steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Empty `active`, `position`, `rotation` and `friction` of a problem."""
+    rotation = np.zeros((steps, 4, 3, 3))
+    rotation[:, :, (0, 1, 2), (0, 1, 2)] = 1.0
+    return np.zeros((steps, 4), bool), np.zeros((steps, 4, 3)), rotation, np.zeros((steps, 4))
+
+
+def _put(arrays: tuple[np.ndarray, ...], contact: Contact, begin: int, end: int, total: int) -> None:
+    """Enter a contact that holds in steps [begin, end); its place stays known afterwards."""
+    active, position, rotation, friction = arrays
+    active[begin:end, contact.limb] = True
+    position[begin:total, contact.limb] = contact.pose.position
+    rotation[begin:total, contact.limb] = contact.pose.rotation
+    friction[begin:total, contact.limb] = contact.friction
+
+
+def _problem(
+    robot: RobotModel,
+    config: ProblemConfig,
+    arrays: tuple[np.ndarray, ...],
+    dt: np.ndarray,
+    yaw: np.ndarray,
+    com: np.ndarray,
+    com_velocity: np.ndarray,
+    last: Sequence[Contact],
+    final_at_rest: bool,
+    landing: Contact | None,
+) -> CentroidalProblem:
+    """The problem of filled arrays that ends on the contacts `last`."""
+    com, com_velocity = np.array(com, float), np.array(com_velocity, float)
+    x, y, z = com.tolist()
+    vx, vy, vz = com_velocity.tolist()
+    if not (math.isfinite(x + y + z) and math.hypot(vx, vy, vz) <= config.max_velocity):
+        raise InputError(
+            f"CoM {com} m and velocity {com_velocity} m/s must be finite, the speed at most {config.max_velocity} m/s"
+        )
+    active = arrays[0]
+    root, tip, reach = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(4)
+    half_size, force = np.zeros((4, 2)), np.zeros(4)
+    bound = config.max_normal_force * robot.mass * STANDARD_GRAVITY
+    for limb, model in robot.limbs.items():
+        half_size[limb] = model.half_size
+        force[limb] = min(model.max_normal_force, bound)
+        if limb.is_foot:
+            leg = robot.legs[limb]
+            root[limb], tip[limb], reach[limb] = leg.hip_in_com, leg.ankle_in_sole, leg.max_length
+        elif limb in robot.arms:
+            arm = robot.arms[limb]
+            root[limb], reach[limb] = arm.shoulder_in_com, arm.max_reach
+    used = active.any(0)
+    if landing is not None:
+        used[landing.limb] = True
+    for limb in range(4):
+        if used[limb] and not reach[limb] > 0.0:
+            raise InputError(f"the robot has no limb {limb} with a reach; it cannot make this contact")
+    a, b = last[0].pose.position.tolist(), last[1].pose.position.tolist()
+    return CentroidalProblem(
+        mass=robot.mass,
+        dt=dt,
+        active=active,
+        position=arrays[1],
+        rotation=arrays[2],
+        friction=arrays[3],
+        half_size=half_size,
+        max_normal_force=force,
+        yaw=yaw,
+        com=com,
+        com_velocity=com_velocity,
+        angular_momentum=np.zeros(3),
+        root_in_com=root,
+        tip_in_contact=tip,
+        max_reach=reach,
+        min_height=config.min_height * robot.com_height,
+        final_center=np.array([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2 + robot.com_height]),
+        final_half_size=np.array(config.final_half_size, float),
+        final_at_rest=final_at_rest,
+        weights=config.weights,
+        margins=config.margins,
+        landing_limb=-1 if landing is None else int(landing.limb),
+        landing_position=None if landing is None else landing.pose.position,
+        landing_rotation=None if landing is None else landing.pose.rotation,
+    )
+
+
+def _heading(contacts: Sequence[Contact]) -> float:
+    """Mean heading in rad of the feet among the contacts (the first two where both are there)."""
+    x = y = 0.0
+    for contact in contacts:
+        if contact.limb.is_foot:
+            rotation = contact.pose.rotation
+            dx, dy = float(rotation[0, 0]), float(rotation[1, 0])
+            length = math.hypot(dx, dy) or 1.0
+            x, y = x + dx / length, y + dy / length
+    return math.atan2(y, x)
+
+
+def _wrap(angle: float) -> float:
+    """The same angle in [-pi, pi]."""
+    return math.remainder(angle, 2 * math.pi)
