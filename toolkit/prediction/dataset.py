@@ -117,7 +117,7 @@ def read_shard(path: Path) -> dict[Category, Samples]:
     """
     remedy = "delete it and run the collection again to refill it"
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise DatasetError(f"{path}: truncated or not a shard ({error}); {remedy}") from None

@@ -1,0 +1,153 @@
+"""Network files and data sets: what is written comes back, and every broken file is refused in one clear line."""
+
+import numpy as np
+import pytest
+from safetensors.numpy import save_file
+
+from toolkit.contacts.category import Category
+from toolkit.errors import DatasetError, NetworkError
+from toolkit.prediction.dataset import (
+    Manifest,
+    Samples,
+    read_dataset,
+    read_shard,
+    shard_path,
+    write_shard,
+)
+from toolkit.prediction.evaluate import balanced, score
+from toolkit.prediction.features import feature_size
+from toolkit.prediction.network import HIDDEN, SCHEMA, load_network, network_path
+from toolkit.prediction.networks import NetworkEvaluator
+
+CATEGORY = Category.BREAK_ONLY_PALM
+
+
+def tensors(rng, size):
+    result = {"features.lower": -np.ones(size, np.float32), "features.upper": np.ones(size, np.float32)}
+    for name, outputs in (("classifier", 1), ("regressor", 7)):
+        widths = [size, HIDDEN, HIDDEN, HIDDEN, outputs]
+        for layer in range(4):
+            scale = 1 / np.sqrt(widths[layer])
+            weight = scale * rng.normal(size=(widths[layer], widths[layer + 1]))
+            result[f"{name}.{layer}.weight"] = weight.astype(np.float32)
+            result[f"{name}.{layer}.bias"] = rng.normal(size=widths[layer + 1]).astype(np.float32)
+    return result
+
+
+METADATA = {"schema": SCHEMA, "category": str(int(CATEGORY)), "robot": "abc"}
+
+
+@pytest.fixture
+def saved(tmp_path):
+    path = network_path(tmp_path, CATEGORY)
+    values = tensors(np.random.default_rng(0), feature_size(CATEGORY))
+    save_file(values, path, METADATA)
+    return path, values
+
+
+def test_a_network_computes_what_its_layers_say(saved):
+    path, values = saved
+    network = load_network(path, CATEGORY, "abc")
+    x = np.random.default_rng(1).normal(size=(5, feature_size(CATEGORY))).astype(np.float32)
+    y = x
+    for layer in range(4):
+        y = y @ values[f"regressor.{layer}.weight"] + values[f"regressor.{layer}.bias"]
+        y = y if layer == 3 else np.maximum(y, 0)
+    np.testing.assert_allclose(network.predict(x)[:, 1:], y[:, 1:], rtol=1e-4, atol=1e-4)  # float32 sums
+    assert (network.predict(x)[:, 0] >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda v, m: v.update({"regressor.1.weight": np.zeros((3, 3), np.float32)}), "is \\(3, 3\\)"),
+        (lambda v, m: v.pop("classifier.0.bias"), "classifier.0.bias is missing"),
+        (lambda v, m: v["regressor.3.bias"].__setitem__(0, np.nan), "not finite"),
+        (lambda v, m: m.update(robot="other"), "robot is 'other', expected 'abc'"),
+        (lambda v, m: m.update(category="7"), "category is '7'"),
+        (lambda v, m: m.update(schema="old"), "schema is 'old'"),
+    ],
+)
+def test_a_network_that_does_not_fit_is_refused(tmp_path, change, message):
+    values, metadata = tensors(np.random.default_rng(0), feature_size(CATEGORY)), dict(METADATA)
+    change(values, metadata)
+    path = network_path(tmp_path, CATEGORY)
+    save_file(values, path, metadata)
+    with pytest.raises(NetworkError, match=message):
+        load_network(path, CATEGORY, "abc")
+
+
+def test_missing_and_truncated_network_files_are_refused(saved):
+    path, _ = saved
+    with pytest.raises(NetworkError, match="no such network; train it with"):
+        load_network(path.with_name("other.safetensors"), CATEGORY, "abc")
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(NetworkError, match="not a readable safetensors file"):
+        load_network(path, CATEGORY, "abc")
+
+
+def some_samples(rng, n=40):
+    size = feature_size(CATEGORY)
+    feasible = rng.random(n) < 0.9
+    return Samples(
+        rng.normal(size=(n, size)).astype(np.float32),
+        feasible,
+        (rng.random((n, 7)) * feasible[:, None]).astype(np.float32),
+    )
+
+
+def data_set(folder, rng, fingerprint="abc"):
+    Manifest("transition-data-1", "some_robot", fingerprint, 0, {}, {}).write(folder)
+    groups = [some_samples(rng), some_samples(rng)]
+    for index, group in enumerate(groups):
+        write_shard(folder, index, {CATEGORY: group})
+    return groups
+
+
+def test_a_data_set_comes_back_in_order(tmp_path):
+    groups = data_set(tmp_path, np.random.default_rng(2))
+    samples = read_dataset(tmp_path, "abc")[CATEGORY]
+    np.testing.assert_array_equal(samples.features, np.concatenate([group.features for group in groups]))
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_a_broken_data_set_is_refused(tmp_path):
+    with pytest.raises(DatasetError, match="no data set here"):
+        read_dataset(tmp_path, "abc")
+    data_set(tmp_path, np.random.default_rng(2))
+    with pytest.raises(DatasetError, match="collected for robot 'some_robot'"):
+        read_dataset(tmp_path, "def")
+    path = shard_path(tmp_path, 1)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(DatasetError, match="truncated or not a shard"):
+        read_dataset(tmp_path, "abc")
+    group = some_samples(np.random.default_rng(3))
+    group.features[0, 0] = np.nan
+    write_shard(tmp_path, 1, {CATEGORY: group})
+    with pytest.raises(DatasetError, match="NaN or infinite"):
+        read_shard(path)
+    write_shard(tmp_path, 1, {CATEGORY: Samples(group.features[:, 1:], group.feasible, group.targets)})
+    with pytest.raises(DatasetError, match="has shapes"):
+        read_shard(path)
+
+
+def test_a_balanced_test_set_keeps_a_quarter_of_each_label(saved):
+    samples = some_samples(np.random.default_rng(5), 2000)
+    chosen = balanced(samples, 400, np.random.default_rng(0))
+    assert len(chosen) == 400
+    assert chosen.feasible.mean() == 0.75
+    result = score(load_network(saved[0], CATEGORY, "abc"), chosen)
+    assert result.feasible_share == 0.75
+    assert 0 <= result.accuracy <= 1
+
+
+def test_a_query_with_nan_is_refused(saved):
+    from tests.prediction.test_features import random_case
+
+    evaluator = NetworkEvaluator({CATEGORY: load_network(saved[0], CATEGORY, "abc")})
+    stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(6))
+    batch = evaluator.evaluate(stance, com, velocity, [transition])
+    assert batch.com.shape == (1, 3)
+    with pytest.raises(NetworkError, match="NaN or infinite"):
+        evaluator.evaluate(stance, com * np.nan, velocity, [transition])

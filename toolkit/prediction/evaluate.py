@@ -1,0 +1,67 @@
+"""How well the networks predict the optimiser, on transitions that they have not seen (paper, Fig. 8)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.prediction.dataset import Samples
+from toolkit.prediction.network import TransitionNetwork
+
+
+@dataclass(frozen=True)
+class Score:
+    """One row of the table.
+
+    Attributes:
+        samples: transitions tested.
+        feasible_share: of them that are feasible.
+        accuracy: share whose feasibility is predicted right.
+        mean_objective: of the feasible ones.
+        objective_error: mean absolute error.
+        com_error: mean distance between predicted and optimised final CoM, m.
+        velocity_error: the same for the final CoM velocity, m/s.
+    """
+
+    samples: int
+    feasible_share: float
+    accuracy: float
+    mean_objective: float
+    objective_error: float
+    com_error: float
+    velocity_error: float
+
+    @property
+    def relative_objective_error(self) -> float:
+        """Mean absolute error of the objective over its mean."""
+        return self.objective_error / self.mean_objective
+
+
+def score(network: TransitionNetwork, samples: Samples) -> Score:
+    """Score a network; the regressor is judged on the transitions that are feasible."""
+    targets = samples.targets[samples.feasible]
+    outputs = network.predict(samples.features[samples.feasible])
+    return Score(
+        samples=len(samples),
+        feasible_share=float(samples.feasible.mean()),
+        accuracy=float((network.feasible(samples.features) == samples.feasible).mean()),
+        mean_objective=float(targets[:, 0].mean()),
+        objective_error=float(np.abs(outputs[:, 0] - targets[:, 0]).mean()),
+        com_error=float(np.linalg.norm(outputs[:, 1:4] - targets[:, 1:4], axis=1).mean()),
+        velocity_error=float(np.linalg.norm(outputs[:, 4:7] - targets[:, 4:7], axis=1).mean()),
+    )
+
+
+def balanced(samples: Samples, count: int, rng: np.random.Generator, *, least_share: float = 0.25) -> Samples:
+    """A test set of `count` transitions in which neither label falls under `least_share`.
+
+    Takes the samples as they come and replaces only as many of the commoner label as it must.
+    """
+    order = rng.permutation(len(samples))
+    labels = samples.feasible[order]
+    head = labels[:count]
+    least = int(np.ceil(least_share * count))
+    wanted = int(np.clip(head.sum(), least, count - least))
+    chosen = np.concatenate([order[labels][:wanted], order[~labels][: count - wanted]])
+    return Samples(samples.features[chosen], samples.feasible[chosen], samples.targets[chosen])
