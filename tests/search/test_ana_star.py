@@ -1,0 +1,147 @@
+import math
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from toolkit.search.ana_star import AnaStar, AnaStarConfig, Edge
+
+
+class Graph:
+    """A random digraph with an admissible, deliberately inconsistent heuristic."""
+
+    def __init__(self, rng, nodes=60, degree=4, consistent=False, goals=2, scale=1.0):
+        self.graph = nx.DiGraph()
+        self.graph.add_nodes_from(range(nodes))
+        for node in range(nodes):
+            for other in rng.choice(nodes, degree, replace=False):
+                if other != node:
+                    self.graph.add_edge(node, int(other), weight=float(rng.choice([0.0, 0.5, 1.0, 3.0]) + rng.random()))
+        self.goals = {int(x) for x in rng.choice(np.arange(1, nodes), goals, replace=False)}
+        reverse = self.graph.reverse()
+        distance = nx.multi_source_dijkstra_path_length(reverse, self.goals)
+        self.least = distance.get(0, math.inf)
+        factor = np.full(nodes, scale) if consistent else scale * rng.random(nodes)
+        self.h = [distance[node] * factor[node] if node in distance else math.inf for node in range(nodes)]
+        self.expansions = 0
+
+    def start(self):
+        return 0
+
+    def expand(self, state, slack):
+        self.expansions += 1
+        return [Edge(other, data["weight"], (state, other)) for other, data in self.graph[state].items()]
+
+    def heuristic(self, states):
+        return [self.h[state] for state in states]
+
+    def is_goal(self, states):
+        return [state in self.goals for state in states]
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.1, 0.7])
+@pytest.mark.parametrize("initial_cost", [math.inf, 5.0])
+@pytest.mark.parametrize("consistent", [True, False])
+def test_exhaustion_equals_dijkstra(epsilon, initial_cost, consistent):
+    for seed in range(25):
+        graph = Graph(np.random.default_rng(seed), consistent=consistent)
+        config = AnaStarConfig(epsilon=epsilon, initial_cost=initial_cost)
+        result = AnaStar(graph, np.random.default_rng(seed), config).run()
+        assert result.stopped_by == "exhausted"
+        if graph.least == math.inf:
+            assert not result.paths
+            continue
+        assert result.paths[-1].cost == pytest.approx(graph.least, abs=1e-9)
+        for path in result.paths:  # each is a real path of its cost
+            assert path.states[0] == 0 and path.states[-1] in graph.goals
+            assert path.payloads == tuple(zip(path.states, path.states[1:], strict=False))
+            cost = sum(graph.graph[a][b]["weight"] for a, b in path.payloads)
+            assert cost == pytest.approx(path.cost, abs=1e-9)
+
+
+def test_costs_fall_and_bounds_hold():
+    for seed in range(25):
+        graph = Graph(np.random.default_rng(seed), nodes=150, scale=0.8)
+        result = AnaStar(graph, np.random.default_rng(seed), AnaStarConfig(epsilon=0.1)).run()
+        costs = [path.cost for path in result.paths]
+        assert costs == sorted(set(costs), reverse=True)
+        for path in result.paths:
+            assert path.bound >= 1.0 - 1e-12
+            assert path.cost <= path.bound * graph.least + 1e-9
+        if result.paths:
+            assert result.lower_bound == pytest.approx(graph.least, abs=1e-9)
+
+
+def test_bound_on_interruption_is_valid():
+    for seed in range(25):
+        graph = Graph(np.random.default_rng(seed), nodes=150, scale=0.9)
+        result = AnaStar(graph, np.random.default_rng(0), AnaStarConfig(epsilon=0.0, max_expansions=15)).run()
+        assert result.lower_bound <= graph.least + 1e-9
+        assert result.expansions <= 15
+
+
+def test_an_inadmissible_heuristic_can_miss_the_optimum():
+    """The Dijkstra test can fail: the same test with h too large finds costlier paths."""
+    missed = 0
+    for seed in range(25):
+        graph = Graph(np.random.default_rng(seed), scale=6.0)
+        result = AnaStar(graph, np.random.default_rng(seed), AnaStarConfig(epsilon=0.0)).run()
+        missed += bool(result.paths) and result.paths[-1].cost > graph.least + 1e-9
+    assert missed > 0
+
+
+def test_same_seed_same_search():
+    def run(seed):
+        graph = Graph(np.random.default_rng(3), nodes=200)
+        return AnaStar(graph, np.random.default_rng(seed), AnaStarConfig(epsilon=0.5)).run()
+
+    first, second, other = run(1), run(1), run(2)
+    assert first.expanded == second.expanded
+    assert first.expanded != other.expanded
+
+
+def test_judge_forbids_and_changes_the_last_edge():
+    graph = Graph(np.random.default_rng(0), goals=2)
+    best = AnaStar(graph, np.random.default_rng(0)).run().paths[-1]
+    forbidden = best.states[-1]
+
+    def judge(state, edge):
+        return None if edge.state == forbidden else edge._replace(cost=edge.cost + 10, payload="judged")
+
+    judged = AnaStar(graph, np.random.default_rng(0), judge=judge).run()
+    assert judged.paths and all(path.states[-1] != forbidden for path in judged.paths)
+    path = judged.paths[-1]
+    assert path.payloads[-1] == "judged"
+    cost = 10 + sum(graph.graph[a][b]["weight"] for a, b in zip(path.states, path.states[1:], strict=False))
+    assert path.cost == pytest.approx(cost)
+
+
+def test_limits_and_observer():
+    class Line(Graph):
+        def __init__(self):
+            pass
+
+        def expand(self, state, slack):
+            return [Edge(state + 1, 1.0), Edge(-state - 1, 1.0)]
+
+        def heuristic(self, states):
+            return [1.0] * len(states)
+
+        def is_goal(self, states):
+            return [False] * len(states)
+
+    seen = []
+    config = AnaStarConfig(report_interval=0.01)
+    result = AnaStar(Line(), np.random.default_rng(0), config).run(0.2, seen.append)
+    assert result.stopped_by == "time" and not result.paths
+    assert 0.2 <= result.seconds < 0.22  # an expansion takes microseconds; 10 % for a loaded machine
+    assert len(seen) > 3 and "none yet" in str(seen[0])
+    assert AnaStar(Line(), np.random.default_rng(0), AnaStarConfig(max_states=50)).run().stopped_by == "memory"
+    assert AnaStar(Line(), np.random.default_rng(0), AnaStarConfig(max_expansions=7)).run().expansions == 7
+
+
+def test_start_at_the_goal_is_a_path_without_edges():
+    graph = Graph(np.random.default_rng(0))
+    graph.goals = {0}
+    result = AnaStar(graph, np.random.default_rng(0)).run()
+    assert result.paths[0].states == (0,) and result.paths[0].cost == 0.0 and result.stopped_by == "exhausted"

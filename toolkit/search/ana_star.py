@@ -1,0 +1,347 @@
+"""Epsilon-greedy ANA*, for any graph: anytime search without a parameter for its greed.
+
+ANA* keeps the cost G of the best solution and always expands the open state with the largest
+
+    e(s) = (G - g(s)) / h(s)
+
+that is, the one that most probably improves on G. With h admissible, a solution is at most max_open e(s) times as
+costly as the best one. With probability epsilon a random open state is expanded instead, which leaves the guarantees
+alone and helps out of cul-de-sacs. States reopen when a cheaper path to them is found, so that the search, run to
+exhaustion, ends with the cheapest path whether or not h is consistent.
+
+Reference:
+    van den Berg, Shah, Huang, Goldberg: ANA*: Anytime Nonparametric A*, AAAI 2011; the paper, Sec. V.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+import time
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+State = Hashable
+_TINY = 1e-9  # divisor in place of h = 0
+
+
+class Edge(NamedTuple):
+    """A way out of a state: where it leads, its cost (>= 0), and anything the caller wants to find in the path."""
+
+    state: State
+    cost: float
+    payload: Any = None
+
+
+class SearchProblem(Protocol):
+    """A graph, given by what can be reached from where."""
+
+    def start(self) -> State:
+        """The state in which the search begins."""
+        ...
+
+    def expand(self, state: State, slack: float) -> Sequence[Edge]:
+        """Edges out of a state; those with cost + heuristic >= slack cannot improve and may be left out."""
+        ...
+
+    def heuristic(self, states: Sequence[State]) -> Sequence[float]:
+        """Estimates >= 0 of the cost from each state to the goal; inf where it cannot be reached."""
+        ...
+
+    def is_goal(self, states: Sequence[State]) -> Sequence[bool]:
+        """Whether each state is a goal."""
+        ...
+
+
+Judge = Callable[[State, Edge], Edge | None]
+
+
+@dataclass(frozen=True)
+class Path:
+    """A solution.
+
+    Attributes:
+        states: from the start to a goal.
+        payloads: of the len(states) - 1 edges between them.
+        cost: sum of the edge costs.
+        bound: the cost is at most so many times the least one, by what was known when it was found; inf where the
+            heuristic says nothing.
+        seconds: since the search began.
+        expansions: before it was found.
+    """
+
+    states: tuple[State, ...]
+    payloads: tuple[Any, ...]
+    cost: float
+    bound: float
+    seconds: float
+    expansions: int
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How a search is going.
+
+    Attributes:
+        seconds: since it began.
+        expansions: so far.
+        open: states waiting.
+        cost: of the best solution, inf without one.
+        bound: of the best solution when it was found.
+        state: expanded last.
+    """
+
+    seconds: float
+    expansions: int
+    open: int
+    cost: float
+    bound: float
+    state: State
+
+    def __str__(self) -> str:
+        """One line for a terminal."""
+        found = f"cost {self.cost:.1f} (at most {self.bound:.1f} x optimal)" if self.cost < math.inf else "none yet"
+        return f"{self.expansions} expansions, {found}"
+
+
+@dataclass(frozen=True)
+class AnaStarConfig:
+    """Settings of the search.
+
+    Attributes:
+        epsilon: probability of expanding a random open state.
+        initial_cost: stands for G before there is a solution, for the order of expansion only: inf expands the least
+            h (depth first, fastest), a smaller value weighs the cost so far as well. Nothing is pruned by it.
+        max_expansions: ends the search; None for no limit.
+        max_states: ends the search, to bound memory.
+        report_interval: s between calls of the observer, solutions apart.
+    """
+
+    epsilon: float = 0.1
+    initial_cost: float = math.inf
+    max_expansions: int | None = None
+    max_states: int = 1_000_000
+    report_interval: float = 0.1
+
+
+@dataclass(frozen=True)
+class AnaStarResult:
+    """Outcome.
+
+    Attributes:
+        paths: every solution, in the order of their finding; costs fall strictly.
+        stopped_by: "exhausted" (nothing left that could improve), "time", "expansions" or "memory".
+        lower_bound: no path can cost less (with h admissible).
+        seconds, expansions, states: spent and known.
+        expanded: states in order of expansion.
+    """
+
+    paths: tuple[Path, ...]
+    stopped_by: str
+    lower_bound: float
+    seconds: float
+    expansions: int
+    states: int
+    expanded: tuple[State, ...] = field(repr=False)
+
+
+class AnaStar:
+    """One search. Make it, call `run` once.
+
+    Args:
+        problem: the graph.
+        rng: for the random expansions.
+        config: settings.
+        judge: has the last word on an edge that reaches a goal: returns it, or another edge in its place (a different
+            cost or payload), or None to forbid it.
+    """
+
+    def __init__(
+        self,
+        problem: SearchProblem,
+        rng: np.random.Generator,
+        config: AnaStarConfig | None = None,
+        judge: Judge | None = None,
+    ):
+        self._problem, self._rng, self._judge = problem, rng, judge
+        self._config = config or AnaStarConfig()
+        self._best = math.inf  # G
+        self._index: dict[State, int] = {}
+        self._state: list[State] = []
+        self._g: list[float] = []
+        self._h: list[float] = []
+        self._parent: list[int] = []
+        self._edge_cost: list[float] = []  # from the parent
+        self._payload: list[Any] = []
+        self._open: list[int] = []  # in no order, for random draws
+        self._place: list[int] = []  # of each node in _open, -1 where it is not open
+        self._heap: list[tuple[float, int, int, float]] = []
+        self._pushes = 0
+        self._forbidden: set[tuple[State, State]] = set()
+
+    def run(
+        self, time_limit: float = math.inf, observer: Callable[[Progress], None] | None = None
+    ) -> AnaStarResult:
+        """Search until nothing can improve, or a limit is reached.
+
+        Args:
+            time_limit: s.
+            observer: told of every solution, and of progress now and then.
+        """
+        began = time.perf_counter()
+        config, paths, expanded = self._config, [], []
+        start = self._problem.start()
+        reported = 0.0
+        if self._problem.is_goal([start])[0]:
+            paths.append(Path((start,), (), 0.0, 1.0, 0.0, 0))
+            self._best = 0.0
+        else:
+            self._improve(Edge(start, 0.0), 0.0, float(self._problem.heuristic([start])[0]), -1)
+        stopped_by = "exhausted"
+        while self._open:
+            now = time.perf_counter() - began
+            if now >= time_limit:
+                stopped_by = "time"
+            elif config.max_expansions is not None and len(expanded) >= config.max_expansions:
+                stopped_by = "expansions"
+            elif len(self._state) >= config.max_states:
+                stopped_by = "memory"
+            if stopped_by != "exhausted":
+                break
+            node = self._next()
+            self._close(node)
+            expanded.append(self._state[node])
+            goals = self._expand(node)
+            for edge in sorted(goals, key=lambda goal: goal.cost):
+                path = self._reach(node, edge, time.perf_counter() - began, len(expanded))
+                if path is not None:
+                    paths.append(path)
+                    break
+            if observer is not None and (now - reported >= config.report_interval or (paths and goals)):
+                reported = now
+                bound = paths[-1].bound if paths else math.inf
+                observer(Progress(now, len(expanded), len(self._open), self._best, bound, expanded[-1]))
+        seconds = time.perf_counter() - began
+        return AnaStarResult(
+            tuple(paths), stopped_by, self._lower_bound(), seconds, len(expanded), len(self._state), tuple(expanded)
+        )
+
+    def _expand(self, node: int) -> list[Edge]:
+        """Open the children of a node that may improve; returns the edges to goals instead of opening them."""
+        g, state = self._g[node], self._state[node]
+        edges = self._problem.expand(state, self._best - g)
+        if not edges:
+            return []
+        states = [edge.state for edge in edges]
+        goals = []
+        for edge, h, is_goal in zip(
+            edges, self._problem.heuristic(states), self._problem.is_goal(states), strict=True
+        ):
+            if is_goal:
+                goals.append(edge)
+            else:
+                self._improve(edge, g + edge.cost, float(h), node)
+        return goals
+
+    def _improve(self, edge: Edge, g: float, h: float, parent: int) -> None:
+        """Open a state, or reopen it, where the path to it is the cheapest so far and may lead to a better solution."""
+        if not g + h < self._best or h == math.inf:
+            return
+        node = self._index.get(edge.state)
+        if node is None:
+            node = len(self._state)
+            self._index[edge.state] = node
+            self._state.append(edge.state)
+            self._g.append(g)
+            self._h.append(h)
+            self._parent.append(parent)
+            self._edge_cost.append(edge.cost)
+            self._payload.append(edge.payload)
+            self._place.append(-1)
+        elif g < self._g[node]:
+            self._g[node], self._parent[node] = g, parent
+            self._edge_cost[node], self._payload[node] = edge.cost, edge.payload
+        else:
+            return
+        if self._place[node] < 0:
+            self._place[node] = len(self._open)
+            self._open.append(node)
+        self._push(node)
+
+    def _push(self, node: int) -> None:
+        g, h = self._g[node], self._h[node]
+        self._pushes += 1
+        # Equal priorities: the newest first, which keeps the search going in depth.
+        heapq.heappush(self._heap, (self._priority(g, h), -self._pushes, node, g))
+
+    def _priority(self, g: float, h: float) -> float:
+        """Falls as e(s) rises."""
+        target = self._best if self._best < math.inf else self._config.initial_cost
+        if target == math.inf:
+            return h
+        margin = target - g
+        return -margin / max(h, _TINY) if margin > 0 else -margin * h  # second case: only before a solution
+
+    def _next(self) -> int:
+        if self._config.epsilon > 0 and self._rng.random() < self._config.epsilon:
+            return self._open[int(self._rng.integers(len(self._open)))]
+        while True:  # entries of closed nodes and of older paths are stale; every open node has a fresh one
+            _, _, node, g = heapq.heappop(self._heap)
+            if self._place[node] >= 0 and g == self._g[node]:
+                return node
+
+    def _close(self, node: int) -> None:
+        place, last = self._place[node], self._open[-1]
+        self._open[place], self._place[last] = last, place
+        self._open.pop()
+        self._place[node] = -1
+
+    def _reach(self, node: int, edge: Edge, seconds: float, expansions: int) -> Path | None:
+        """Take an edge to a goal if it improves on the best solution and the judge agrees."""
+        if not self._g[node] + edge.cost < self._best:
+            return None
+        if self._judge is not None:
+            key = (self._state[node], edge.state)
+            if key in self._forbidden:
+                return None
+            judged = self._judge(self._state[node], edge)
+            if judged is None:
+                self._forbidden.add(key)
+                return None
+            edge = judged
+        states, payloads, cost = [edge.state], [edge.payload], edge.cost
+        while node >= 0:
+            states.append(self._state[node])
+            payloads.append(self._payload[node])
+            cost += self._edge_cost[node]  # the sum may be less than g: an ancestor may have reopened since
+            node = self._parent[node]
+        if not cost < self._best:
+            return None
+        self._best = cost
+        bound = cost / max(self._lower_bound(), _TINY) if cost > 0 else 1.0
+        self._prune()
+        return Path(tuple(states[::-1]), tuple(payloads[-2::-1]), cost, bound, seconds, expansions)
+
+    def _lower_bound(self) -> float:
+        """Least g + h of the open states, or G: no path costs less.
+
+        G over it is never above ANA*'s own bound max e(s), since G <= g + e h <= e (g + h) for e >= 1.
+        """
+        return min(self._best, min((self._g[node] + self._h[node] for node in self._open), default=math.inf))
+
+    def _prune(self) -> None:
+        """Close what cannot improve on the new G and sort the rest by the new e."""
+        kept = [node for node in self._open if self._g[node] + self._h[node] < self._best]
+        for node in self._open:
+            self._place[node] = -1
+        for place, node in enumerate(kept):
+            self._place[node] = place
+        self._open = kept
+        self._heap = []
+        for node in sorted(kept):
+            self._pushes += 1
+            self._heap.append((self._priority(self._g[node], self._h[node]), -self._pushes, node, self._g[node]))
+        heapq.heapify(self._heap)
