@@ -1,0 +1,130 @@
+"""plan.json: a contact sequence in words that another program can read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from toolkit.contacts.category import category_of
+from toolkit.contacts.sequence import ContactSequence, ContactTransition
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.errors import InputError
+from toolkit.geometry.limb import Limb
+from toolkit.geometry.pose import Pose
+from toolkit.report.files import read_json, write_json
+from toolkit.search.result import Solution
+from toolkit.world.timing import Timing
+
+SCHEMA = 1
+
+
+def write_plan(
+    path: Path,
+    sequence: ContactSequence,
+    *,
+    world: str,
+    robot: str,
+    initial_rest: float = 0.0,
+    solution: Solution | None = None,
+) -> None:
+    """Write plan.json.
+
+    Args:
+        path: the file.
+        sequence: start stance and transitions.
+        world: name of the world.
+        robot: name of the robot.
+        initial_rest: s before the first transition begins, added to the absolute times.
+        solution: the search's solution, for its cost and the predicted CoM.
+    """
+    entries: list[dict[str, Any]] = []
+    time = initial_rest
+    stances = sequence.stances
+    for index, transition in enumerate(sequence.transitions):
+        lift_off = time + transition.timing.shift
+        touchdown = lift_off + transition.timing.swing
+        contact = {} if transition.contact is None else _contact_entry(transition.contact)
+        entries.append(
+            {
+                "limb": transition.limb.label,
+                "action": "break" if transition.contact is None else "make",
+                **{key: contact.get(key) for key in ("position", "quaternion_wxyz", "surface", "friction")},
+                "times": {
+                    "shift": transition.timing.shift,
+                    "swing": transition.timing.swing,
+                    "start": time,
+                    "lift_off": lift_off,
+                    "touchdown": touchdown,
+                },
+                "category": int(category_of(stances[index], transition)),
+            }
+        )
+        time = touchdown
+    plan: dict[str, Any] = {"schema": SCHEMA, "world": world, "robot": robot}
+    if solution is not None:
+        plan |= {"cost": solution.cost, "bound": solution.bound, "predicted_com": solution.com}
+    plan["start"] = [_contact_entry(contact) for contact in sequence.start.contacts]
+    plan["transitions"] = entries
+    write_json(path, plan)
+
+
+def read_plan(path: Path) -> ContactSequence:
+    """Read plan.json.
+
+    Raises:
+        InputError: the file cannot be read, or an entry is missing or wrong; the message names it.
+    """
+    plan = read_json(path)
+    where = "the file"
+    try:
+        where = "schema"
+        if plan["schema"] != SCHEMA:
+            raise InputError(f"{path}: has schema {plan['schema']}, this version reads {SCHEMA}")
+        where = "start"
+        start = Stance(tuple(sorted((_read_contact(entry) for entry in plan["start"]), key=lambda item: item.limb)))
+        stance, transitions = start, []
+        where = "transitions"
+        for index, entry in enumerate(plan["transitions"]):
+            where = f"transitions[{index}]"
+            transitions.append(_read_transition(entry))
+            category_of(stance, transitions[-1])
+            stance = transitions[-1].apply(stance)
+    except KeyError as error:
+        raise InputError(f"{path}: {where} has no valid {error}") from error
+    except (TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"{path}: {where} is broken: {error}") from error
+    return ContactSequence(start, tuple(transitions))
+
+
+def _contact_entry(contact: Contact) -> dict[str, Any]:
+    """One contact as JSON."""
+    return {
+        "limb": contact.limb.label,
+        "position": contact.pose.position,
+        "quaternion_wxyz": contact.pose.quaternion_wxyz,
+        "surface": contact.surface,
+        "friction": contact.friction,
+    }
+
+
+def _read_contact(entry: dict[str, Any]) -> Contact:
+    """Inverse of `_contact_entry`; KeyError, TypeError or ValueError where it is broken."""
+    position = np.array(entry["position"], float)
+    quaternion_wxyz = np.array(entry["quaternion_wxyz"], float)
+    if position.shape != (3,) or quaternion_wxyz.shape != (4,) or not np.linalg.norm(quaternion_wxyz) > 0:
+        raise ValueError("position needs 3 numbers, quaternion_wxyz 4 that are not all zero")
+    pose = Pose.from_quaternion(position, quaternion_wxyz)
+    return Contact(Limb.from_label(entry["limb"]), pose, float(entry["friction"]), int(entry["surface"]))
+
+
+def _read_transition(entry: dict[str, Any]) -> ContactTransition:
+    """One transition; KeyError, TypeError or ValueError where it is broken."""
+    timing = Timing(float(entry["times"]["shift"]), float(entry["times"]["swing"]))
+    if not (timing.shift >= 0 and timing.swing > 0):
+        raise ValueError(f"shift {timing.shift} and swing {timing.swing} must not be negative")
+    if entry["action"] not in ("make", "break"):
+        raise ValueError(f'action is "{entry["action"]}", must be "make" or "break"')
+    contact = _read_contact(entry) if entry["action"] == "make" else None
+    return ContactTransition(Limb.from_label(entry["limb"]), contact, timing)
