@@ -16,7 +16,7 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.errors import InputError
 from toolkit.report.files import plain
-from toolkit.simulation.check import Check
+from toolkit.report.run_report import check_entries, read_checks
 from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
@@ -112,7 +112,7 @@ def write_execution(path: Path, execution: Execution) -> None:
         if item.name == "qpos":
             value = np.concatenate([np.atleast_2d(value), execution.final_qpos[None]])
         elif item.name == "checks":
-            value = json.dumps([plain(vars(check)) for check in value])
+            value = json.dumps(plain(check_entries(value)))
         elif item.name in ("touchdowns", "unplanned_contacts"):
             value = json.dumps(plain(value))
         array = np.asarray(value)
@@ -146,10 +146,7 @@ def read_execution(path: Path, scene: mujoco.MjModel) -> Execution:
                 values[item.name] = array.astype(float) if array.dtype == np.float32 else array
     except KeyError as error:
         raise InputError(f"{path}: has no array {error}; write it anew by running the plan again") from error
-    values["checks"] = tuple(
-        Check(**{name: float("inf") if name == "limit" and x is None else x for name, x in check.items()})
-        for check in values["checks"]
-    )
+    values["checks"] = read_checks(values["checks"])
     values["qpos"], values["final_qpos"] = values["qpos"][:-1], values["qpos"][-1]
     return Execution(**values)
 

@@ -16,7 +16,7 @@ from toolkit.centroidal.residual import check, cop_margin, friction_margin
 from toolkit.errors import InputError
 from toolkit.report.files import read_json, write_json
 from toolkit.search.result import SearchResult, Solution
-from toolkit.simulation.check import Check
+from toolkit.simulation.check import Check, Result
 from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.surface import Surface
@@ -164,10 +164,7 @@ class RunReport:
             "verdict": self.verdict,
             "reason": self.reason,
             "stages": self.stages,
-            "checks": [
-                {"name": c.name, "value": c.value, "limit": c.limit, "unit": c.unit, "result": c.result.value}
-                for c in self.checks
-            ],
+            "checks": check_entries(self.checks),
         }
 
 
@@ -188,21 +185,39 @@ def read_report(path: Path) -> RunReport:
     try:
         if content["schema"] != SCHEMA:
             raise InputError(f"{path}: has schema {content['schema']}, this version reads {SCHEMA}")
-        checks = []
-        for entry in content["checks"]:
-            unmeasured = entry["result"] == "NOT_CHECKED"
-            value = entry["value"] if entry["value"] is not None or unmeasured else float("inf")
-            limit = float("inf") if entry["limit"] is None else entry["limit"]
-            checks.append(Check(entry["name"], limit, entry["unit"], value))
+        checks = read_checks(content["checks"])
         names = ("world", "robot", "seed", "verdict", "reason", "stages")
         return RunReport(
             *[content[name] for name in names],
-            checks=tuple(checks),
+            checks=checks,
             options=content.get("options", {}),
             versions=content["versions"],
         )
     except (KeyError, TypeError) as error:
         raise InputError(f"{path}: is not a run report, {error} is missing or wrong") from error
+
+
+def check_entries(checks: Sequence[Check]) -> list[dict[str, Any]]:
+    """Checks as JSON holds them, with their result."""
+    return [
+        {"name": c.name, "value": c.value, "limit": c.limit, "unit": c.unit, "result": c.result.value} for c in checks
+    ]
+
+
+def read_checks(entries: Sequence[dict[str, Any]]) -> tuple[Check, ...]:
+    """Checks of `check_entries` after JSON, where null stands for what was not finite; their results stay the same.
+
+    Raises:
+        KeyError: a key is missing.
+        TypeError: an entry is no dictionary.
+    """
+    checks = []
+    for entry in entries:
+        unmeasured = entry["result"] == Result.NOT_CHECKED
+        value = float("inf") if entry["value"] is None and not unmeasured else entry["value"]
+        limit = float("inf") if entry["limit"] is None else entry["limit"]
+        checks.append(Check(entry["name"], limit, entry["unit"], value))
+    return tuple(checks)
 
 
 def _figures(names: tuple[str, ...], stage: Any) -> dict[str, Any]:
