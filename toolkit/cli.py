@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 from toolkit.errors import ToolkitError
 
@@ -20,6 +21,17 @@ def parser(module: str, description: str, epilog: str = "") -> argparse.Argument
         epilog=f"{epilog}\n\n{EXIT_CODES}".strip(),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def add_robot_options(target: argparse.ArgumentParser) -> None:
+    """Add `--robot` and `--robots`."""
+    target.add_argument("--robot", help="folder name under robots/, or a path (default: the one in robots/default)")
+    target.add_argument("--robots", type=Path, metavar="DIR", help="folder with the robots (default: robots/)")
 
 
 def positive(kind: Callable[[str], float]) -> Callable[[str], float]:

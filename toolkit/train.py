@@ -1,0 +1,199 @@
+"""Command line: collect labelled transitions, train the networks, evaluate them."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from toolkit import cli
+from toolkit.contacts.category import Category
+from toolkit.errors import DatasetError, InputError
+from toolkit.prediction.collect import CollectConfig, collect
+from toolkit.prediction.dataset import read_dataset
+from toolkit.prediction.evaluate import Score, balanced, score
+from toolkit.prediction.networks import load_networks
+from toolkit.prediction.query import query_seconds
+from toolkit.report.console import make_console
+from toolkit.report.scores import score_table
+from toolkit.robot.loader import load_robot
+
+DESCRIPTION = """\
+Make the networks with which the contact search judges transitions.
+
+  collect    run the planner in random terrain and label every transition with the centroidal optimiser
+  fit        train a classifier and a regressor per category (needs torch: pip install -e '.[train]')
+  evaluate   score the trained networks on fresh transitions
+"""
+
+
+def progress_bar(console: Console) -> Progress:
+    """A progress bar for counted work."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    )
+
+
+@contextmanager
+def executor(workers: int, cluster: str | None) -> Iterator[Executor]:
+    """Local processes, or the workers of a dask cluster.
+
+    Raises:
+        InputError: dask is not installed, or the cluster does not answer.
+    """
+    if cluster is None:
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            yield pool
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError("--cluster needs dask: pip install -e '.[cluster]'") from None
+    try:
+        client = Client(cluster, timeout="20s")
+    except (OSError, TimeoutError, ValueError) as error:
+        raise InputError(f"--cluster {cluster}: no dask scheduler answers there ({error})") from None
+    with client, client.get_executor(pure=False) as pool:
+        yield pool
+
+
+def run_collect(args: argparse.Namespace, console: Console) -> int:
+    """`collect`."""
+    robot = load_robot(args.robot, args.robots)
+    config = CollectConfig(
+        robot=robot.name,
+        robots=str(robot.folder.parent.resolve()),
+        seed=args.seed,
+        samples_per_category=args.samples,
+        default_share=args.default_share,
+    )
+    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
+        task = progress.add_task("transitions", total=config.shards * config.shard_total)
+
+        def tick(labelled: int, seconds: float) -> None:
+            progress.update(task, completed=labelled)
+            if not console.is_terminal:
+                console.print(f"{labelled} transitions, {seconds:.0f} s")
+
+        summary = collect(args.out, robot, config, pool, tick)
+    console.print(
+        f"{summary.labelled} transitions in {summary.seconds:.0f} s ({summary.rate:.0f} per s, {summary.resumed} found "
+        f"from before), feasible: {summary.feasible_share:.0%}\n{args.out}"
+    )
+    return 0
+
+
+def run_fit(args: argparse.Namespace, console: Console) -> int:
+    """`fit`."""
+    try:
+        import torch
+
+        from toolkit.prediction.fit import FitConfig, fit_category
+    except ImportError:
+        raise InputError("fit needs torch: pip install -e '.[train]'") from None
+    from toolkit.report.curves import draw_curves
+
+    torch.set_num_threads(args.workers)
+    robot = load_robot(args.robot, args.robots)
+    out = args.out or robot.folder / "networks"
+    data = read_dataset(args.data, robot.fingerprint, limit=args.limit)
+    wanted = [Category(index) for index in args.categories] if args.categories else list(data)
+    config = FitConfig(epochs=args.epochs, seed=args.seed)
+    curves = {}
+    with progress_bar(console) as progress:
+        task = progress.add_task("epochs", total=2 * config.epochs * len(wanted))
+        for number, category in enumerate(wanted):
+            if category not in data:
+                raise DatasetError(f"{args.data}: holds no transitions of category {int(category)}; collect more")
+
+            def tick(name: str, epoch: int, training: float, held: float, number=number, category=category) -> None:
+                done = (2 * number + (name == "regressor")) * config.epochs + epoch + 1
+                progress.update(task, completed=done, description=f"{int(category)} {name} {training:.4f} {held:.4f}")
+
+            curves[category] = fit_category(
+                category, data[category], fingerprint=robot.fingerprint, folder=out, config=config, progress=tick
+            )
+            if not console.is_terminal:
+                losses = {name: round(float(curve.validation.min()), 4) for name, curve in curves[category].items()}
+                console.print(f"category {int(category)}: {len(data[category])} transitions, validation {losses}")
+            draw_curves(curves, out / "learning_curves.png")
+    console.print(str(out))
+    return 0
+
+
+def run_evaluate(args: argparse.Namespace, console: Console) -> int:
+    """`evaluate`."""
+    robot = load_robot(args.robot, args.robots)
+    networks = load_networks(robot, args.networks)
+    data = read_dataset(args.data, robot.fingerprint)
+    rng = np.random.default_rng(args.seed)
+    scores: dict[Category, Score] = {}
+    for category, network in networks.items():
+        if category not in data or not len(data[category]):
+            raise DatasetError(f"{args.data}: holds no transitions of category {int(category)}; collect more")
+        scores[category] = score(network, balanced(data[category], args.count, rng))
+    console.print(score_table(scores))
+    network = next(iter(networks.values()))
+    alone, batch = query_seconds(network, 1), query_seconds(network, 60) / 60
+    console.print(f"a query: {alone * 1e6:.0f} us alone, {batch * 1e6:.1f} us a transition in batches of 60")
+    return 0
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one of the sub-commands; returns the exit code."""
+    parser = cli.parser("train", DESCRIPTION)
+    commands = parser.add_subparsers(dest="command", required=True)
+
+    def add(name: str, help_text: str) -> argparse.ArgumentParser:
+        sub = commands.add_parser(name, help=help_text, description=help_text)
+        cli.add_robot_options(sub)
+        sub.add_argument("--seed", type=int, default=0, help="of every random draw (default: %(default)s)")
+        return sub
+
+    sub = add("collect", "label transitions with the centroidal optimiser; goes on where it was stopped")
+    sub.add_argument("--out", type=Path, required=True, help="data set folder, new or begun")
+    sub.add_argument("--samples", type=cli.positive(int), default=100_000, help="per category (default: %(default)s)")
+    sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
+    sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    sub.add_argument(
+        "--default-share",
+        type=float,
+        default=0.4,
+        help="share of the terrains with 1 s + 1 s and friction 0.5; the others draw both (default: %(default)s)",
+    )
+    sub.set_defaults(run=run_collect)
+
+    sub = add("fit", "train a classifier and a regressor per category")
+    sub.add_argument("--data", type=Path, required=True, help="data set folder")
+    sub.add_argument("--out", type=Path, help="folder for the networks (default: the robot's networks/)")
+    sub.add_argument("--epochs", type=cli.positive(int), default=60, help="at most (default: %(default)s)")
+    sub.add_argument("--limit", type=cli.positive(int), help="transitions per category at most")
+    sub.add_argument("--categories", type=int, nargs="+", choices=range(10), metavar="0..9", help="only these")
+    sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="threads (default: all cores)")
+    sub.set_defaults(run=run_fit)
+
+    sub = add("evaluate", "score the networks on transitions that they have not seen")
+    sub.add_argument("--data", type=Path, required=True, help="data set collected with another seed")
+    sub.add_argument("--networks", type=Path, help="folder of networks (default: the robot's networks/)")
+    sub.add_argument("--count", type=cli.positive(int), default=1000, help="per category (default: %(default)s)")
+    sub.set_defaults(run=run_evaluate)
+
+    args = parser.parse_args(argv)
+    return args.run(args, make_console())
+
+
+if __name__ == "__main__":
+    cli.run(main)
