@@ -1,0 +1,177 @@
+"""Checks of a whole-body motion that share no code with the inverse kinematics: MuJoCo recomputes everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.geometry.limb import Limb
+from toolkit.robot.model import RobotModel
+from toolkit.wholebody.collision import CollisionConfig, first_collision
+from toolkit.wholebody.limb_paths import LimbPaths
+from toolkit.wholebody.torque import inverse_dynamics, velocities
+from toolkit.world.world import World
+
+
+@dataclass(frozen=True)
+class CheckConfig:
+    """What a whole-body motion may deviate by, and what it may ask of the joints.
+
+    Attributes:
+        com: m; distance of the CoM from the plan.
+        foot, palm: m; distance of a patch in contact from its planned place.
+        swing: m; the same for a foot in the air.
+        orientation: rad; of a sole from its planned orientation, or of a palm's normal.
+        range_tolerance: rad; beyond a joint's range.
+        velocity_ratio, torque_ratio: of the joint limits.
+        collision: see the class.
+    """
+
+    com: float = 0.02
+    foot: float = 0.005
+    palm: float = 0.01
+    swing: float = 0.02
+    orientation: float = 0.03
+    range_tolerance: float = 1e-3
+    velocity_ratio: float = 1.0
+    torque_ratio: float = 1.0
+    collision: CollisionConfig = field(default_factory=CollisionConfig)
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """Result of the checks.
+
+    Attributes:
+        max_position_error: m; over CoM and contacts. max_orientation_error: rad; over contacts.
+        torque: (T, n) N m.
+        base_residual: (T, 6) N and N m; see `torque.inverse_dynamics`.
+        limits_respected: joint ranges, velocities, torques.
+        reasons: one line per violated check, empty where all hold.
+    """
+
+    max_position_error: float
+    max_orientation_error: float
+    torque: np.ndarray
+    base_residual: np.ndarray
+    limits_respected: bool
+    reasons: tuple[str, ...]
+
+
+def check(
+    robot: RobotModel,
+    world: World,
+    paths: LimbPaths,
+    motion: CentroidalMotion,
+    times: np.ndarray,
+    qpos: np.ndarray,
+    config: CheckConfig,
+) -> CheckReport:
+    """Check a motion.
+
+    Args:
+        robot: the robot.
+        world: for collisions.
+        paths: planned poses of the limbs.
+        motion: planned CoM and wrenches.
+        times: (T,) s, uniform.
+        qpos: (T, 7 + n).
+        config: thresholds.
+    """
+    position, orientation, tracking = _tracking(robot, paths, motion, times, qpos, config)
+    torque, residual = inverse_dynamics(robot, motion, times, qpos)
+    limits = _limits(robot, times, qpos, torque, config)
+    hit = first_collision(robot, world, paths, times, qpos, config.collision)
+    reasons = tracking + limits + ([hit] if hit else [])
+    return CheckReport(position, orientation, torque, residual, not limits, tuple(reasons))
+
+
+def _tracking(
+    robot: RobotModel,
+    paths: LimbPaths,
+    motion: CentroidalMotion,
+    times: np.ndarray,
+    qpos: np.ndarray,
+    config: CheckConfig,
+) -> tuple[float, float, list[str]]:
+    """Largest position and orientation error over CoM and contacts, and the reasons to fail."""
+    model = robot.mujoco_model
+    data = mujoco.MjData(model)
+    worst: dict[tuple[str, str], tuple[float, float, float]] = {}  # (thing, unit): ratio, error, time
+
+    def note(thing: str, unit: str, error: float, limit: float, time: float) -> None:
+        error = error if np.isfinite(error) else np.inf
+        if error / limit >= worst.get((thing, unit), (-1.0, 0.0, 0.0))[0]:
+            worst[thing, unit] = (error / limit, error, time)
+
+    position = orientation = 0.0
+    for time, state in zip(times, qpos, strict=True):
+        data.qpos[:] = state
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        error = float(np.linalg.norm(data.subtree_com[0] - motion.sample(time)[0]))
+        position = max(position, error)
+        note("the CoM", "m", error, config.com, time)
+        for limb, item in robot.limbs.items():
+            sample = paths.sample(limb, time)
+            if sample.pose is None or not (limb.is_foot or sample.in_contact):
+                continue
+            site = data.site(item.site)
+            error = float(np.linalg.norm(site.xpos - sample.pose.position))
+            if not sample.in_contact:
+                note(f"{limb.label} in the air", "m", error, config.swing, time)
+                continue
+            turn = _angle(limb, site.xmat.reshape(3, 3), sample.pose.rotation)
+            position, orientation = max(position, error), max(orientation, turn)
+            note(limb.label, "m", error, config.foot if limb.is_foot else config.palm, time)
+            note(limb.label, "rad", turn, config.orientation, time)
+    reasons = [
+        f"{thing} is {error:.3g} {unit} off its plan at {time:.2f} s (limit {error / ratio:.3g} {unit})"
+        for (thing, unit), (ratio, error, time) in worst.items()
+        if ratio > 1.0
+    ]
+    return position, orientation, reasons
+
+
+def _angle(limb: Limb, actual: np.ndarray, planned: np.ndarray) -> float:
+    """Angle in rad between two orientations; of the normals only for palms, whose twist is free."""
+    if not limb.is_foot:
+        return float(np.arctan2(np.linalg.norm(np.cross(actual[:, 2], planned[:, 2])), actual[:, 2] @ planned[:, 2]))
+    # |R - I|_F = 2 sqrt(2) sin(angle / 2): accurate for small angles, unlike the trace.
+    return float(2.0 * np.arcsin(min(np.linalg.norm(actual - planned) / (2.0 * np.sqrt(2.0)), 1.0)))
+
+
+def _limits(
+    robot: RobotModel, times: np.ndarray, qpos: np.ndarray, torque: np.ndarray, config: CheckConfig
+) -> list[str]:
+    """Reasons to fail: range, velocity, torque."""
+    reasons = []
+    joints = qpos[:, 7:]
+    beyond = np.maximum(robot.lower - joints, joints - robot.upper)
+    row, column = _worst(beyond)
+    if not beyond[row, column] <= config.range_tolerance:
+        reasons.append(
+            f"joint {robot.joint_names[column]} is at {joints[row, column]:.3f} rad at {times[row]:.2f} s "
+            f"(range {robot.lower[column]:.3f} to {robot.upper[column]:.3f} rad)"
+        )
+    speed = velocities(robot.mujoco_model, times, qpos)[:, 6:]
+    for values, limit, allowed, what, unit in (
+        (speed, robot.velocity_limit, config.velocity_ratio, "turns at", "rad/s"),
+        (torque, robot.torque_limit, config.torque_ratio, "needs", "N m"),
+    ):
+        row, column = _worst(np.abs(values) / limit)
+        if not abs(values[row, column]) <= allowed * limit[column]:
+            reasons.append(
+                f"joint {robot.joint_names[column]} {what} {values[row, column]:.3g} {unit} at {times[row]:.2f} s "
+                f"(limit {allowed * limit[column]:.3g} {unit})"
+            )
+    return reasons
+
+
+def _worst(values: np.ndarray) -> tuple[int, int]:
+    """Index of the largest entry, where NaN counts as infinite."""
+    row, column = np.unravel_index(np.argmax(np.where(np.isnan(values), np.inf, values)), values.shape)
+    return int(row), int(column)

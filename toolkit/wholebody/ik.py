@@ -1,0 +1,209 @@
+"""Inverse kinematics of the whole body along a centroidal motion, with placo.
+
+At every tick one quadratic program over the joint displacements dq tracks, from the strongest to the weakest: the
+patches, the CoM, the base's upright orientation with the heading of the feet, the planned angular momentum, and an
+eased return to the home posture. Joint ranges, velocities and a least knee flexion are hard limits. Each tick starts
+from the last one, so the error of the linearisation stays of second order in the step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.errors import PlanningError
+from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.geometry.pose import Pose, rotation_about_z
+from toolkit.robot.model import RobotModel
+from toolkit.robot.placo import PinocchioMap, placo_wrapper
+from toolkit.wholebody.knee import knee_range
+from toolkit.wholebody.limb_paths import LimbPaths
+
+
+@dataclass(frozen=True)
+class IKConfig:
+    """Weights of the inverse kinematics; the defaults suit humanoids of any size.
+
+    Attributes:
+        substeps: quadratic programs per sample of the trajectory.
+        settle: iterations for the first sample.
+        foot_position, foot_orientation, com, palm_position, palm_normal, palm_twist, base: weights per squared m or rad.
+        posture: weight per squared rad of a tick's deviation from the eased return to the home posture.
+        posture_time: s; time constant of that return.
+        angular_momentum: weight per squared kg m^2.
+        velocity_fraction: share of the joint velocity limits that may be used.
+        range_margin: rad; kept from each end of a joint's range.
+        min_knee: rad; least knee flexion.
+    """
+
+    substeps: int = 2
+    settle: int = 200
+    foot_position: float = 1e4
+    foot_orientation: float = 1e3
+    com: float = 1e3
+    palm_position: float = 1e3
+    palm_normal: float = 1e2
+    palm_twist: float = 0.1
+    base: float = 1.0
+    posture: float = 0.05
+    posture_time: float = 0.3
+    angular_momentum: float = 0.02
+    velocity_fraction: float = 0.95
+    range_margin: float = 0.02
+    min_knee: float = 0.2
+
+
+class WholeBodyIK:
+    """The solver with its tasks, tick after tick."""
+
+    def __init__(self, robot: RobotModel, config: IKConfig, tick: float):
+        """Set up the tasks.
+
+        Args:
+            robot: the robot.
+            config: weights.
+            tick: s between two solves.
+        """
+        self.robot, self.config, self.tick = robot, config, tick
+        self.wrapper = placo_wrapper(robot)
+        self.map = PinocchioMap(robot, self.wrapper)
+        self.solver = self.wrapper.make_solver()
+        self.solver.dt = tick
+        self.home = dict(zip(robot.joint_names, robot.home[7:], strict=True))
+        self._set_limits()
+        self._add_tasks()
+
+    def _set_limits(self) -> None:
+        robot, config = self.robot, self.config
+        lower = np.minimum(robot.lower + config.range_margin, np.maximum(robot.lower, robot.home[7:]))
+        upper = np.maximum(robot.upper - config.range_margin, np.minimum(robot.upper, robot.home[7:]))
+        for foot in FEET:
+            knee = knee_range(robot, foot, config.min_knee)
+            if knee is not None:
+                lower[knee[0]], upper[knee[0]] = max(lower[knee[0]], knee[1]), min(upper[knee[0]], knee[2])
+        self.lower, self.upper = lower, upper
+        for index, name in enumerate(robot.joint_names):
+            self.wrapper.set_joint_limits(name, float(lower[index]), float(upper[index]))
+            self.wrapper.set_velocity_limit(name, float(config.velocity_fraction * robot.velocity_limit[index]))
+        self.solver.enable_joint_limits(True)
+
+    def _add_tasks(self) -> None:
+        robot, config, solver = self.robot, self.config, self.solver
+        self.com = solver.add_com_task(np.zeros(3))
+        self.com.configure("com", "soft", config.com)
+        self.feet, self.palms = {}, {}
+        for foot in FEET:
+            task = solver.add_frame_task(robot.limbs[foot].site, np.eye(4))
+            task.configure(foot.label, "soft", config.foot_position, config.foot_orientation)
+            self.feet[foot] = task
+        for palm in PALMS:
+            if palm in robot.limbs:
+                position = solver.add_position_task(robot.limbs[palm].site, np.zeros(3))
+                normal = solver.add_axisalign_task(robot.limbs[palm].site, np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.0]))
+                twist = solver.add_orientation_task(robot.limbs[palm].site, np.eye(3))
+                self.palms[palm] = (position, normal, twist)
+        self.base = solver.add_orientation_task(robot.base, np.eye(3))
+        self.base.configure("base", "soft", config.base)
+        self.posture = solver.add_joints_task()
+        self.posture.set_joints(self.home)
+        self.momentum = solver.add_centroidal_momentum_task(np.zeros(3))
+        solver.add_regularization_task(1e-6)
+
+    def start(self, qpos: np.ndarray, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
+        """Settle on the first sample.
+
+        Args:
+            qpos: (7 + n,) first guess.
+            paths: targets of the limbs.
+            motion: target of the CoM.
+
+        Returns:
+            (7 + n,) qpos at time 0.
+        """
+        guess = qpos.copy()
+        guess[7:] = np.clip(guess[7:], self.lower, self.upper)
+        self.map.set_qpos(guess)
+        self.solver.enable_velocity_limits(False)
+        self._set_targets(0.0, paths, motion)
+        self.momentum.configure("momentum", "soft", 0.0)
+        # At rest, an eased posture task of weight w weighs as much as a plain one of weight w * ease.
+        self.posture.set_joints(self.home)
+        self.posture.configure("posture", "soft", self.config.posture * self._ease)
+        for _ in range(self.config.settle):
+            if np.abs(self._solve(0.0)).max() < 1e-7:
+                break
+        self.posture.configure("posture", "soft", self.config.posture)
+        self.momentum.configure("momentum", "soft", self.config.angular_momentum)
+        self.solver.enable_velocity_limits(True)
+        return self.map.get_qpos()
+
+    def advance(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
+        """Move on by one tick to a time in s; returns (7 + n,) qpos.
+
+        Raises:
+            PlanningError: if the quadratic program has no solution.
+        """
+        self._set_targets(time, paths, motion)
+        for name, home in self.home.items():
+            angle = self.wrapper.get_joint(name)
+            self.posture.set_joint(name, angle + self._ease * (home - angle))
+        self._solve(time)
+        return self.map.get_qpos()
+
+    @property
+    def _ease(self) -> float:
+        return min(self.tick / self.config.posture_time, 1.0)
+
+    def _solve(self, time: float) -> np.ndarray:
+        try:
+            step = self.solver.solve(True)
+        except RuntimeError as error:
+            raise PlanningError(f"the inverse kinematics has no solution at {time:.2f} s: {error}") from error
+        self.wrapper.update_kinematics()
+        return step
+
+    def _set_targets(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> None:
+        self.com.target_world = motion.sample(time)[0]
+        self.momentum.L_world = momentum_at(motion, time)
+        heading = np.zeros(2)
+        for foot, task in self.feet.items():
+            pose = paths.sample(foot, time).pose
+            assert pose is not None
+            task.T_world_frame = pose.matrix
+            heading += np.array([np.cos(pose.yaw), np.sin(pose.yaw)])
+        self.base.R_world_frame = rotation_about_z(np.arctan2(heading[1], heading[0]))
+        for palm, tasks in self.palms.items():
+            self._set_palm(palm, tasks, paths.sample(palm, time).pose, paths.authority(palm, time))
+
+    def _set_palm(self, palm: Limb, tasks: tuple, pose: Pose | None, authority: float) -> None:
+        position, normal, twist = tasks
+        if pose is not None:
+            position.target_world = pose.position
+            normal.targetAxis_world = pose.normal
+            twist.R_world_frame = pose.rotation
+        position.configure(f"{palm.label}_position", "soft", authority * self.config.palm_position)
+        normal.configure(f"{palm.label}_normal", "soft", authority * self.config.palm_normal)
+        twist.configure(f"{palm.label}_twist", "soft", authority * self.config.palm_twist)
+
+
+def momentum_at(motion: CentroidalMotion, time: float) -> np.ndarray:
+    """(3,) kg m^2/s; planned angular momentum about the CoM at a time in s, linear between knots."""
+    times = motion.problem.times
+    step = min(max(int(np.searchsorted(times, time, side="right")) - 1, 0), motion.problem.steps - 1)
+    share = min(max((time - times[step]) / (times[step + 1] - times[step]), 0.0), 1.0)
+    return (1.0 - share) * motion.angular_momentum[step] + share * motion.angular_momentum[step + 1]
+
+
+def first_guess(robot: RobotModel, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
+    """(7 + n,) qpos: the home posture above the feet's first contacts, shifted so that its CoM is as planned."""
+    left, right = (paths.sample(foot, 0.0).pose for foot in FEET)
+    assert left is not None and right is not None
+    heading = np.array([np.cos(left.yaw) + np.cos(right.yaw), np.sin(left.yaw) + np.sin(right.yaw)])
+    feet = Pose.from_yaw((left.position + right.position) / 2, float(np.arctan2(heading[1], heading[0])))
+    base = feet @ Pose.from_quaternion(robot.home[:3], robot.home[3:7])
+    rise = motion.com[0, 2] - feet.position[2] - robot.com_height
+    qpos = robot.home.copy()
+    qpos[:3], qpos[3:7] = base.position + np.array([0.0, 0.0, rise]), base.quaternion_wxyz
+    return qpos

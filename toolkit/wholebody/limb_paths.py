@@ -1,0 +1,221 @@
+"""LimbPaths: where each limb's patch is meant to be at any time of a schedule."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.contacts.schedule import ContactSchedule, Phase
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.geometry.limb import Limb
+from toolkit.geometry.pose import Pose
+from toolkit.robot.model import RobotModel
+from toolkit.wholebody.profile import Window
+from toolkit.wholebody.swing import PathSample, SwingPath
+from toolkit.wholebody.swing_planner import Collide, SwingConfig, SwingTask, plan_swing
+from toolkit.world.world import World
+
+
+class LimbSample(NamedTuple):
+    """A limb's patch at one time.
+
+    Attributes:
+        pose: world_from_contact; None for a palm that hangs free.
+        velocity: (6,) m/s and rad/s, linear then angular, in the world; NaN for a free palm.
+        acceleration: (6,) m/s^2 and rad/s^2; NaN for a free palm.
+        in_contact: planned contact.
+    """
+
+    pose: Pose | None
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    in_contact: bool
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A limb during one phase.
+
+    Attributes:
+        begin, end: s.
+        transition: index of the transition that the phase belongs to.
+        pose: where the limb rests in contact; None otherwise.
+        path: how it moves; None in contact and for a free palm.
+        free_start, free_end: the path comes from, or goes to, the arm's free posture.
+    """
+
+    begin: float
+    end: float
+    transition: int
+    pose: Pose | None = None
+    path: SwingPath | None = None
+    free_start: bool = False
+    free_end: bool = False
+
+
+@dataclass(frozen=True)
+class LimbPaths:
+    """Paths of all limbs over a schedule; before and after it they rest.
+
+    Attributes:
+        segments: one tuple per limb (indexed by `Limb`), in order of time, without gaps.
+    """
+
+    segments: tuple[tuple[Segment, ...], ...]
+
+    @cached_property
+    def _begins(self) -> tuple[list[float], ...]:
+        return tuple([segment.begin for segment in segments] for segments in self.segments)
+
+    def segment(self, limb: Limb, time: float) -> Segment:
+        """The limb's segment at a time in s, clamped at the ends."""
+        return self.segments[limb][max(bisect_right(self._begins[limb], time) - 1, 0)]
+
+    def sample(self, limb: Limb, time: float) -> LimbSample:
+        """The limb's patch at a time in s, clamped at the ends."""
+        segment = self.segment(limb, time)
+        if segment.path is not None:
+            sample: PathSample = segment.path.sample(time)
+            return LimbSample(sample.pose, sample.velocity, sample.acceleration, False)
+        if segment.pose is not None:
+            return LimbSample(segment.pose, np.zeros(6), np.zeros(6), True)
+        return LimbSample(None, np.full(6, np.nan), np.full(6, np.nan), False)
+
+    def authority(self, limb: Limb, time: float) -> float:
+        """How binding the limb's pose is, in [0, 1]: a palm blends from and to the arm's free posture."""
+        segment = self.segment(limb, time)
+        if segment.path is None:
+            return 0.0 if segment.pose is None else 1.0
+        u = (time - segment.path.begin) / segment.path.duration
+        value = 1.0
+        if segment.free_start:
+            value *= Window(0.0, 0.5).step(u)[0]
+        if segment.free_end:
+            value *= 1.0 - Window(0.5, 1.0).step(u)[0]
+        return value
+
+    @property
+    def blocked(self) -> tuple[tuple[Limb, int], ...]:
+        """Limb and transition of each path for which no clear way was found."""
+        return tuple(
+            (Limb(limb), segment.transition)
+            for limb, segments in enumerate(self.segments)
+            for segment in segments
+            if segment.path is not None and not segment.path.clear
+        )
+
+
+def limb_paths(
+    robot: RobotModel,
+    world: World,
+    schedule: ContactSchedule,
+    motion: CentroidalMotion | None = None,
+    config: SwingConfig | None = None,
+    *,
+    collide: Collide | None = None,
+) -> LimbPaths:
+    """Paths of the limbs of a schedule, clear of the world's geometry where that is possible.
+
+    Args:
+        robot: for the patches' sizes and the arms' free posture.
+        world: to keep clear of.
+        schedule: phases with their contacts.
+        motion: places the free palms relative to the planned CoM; relative to the mean of the feet where None.
+        config: shape of the paths.
+        collide: replaces the collision test of `world`.
+
+    Returns:
+        Paths; see `LimbPaths.blocked` for those that are not clear.
+    """
+    config = config or SwingConfig()
+    if collide is None:
+        from toolkit.world.clearance import boxes_collide
+
+        def collide(centers, rotations, half_sizes):
+            return boxes_collide(world, centers, rotations, half_sizes)
+
+    segments: list[tuple[Segment, ...]] = []
+    for limb in Limb:
+        row = []
+        for index, phase in enumerate(schedule.phases):
+            contact = _contact(phase, limb)
+            if contact is not None:
+                row.append(Segment(phase.start, phase.end, phase.transition, pose=contact.pose))
+            elif phase.swing == limb:
+                row.append(_swing(robot, schedule, index, limb, motion, collide, config))
+            else:
+                row.append(Segment(phase.start, phase.end, phase.transition))
+        segments.append(tuple(row))
+    return LimbPaths(tuple(segments))
+
+
+def _contact(phase: Phase, limb: Limb) -> Contact | None:
+    return next((contact for contact in phase.contacts if contact.limb == limb), None)
+
+
+def _swing(
+    robot: RobotModel,
+    schedule: ContactSchedule,
+    index: int,
+    limb: Limb,
+    motion: CentroidalMotion | None,
+    collide: Collide,
+    config: SwingConfig,
+) -> Segment:
+    """The segment of the limb that swings in phase `index`."""
+    phases = schedule.phases
+    phase = phases[index]
+    old = _contact(phases[index - 1], limb) if index > 0 else None
+    new = _contact(phases[index + 1], limb) if index + 1 < len(phases) else None
+    if limb.is_foot and (old is None or new is None):
+        raise ValueError(f"the schedule leaves {limb.label} without a contact before or after {phase.start:.2f} s")
+    if new is None and old is None:
+        return Segment(phase.start, phase.end, phase.transition)
+
+    def free(neighbour: int, time: float) -> Pose:
+        com = None if motion is None else motion.sample(time)[0]
+        return free_palm(robot, limb, _feet(phases[neighbour]), com)
+
+    start = old.pose if old is not None else free(index - 1 if index > 0 else index, phase.start)
+    end = new.pose if new is not None else free(min(index + 1, len(phases) - 1), phase.end)
+    other = None
+    if limb.is_foot:
+        standing = _contact(phase, limb.mirrored)
+        other = None if standing is None else (standing.pose, robot.half_sizes[limb.mirrored])
+    task = SwingTask(
+        phase.start, phase.duration, start, end, robot.half_sizes[limb], limb.is_foot, old is None, new is None, other
+    )
+    path = plan_swing(task, collide, config)
+    return Segment(phase.start, phase.end, phase.transition, path=path, free_start=old is None, free_end=new is None)
+
+
+def _feet(phase: Phase) -> Pose:
+    """Frame of the mean of the feet of a phase with both feet in contact."""
+    return Stance(tuple(contact for contact in phase.contacts if contact.limb.is_foot)).mean_feet
+
+
+def free_palm(robot: RobotModel, limb: Limb, feet: Pose, com: np.ndarray | None = None) -> Pose:
+    """Pose of a palm that hangs in the home posture.
+
+    Args:
+        robot: the robot.
+        limb: a palm.
+        feet: upright frame of the mean of the feet.
+        com: (3,) m; where the CoM is; above `feet` as in the home posture where None.
+    """
+    data = mujoco.MjData(robot.mujoco_model)
+    data.qpos[:] = robot.home
+    mujoco.mj_kinematics(robot.mujoco_model, data)
+    mujoco.mj_comPos(robot.mujoco_model, data)
+    site = data.site(robot.limbs[limb].site)
+    home = Pose(site.xmat.reshape(3, 3).copy(), site.xpos.copy())
+    placed = feet @ home
+    if com is None:
+        return placed
+    return Pose(placed.rotation, placed.position + com - feet @ data.subtree_com[0])

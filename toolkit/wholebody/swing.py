@@ -1,0 +1,123 @@
+"""Swing path: a limb's patch between two contacts, with analytic velocity and acceleration.
+
+The path is a sum of straight moves, each smoothly timed within its own window of the swing: off the old surface along
+its normal, up, across, down, and onto the new surface along its normal. A sideways bump leads a foot around the other
+one. The orientation turns about one fixed axis (slerp).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from toolkit.geometry.pose import Pose
+from toolkit.wholebody.profile import Window
+
+
+@dataclass(frozen=True)
+class Move:
+    """A straight displacement within a window; with `returns`, out and back again.
+
+    Attributes:
+        vector: (3,) float, m, world frame.
+        window: when.
+        returns: a bump instead of a step.
+    """
+
+    vector: np.ndarray
+    window: Window
+    returns: bool = False
+
+
+@dataclass(frozen=True)
+class PathSample:
+    """A patch at one time.
+
+    Attributes:
+        pose: world_from_contact.
+        velocity: (6,) m/s and rad/s; linear velocity of the patch's centre, then angular velocity, in the world.
+        acceleration: (6,) m/s^2 and rad/s^2; the time derivative of `velocity`.
+    """
+
+    pose: Pose
+    velocity: np.ndarray
+    acceleration: np.ndarray
+
+
+@dataclass(frozen=True)
+class SwingPath:
+    """Path of one patch within one swing phase.
+
+    Attributes:
+        begin: s, when the swing starts.
+        duration: s.
+        start, end: world_from_contact at both ends.
+        moves: they lead from the start's position to the end's.
+        turn: when the orientation changes.
+        clear: the swept patch keeps free of the world (decided by the planner of the path).
+    """
+
+    begin: float
+    duration: float
+    start: Pose
+    end: Pose
+    moves: tuple[Move, ...]
+    turn: Window
+    clear: bool = True
+
+    @cached_property
+    def rotation_vector(self) -> np.ndarray:
+        """(3,) rad; the world-frame rotation that turns the start's orientation into the end's."""
+        return rotation_vector(self.end.rotation @ self.start.rotation.T)
+
+    def positions(self, u: np.ndarray) -> np.ndarray:
+        """(k, 3) positions at (k,) fractions of the swing."""
+        points = np.repeat(self.start.position[None], len(u), 0)
+        for move in self.moves:
+            scale = move.window.value(u)
+            scale = 4.0 * scale * (1.0 - scale) if move.returns else scale
+            points = points + scale[:, None] * move.vector
+        return points
+
+    def rotations(self, u: np.ndarray) -> np.ndarray:
+        """(k, 3, 3) world_from_contact rotations at (k,) fractions of the swing."""
+        return rotation_exponential(self.turn.value(u)[:, None] * self.rotation_vector) @ self.start.rotation
+
+    def sample(self, time: float) -> PathSample:
+        """The patch at a time in s; at rest before and after the swing."""
+        u = (time - self.begin) / self.duration
+        if not 0.0 <= u <= 1.0:
+            return PathSample(self.start if u < 0.0 else self.end, np.zeros(6), np.zeros(6))
+        position, velocity, acceleration = self.start.position.copy(), np.zeros(6), np.zeros(6)
+        for move in self.moves:
+            value, rate, second = move.window.bump(u) if move.returns else move.window.step(u)
+            position += value * move.vector
+            velocity[:3] += rate / self.duration * move.vector
+            acceleration[:3] += second / self.duration**2 * move.vector
+        value, rate, second = self.turn.step(u)
+        vector = self.rotation_vector
+        velocity[3:] = rate / self.duration * vector
+        acceleration[3:] = second / self.duration**2 * vector
+        return PathSample(Pose(rotation_exponential(value * vector) @ self.start.rotation, position), velocity, acceleration)
+
+
+def rotation_exponential(vector: np.ndarray) -> np.ndarray:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad (Rodrigues)."""
+    vector = np.asarray(vector, float)
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vector, -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
+    # numpy's sinc is sin(pi x) / (pi x): exact through zero.
+    return np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (cross @ cross)
+
+
+def rotation_vector(rotation: np.ndarray) -> np.ndarray:
+    """Rotation vector (3,) in rad, at most pi long, of one rotation matrix (3, 3)."""
+    w, *axis = Pose(np.asarray(rotation, float), np.zeros(3)).quaternion_wxyz
+    sine = np.linalg.norm(axis)
+    if sine < 1e-12:
+        return 2.0 * np.asarray(axis)
+    return 2.0 * np.arctan2(sine, w) / sine * np.asarray(axis)
