@@ -33,6 +33,8 @@ class World:
         start: upright pose of the point between the feet at the start (as authored, not projected).
         goal: goal region.
         timing: shift and swing time of a transition.
+        square: (xmin, ymin, xmax, ymax), m; infinite planes are cut to it wherever they are drawn or listed.
+        mjcf: text of the scene where it exists in memory only; None where `path` holds it.
     """
 
     name: str
@@ -42,3 +44,5 @@ class World:
     start: Pose
     goal: Goal
     timing: Timing
+    square: tuple[float, float, float, float] = (-10.0, -10.0, 10.0, 10.0)
+    mjcf: str | None = field(default=None, repr=False)

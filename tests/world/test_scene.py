@@ -1,0 +1,90 @@
+"""Robot and world in one model."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from toolkit.errors import RobotError, WorldError
+from toolkit.world.loader import load_world
+from toolkit.world.scene import compose_scene
+
+FLOORS = """
+<geom name="floor" type="plane" size="0 0 1" friction="0.45" material="checker"/>
+<geom name="left_sole" type="box" size="0.2 0.2 0.05" pos="3 0 0.05" friction="0.8" solref="0.1 1" margin="0.01"/>
+"""
+ASSETS = """
+<texture name="sky" type="skybox" builtin="gradient" width="8" height="8"/>
+<texture name="checker" type="2d" builtin="checker" width="8" height="8"/><material name="checker" texture="checker"/>
+"""
+MORE = '<option timestep="0.01" gravity="0 0 -1"><flag contact="disable"/></option><size memory="1M"/>'
+
+
+@pytest.fixture
+def scene(stool, make_world):
+    return compose_scene(stool, make_world(FLOORS, assets=ASSETS, more=MORE))
+
+
+def test_robot_keeps_its_names_and_order(scene, stool):
+    assert scene.nq == 9 and scene.nu == 2 and scene.nkey == 0 and scene.neq == 0
+    assert [scene.joint(i).name for i in range(scene.njnt)] == ["root_joint", *stool.joint_names]
+    for limb in stool.limbs.values():
+        assert scene.site(limb.site).name == limb.site
+    assert scene.geom("world/floor").id >= 0 and scene.site("world/goal").id >= 0
+
+
+def test_options_are_those_of_every_run(scene):
+    assert scene.opt.timestep == 0.002
+    assert scene.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+    assert scene.opt.impratio == 100
+    assert scene.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    assert scene.opt.disableflags == 0
+    np.testing.assert_array_equal(scene.opt.gravity, [0, 0, -9.81])
+
+
+def test_textures_and_lights_are_kept(scene):
+    assert scene.ntex == 3 and scene.nmat == 2
+    assert mujoco.mjtTexture.mjTEXTURE_SKYBOX in scene.tex_type
+
+
+@pytest.mark.parametrize(("x", "friction"), [(0.0, 0.45), (3.0, 0.8)])
+def test_contact_has_exactly_the_friction_of_the_world(scene, stool, x, friction):
+    data = mujoco.MjData(scene)
+    data.qpos[:] = stool.home
+    data.qpos[0], data.qpos[2] = x, 0.4995 + (0.1 if x else 0.0)
+    mujoco.mj_forward(scene, data)
+    pairs = [tuple(sorted(scene.geom(int(g)).name for g in contact.geom)) for contact in data.contact]
+    assert {"left_sole", "right_sole"} <= {name for pair in pairs for name in pair}
+    assert not any("decoration" in name for pair in pairs for name in pair)
+    for contact in data.contact:
+        assert contact.friction[0] == friction and contact.friction[1] == friction
+        assert contact.dim == 3
+        np.testing.assert_array_equal(contact.solref, [0.02, 1.0])
+
+
+def test_robot_does_not_collide_with_itself_differently(scene, stool):
+    alone, together = mujoco.MjData(stool.mujoco_model), mujoco.MjData(scene)
+    for model, data in ((stool.mujoco_model, alone), (scene, together)):
+        data.qpos[:] = stool.home
+        data.qpos[2] = 2.0
+        data.qpos[7:] = 0.9, -0.9
+        mujoco.mj_forward(model, data)
+    assert together.ncon == alone.ncon
+
+
+def test_world_changed_since_it_was_loaded(stool, tmp_path):
+    from tests.world.conftest import mjcf_of
+
+    path = tmp_path / "world.xml"
+    path.write_text(mjcf_of('<geom type="plane" size="0 0 1"/>'))
+    world = load_world(path)
+    path.write_text(mjcf_of('<geom type="box" size="1 1 1" pos="0 0 -1"/>'))
+    with pytest.raises(WorldError, match="world.xml: the file changed since it was loaded"):
+        compose_scene(stool, world)
+
+
+def test_robot_that_brings_its_own_floor_is_refused(stool, make_world):
+    from dataclasses import replace
+
+    own = stool.mjcf.replace("<worldbody>", '<worldbody><geom type="plane" size="0 0 1"/>')
+    with pytest.raises(RobotError, match="static geoms of the robot"):
+        compose_scene(replace(stool, mjcf=own), make_world('<geom type="plane" size="0 0 1"/>'))

@@ -1,0 +1,135 @@
+"""A mesh that is not convex as convex solids whose faces are the mesh's own facets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+import trimesh
+
+from toolkit.world.convex import convex_partition
+from toolkit.world.facets import Facet, find_facets
+
+FACET_ANGLE = np.radians(1.0)  # triangles of one facet: normals within this of the first triangle's
+FACET_DISTANCE = 1e-3  # m; and corners within this of its plane
+
+_DEPTH = 0.06  # m; thickness of a part where the mesh is thick enough
+_LEAST_DEPTH = 2e-3  # m; and where it is not
+_TAPER = 0.7  # size of a part's back relative to its front: sharp edges of the mesh stay sharp
+_MOST_PARTS = 4000
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """Convex solids that stand for a mesh.
+
+    Attributes:
+        facets: flat facets of the mesh, in the frame of its vertices.
+        parts: (k, 3) float vertex arrays; the convex hull of each is a solid, one face of which lies on the mesh.
+    """
+
+    facets: list[Facet]
+    parts: list[np.ndarray]
+
+
+def decompose_mesh(vertices: np.ndarray, triangles: np.ndarray) -> Decomposition | None:
+    """Split a mesh into convex solids, or find that it is convex.
+
+    A closed convex component becomes one solid. Of anything else each flat facet is split into convex polygons, and
+    each of these becomes a frustum that reaches into the mesh: never further than half way to the mesh's other side.
+    Open meshes are sheets: their triangles are turned so that on average they look up.
+
+    Args:
+        vertices: (n, 3) float, m.
+        triangles: (k, 3) int, counterclockwise seen from outside.
+
+    Returns:
+        The solids; None where the mesh is convex, so that its hull is the mesh.
+
+    Raises:
+        ValueError: no triangle has an area, or there would be too many solids.
+    """
+    mesh = trimesh.Trimesh(vertices, triangles, process=True)
+    components = _components(mesh)
+    if not components:
+        raise ValueError("it has no triangle with an area")
+    convex = [_is_convex(component) for component in components]
+    if len(components) == 1 and convex[0]:
+        return None
+    facets, parts = [], []
+    for component, whole in zip(components, convex, strict=True):
+        found = find_facets(component, angle=FACET_ANGLE, distance=FACET_DISTANCE)
+        facets += found
+        parts += [np.asarray(component.vertices)] if whole else _frusta(component, found)
+    if len(parts) > _MOST_PARTS:
+        raise ValueError(
+            f"it is not convex and has {len(parts)} flat parts, more than {_MOST_PARTS}; simplify it or "
+            "use a height field"
+        )
+    return Decomposition(facets, parts)
+
+
+def _components(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
+    """Connected components, each wound outwards (closed) or upwards (open)."""
+    labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
+    components = []
+    for label in range(labels.max() + 1 if len(labels) else 0):
+        component = mesh.submesh([np.flatnonzero(labels == label)], append=True, repair=False)
+        if component.area < 1e-10:
+            continue
+        closed = component.is_watertight and component.is_winding_consistent
+        upside_down = component.volume < 0 if closed else component.area_faces @ component.face_normals[:, 2] < 0
+        if upside_down:
+            component.invert()
+        components.append(component)
+    return components
+
+
+def _is_convex(mesh: trimesh.Trimesh) -> bool:
+    """Whether a mesh is closed and fills its convex hull."""
+    if not (mesh.is_watertight and mesh.is_winding_consistent):
+        return False
+    return mesh.volume > (1.0 - 1e-4) * mesh.convex_hull.volume
+
+
+def _frusta(mesh: trimesh.Trimesh, facets: list[Facet]) -> list[np.ndarray]:
+    """Frusta behind the facets of a mesh, (2 k, 3) vertices each."""
+    fronts = []
+    for facet in facets:
+        if facet.polygon.area < 1e-8:
+            continue
+        shape = shapely.remove_repeated_points(facet.polygon, 1e-6)
+        for ring in convex_partition(shape):
+            fronts.append((facet, facet.frame @ np.column_stack([ring, np.zeros(len(ring))])))
+    centres = np.array([front.mean(axis=0) for _, front in fronts])
+    normals = np.array([facet.frame.normal for facet, _ in fronts])
+    depth = np.clip(0.5 * _thickness(mesh, centres, normals), _LEAST_DEPTH, _DEPTH)
+    return [
+        np.concatenate([front, centre + _TAPER * (front - centre) - deep * normal])
+        for (_, front), centre, normal, deep in zip(fronts, centres, normals, depth, strict=True)
+    ]
+
+
+def _thickness(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Distance (n,) from points on a mesh to the next triangle behind them; inf where there is none.
+
+    Every ray against every triangle (Moeller and Trumbore 1997), in blocks.
+    """
+    corner = mesh.triangles[:, 0]
+    first, second = mesh.triangles[:, 1] - corner, mesh.triangles[:, 2] - corner
+    result = np.full(len(points), np.inf)
+    block = max(1, 2_000_000 // max(1, len(corner)))
+    for begin in range(0, len(points), block):
+        point, ray = points[begin : begin + block, None], -normals[begin : begin + block, None]
+        p = np.cross(ray, second)
+        determinant = (first * p).sum(-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            offset = point - corner
+            u = (offset * p).sum(-1) / determinant
+            q = np.cross(offset, first)
+            v = (ray * q).sum(-1) / determinant
+            distance = (second * q).sum(-1) / determinant
+            hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 1e-4)
+        result[begin : begin + block] = np.where(hit, distance, np.inf).min(axis=1)
+    return result

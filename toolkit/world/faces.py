@@ -1,0 +1,111 @@
+"""Planar faces of the world's geoms, before anything is cut away."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import shapely
+import trimesh
+from shapely.geometry import Polygon
+
+from toolkit.geometry.pose import Pose
+from toolkit.world.decomposition import FACET_ANGLE, FACET_DISTANCE
+from toolkit.world.facets import find_facets
+from toolkit.world.solids import height_field_triangles, plane_rectangle
+from toolkit.world.source import Source, mesh_of_geom
+
+_CAP_SIDES = 64  # corners, on the circle, of a cylinder's cap
+
+
+@dataclass(frozen=True)
+class Face:
+    """A flat face of a geom.
+
+    Attributes:
+        geom: label of the authored geom.
+        friction: sliding coefficient.
+        frame: world_from_face; z is the outward normal.
+        polygon: outline in the frame's xy, m; may have holes.
+    """
+
+    geom: str
+    friction: float
+    frame: Pose
+    polygon: Polygon
+
+
+def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) -> list[Face]:
+    """All flat faces of the colliding geoms of a world.
+
+    Args:
+        source: the world's scene.
+        square: (xmin, ymin, xmax, ymax), m; infinite planes are cut to it.
+        least_area: m^2; smaller faces of meshes and height fields are left out.
+
+    Returns:
+        Faces in the order of the geoms. Spheres, capsules, ellipsoids and the sides of cylinders and of height fields
+        have none.
+    """
+    model = source.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    faces, done = [], set()
+    for index in np.flatnonzero((model.geom_contype | model.geom_conaffinity) != 0).tolist():
+        label, friction = source.owner[index], float(model.geom_friction[index, 0])
+        pose = Pose(data.geom_xmat[index].reshape(3, 3).copy(), data.geom_xpos[index].copy())
+        if label in source.facets:  # a mesh made of parts: its own facets, once
+            found = [(facet.frame, facet.polygon) for facet in source.facets[label]] if label not in done else []
+            done.add(label)
+        else:
+            found = _local_faces(model, data, index, pose, square)
+        for frame, polygon in found:
+            if polygon.area > least_area:
+                faces.append(Face(label, friction, frame, polygon))
+    return faces
+
+
+def _local_faces(model, data, index: int, pose: Pose, square: tuple[float, ...]) -> list[tuple[Pose, Polygon]]:
+    """(world_from_face, outline) of a geom's faces."""
+    types, size = mujoco.mjtGeom, model.geom_size[index]
+    kind = model.geom_type[index]
+    if kind == types.mjGEOM_PLANE:
+        rectangle = plane_rectangle(model, index, pose, square)
+        drawn = np.where(size[:2] > 0, size[:2], np.inf)
+        low, high = np.maximum(rectangle.min(axis=0), -drawn), np.minimum(rectangle.max(axis=0), drawn)
+        return [(pose, shapely.box(*low, *high))] if (high > low).all() else []
+    if kind == types.mjGEOM_BOX:
+        return [(pose @ Pose(turn, turn[:, 2] * size), shapely.box(*-half, *half)) for turn, half in _box_faces(size)]
+    if kind == types.mjGEOM_CYLINDER:
+        angle = 2 * np.pi * np.arange(_CAP_SIDES) / _CAP_SIDES
+        cap = Polygon(size[0] * np.column_stack([np.cos(angle), np.sin(angle)]))
+        down = np.diag([1.0, -1.0, -1.0])
+        return [(pose @ Pose(turn, turn[:, 2] * size[1]), cap) for turn in (np.eye(3), down)]
+    if kind == types.mjGEOM_MESH:
+        vertices, _ = mesh_of_geom(model, data, index)
+        hull = trimesh.convex.convex_hull(vertices)
+    elif kind == types.mjGEOM_HFIELD:
+        points, triangles = height_field_triangles(model, int(model.geom_dataid[index]))
+        hull = trimesh.Trimesh(pose @ points, triangles, process=False)
+    else:
+        return []
+    facets = find_facets(hull, angle=FACET_ANGLE, distance=FACET_DISTANCE)
+    return [(facet.frame, facet.polygon) for facet in facets]
+
+
+def _box_faces(size: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(box_from_face rotation, half extents along its x and y) of the six faces of a box."""
+    faces = []
+    for axis, sign in ((2, 1), (2, -1), (0, 1), (0, -1), (1, 1), (1, -1)):
+        normal = sign * np.eye(3)[axis]
+        x = np.eye(3)[0 if axis == 2 else (axis + 1) % 3]
+        turn = np.stack([x, np.cross(normal, x), normal], axis=1)
+        faces.append((turn, np.abs(turn[:, :2].T @ size)))
+    return faces
+
+
+def square_around(points: np.ndarray, margin: float) -> tuple[float, float, float, float]:
+    """(xmin, ymin, xmax, ymax) of points (n, 2 or 3) with a margin in m on every side."""
+    low, high = points[:, :2].min(axis=0) - margin, points[:, :2].max(axis=0) + margin
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])

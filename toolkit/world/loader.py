@@ -1,0 +1,115 @@
+"""Load a world: a plain MJCF file with a start, a goal and static geometry."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from toolkit.errors import WorldError
+from toolkit.geometry.pose import Pose
+from toolkit.world.extraction import SurfaceConfig, extract_surfaces
+from toolkit.world.faces import square_around
+from toolkit.world.polygon import surface_height
+from toolkit.world.solids import solids_of
+from toolkit.world.source import read_source
+from toolkit.world.surface import Surface
+from toolkit.world.timing import Timing
+from toolkit.world.world import Goal, World
+
+_DEFAULT = SurfaceConfig()
+_ABOVE_START, _BELOW_START = 0.15, 0.3  # m; where the ground is looked for, relative to the start
+_AROUND_START = 0.25  # m; the start may be between two stones
+
+
+def load_world(path: Path | str, *, mjcf: str | None = None, config: SurfaceConfig = _DEFAULT) -> World:
+    """Load a world from its MJCF file.
+
+    Args:
+        path: the file; its folder is where meshes are looked for, its name (without ending) names the world.
+        mjcf: text to use in place of the file's content (a world made in memory).
+        config: what counts as a contact surface.
+
+    Returns:
+        The world with its surfaces.
+
+    Raises:
+        WorldError: one line that names the file, the thing at fault and the remedy.
+    """
+    path = Path(path)
+    source = read_source(path, mjcf)
+    model = source.model
+    start, goal, timing = _start(path, model), _goal(path, model), _timing(path, model)
+    square = square_around(np.stack([start.position, goal.position]), config.plane_margin)
+    surfaces = extract_surfaces(source, solids_of(model, square=square), square, config)
+    if not any(surface.serves_foot for surface in surfaces):
+        raise WorldError(
+            f"{path}: no usable surface for feet; add a static colliding geom with a free flat top of at least "
+            f"{config.least_area:g} m^2, tilted less than {np.degrees(config.foot_angle):g} degrees"
+        )
+    _check_ground(path, start, surfaces)
+    return World(path.stem, path, model, surfaces, start, goal, timing, square=square, mjcf=mjcf)
+
+
+def _site(path: Path, model: mujoco.MjModel, name: str, example: str) -> int:
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
+    if site < 0:
+        raise WorldError(f"{path}: no site '{name}'; add {example} to the worldbody")
+    return site
+
+
+def _site_pose(model: mujoco.MjModel, site: int) -> Pose:
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return Pose(data.site_xmat[site].reshape(3, 3).copy(), data.site_xpos[site].copy())
+
+
+def _start(path: Path, model: mujoco.MjModel) -> Pose:
+    """Upright pose of the start site."""
+    pose = _site_pose(model, _site(path, model, "start", '<site name="start" pos="x y z"/>'))
+    if pose.normal[2] < 0.5:
+        raise WorldError(f"{path}: site 'start' is tilted; turn it about z only (its yaw is the heading)")
+    return Pose.from_yaw(pose.position, pose.yaw)
+
+
+def _goal(path: Path, model: mujoco.MjModel) -> Goal:
+    example = '<site name="goal" type="cylinder" pos="x y z" size="radius height"/>'
+    site = _site(path, model, "goal", example)
+    if model.site_type[site] != mujoco.mjtGeom.mjGEOM_CYLINDER:
+        raise WorldError(f"{path}: site 'goal' is not a cylinder; write it as {example}")
+    radius = float(model.site_size[site, 0])
+    if not radius > 0.0:
+        raise WorldError(f"{path}: site 'goal' has radius {radius:g}; give a radius above zero in metres")
+    return Goal(_site_pose(model, site).position, radius)
+
+
+def _timing(path: Path, model: mujoco.MjModel) -> Timing:
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, "transition_timing")
+    if index < 0:
+        return Timing()
+    first, count = int(model.numeric_adr[index]), int(model.numeric_size[index])
+    values = model.numeric_data[first : first + count]
+    if count != 2 or not np.isfinite(values).all() or not (values > 0).all():
+        raise WorldError(
+            f"{path}: numeric 'transition_timing' is '{' '.join(f'{value:g}' for value in values)}'; "
+            "give two times above zero in seconds: shift and swing"
+        )
+    return Timing(float(values[0]), float(values[1]))
+
+
+def _check_ground(path: Path, start: Pose, surfaces: tuple[Surface, ...]) -> None:
+    """Raise where no surface for feet lies under the start or close beside it."""
+    angles = np.arange(8) * np.pi / 4
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    spots = start.position[:2] + np.concatenate([[[0.0, 0.0]], _AROUND_START / 2 * ring, _AROUND_START * ring])
+    z = start.position[2]
+    for surface in surfaces:
+        if surface.serves_foot:
+            height = surface_height(surface, spots)
+            if ((height <= z + _ABOVE_START) & (height >= z - _BELOW_START)).any():
+                return
+    raise WorldError(
+        f"{path}: site 'start' is in the air: no surface for feet within {_BELOW_START:g} m below "
+        f"({start.position[0]:.3g}, {start.position[1]:.3g}, {z:.3g}); move it onto the ground"
+    )

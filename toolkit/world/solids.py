@@ -1,0 +1,214 @@
+"""The world's colliding geometry as convex solids, and the shadow they cast on a plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import shapely
+import trimesh
+
+from toolkit.geometry.pose import Pose
+
+_DEEP = 100.0  # m; depth of the half space under a plane
+_SIDES = 48  # sides of a prism that stands for a cylinder
+
+
+@dataclass(frozen=True)
+class Solids:
+    """Convex solids by their vertices and edges.
+
+    Attributes:
+        points: (n, 3) float, m; vertices in the world frame, solid after solid.
+        edges: (k, 2) int; pairs of vertices. All of a solid's convex edges are among them.
+        edge_solid: (k,) int; solid of each edge, ascending.
+        point_solid: (n,) int; solid of each vertex, ascending.
+        triangles: (t, 3) int; the solids' faces as triangles of vertices, counterclockwise from outside.
+    """
+
+    points: np.ndarray
+    edges: np.ndarray
+    edge_solid: np.ndarray
+    point_solid: np.ndarray
+    triangles: np.ndarray
+
+    def shadow(self, frame: Pose, bounds: tuple[float, ...], low: float, high: float) -> np.ndarray:
+        """Projections on a plane of what the solids fill between two heights above it.
+
+        Args:
+            frame: world_from_plane; z is the plane's normal.
+            bounds: (xmin, ymin, xmax, ymax), m, in the plane; solids outside are left out.
+            low: m; lower height.
+            high: m; upper height.
+
+        Returns:
+            (s,) object array of shapely polygons in the plane's xy, one per solid that fills an area.
+        """
+        local = frame.inverse() @ self.points
+        start = np.flatnonzero(np.diff(self.point_solid, prepend=-1))
+        least, most = np.minimum.reduceat(local, start), np.maximum.reduceat(local, start)
+        near = (most[:, 2] > low) & (least[:, 2] < high)
+        near &= (most[:, 0] > bounds[0]) & (least[:, 0] < bounds[2])
+        near &= (most[:, 1] > bounds[1]) & (least[:, 1] < bounds[3])
+        chosen = near[self.edge_solid]
+        if not chosen.any():
+            return np.empty(0, object)
+        ends, solid = local[self.edges[chosen]], self.edge_solid[chosen]
+        height = ends[:, :, 2]
+        rise = height[:, 1] - height[:, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at_low, at_high = (low - height[:, 0]) / rise, (high - height[:, 0]) / rise
+        level = np.abs(rise) < 1e-12
+        enter = np.where(level, 0.0, np.clip(np.minimum(at_low, at_high), 0.0, 1.0))
+        leave = np.where(level, 1.0, np.clip(np.maximum(at_low, at_high), 0.0, 1.0))
+        inside = np.where(level, (height[:, 0] > low) & (height[:, 0] < high), leave > enter)
+        enter, leave, ends, solid = enter[inside], leave[inside], ends[inside], solid[inside]
+        if len(solid) == 0:
+            return np.empty(0, object)
+        along = ends[:, 1, :2] - ends[:, 0, :2]
+        cut = ends[:, :1, :2] + np.stack([enter, leave], axis=1)[:, :, None] * along[:, None]
+        hulls = shapely.convex_hull(shapely.multipoints(cut.reshape(-1, 2), indices=_ranks(np.repeat(solid, 2))))
+        return hulls[(shapely.get_type_id(hulls) == 3) & (shapely.area(hulls) > 1e-10)]
+
+    @property
+    def corners(self) -> np.ndarray:
+        """(t, 3, 3) float; corners of the solids' triangles in the world frame."""
+        return self.points[self.triangles]
+
+
+def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
+    """Convex solids of all colliding geoms of a world.
+
+    Planes are half spaces whatever size they are drawn with, because MuJoCo collides them so; here they are cut to a
+    square and are deep. Cylinders become prisms around the circle; spheres, capsules and ellipsoids fine polyhedra;
+    a height field one prism per triangle, as MuJoCo collides it.
+
+    Args:
+        model: the world compiled (meshes convex).
+        square: (xmin, ymin, xmax, ymax), m; the part of infinite planes that matters.
+
+    Returns:
+        The solids.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    meshes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    for index in np.flatnonzero((model.geom_contype | model.geom_conaffinity) != 0).tolist():
+        pose = Pose(data.geom_xmat[index].reshape(3, 3), data.geom_xpos[index])
+        for points, faces, edges in _local_solids(model, index, pose, square):
+            meshes.append((pose @ points, faces, edges))
+    if not meshes:
+        empty = np.zeros((0, 3))
+        return Solids(empty, np.zeros((0, 2), int), np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3), int))
+    counts = np.array([len(points) for points, _, _ in meshes])
+    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    return Solids(
+        np.concatenate([points for points, _, _ in meshes]),
+        np.concatenate([edges + at for at, (_, _, edges) in zip(first, meshes, strict=True)]),
+        np.repeat(np.arange(len(meshes)), [len(edges) for _, _, edges in meshes]),
+        np.repeat(np.arange(len(meshes)), counts),
+        np.concatenate([faces + at for at, (_, faces, _) in zip(first, meshes, strict=True)]),
+    )
+
+
+def plane_rectangle(model: mujoco.MjModel, index: int, pose: Pose, square: tuple[float, ...]) -> np.ndarray:
+    """(4, 2) float corners, in a plane geom's frame, that cover the square of the world in that plane.
+
+    Args:
+        model: the world compiled.
+        index: the plane geom.
+        pose: world_from_geom.
+        square: (xmin, ymin, xmax, ymax), m.
+    """
+    x0, y0, x1, y1 = square
+    corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+    normal = pose.normal
+    reach = np.hypot(x1 - x0, y1 - y0)
+    if abs(normal[2]) > 0.1:  # the corners of the square, projected along z
+        z = pose.position[2] - ((corners - pose.position[:2]) @ normal[:2]) / normal[2]
+        low, high = _extent(pose.inverse() @ np.column_stack([corners, z]))
+    else:  # a wall: a rectangle as wide as the square and as high as it is wide
+        low, high = _extent(pose.inverse() @ np.column_stack([corners, np.zeros(4)]))
+        middle = (low + high) / 2
+        low, high = middle - reach / 2, middle + reach / 2
+    return np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+
+
+def _extent(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest xy of points (n, 3)."""
+    return points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+
+
+def _ranks(ascending: np.ndarray) -> np.ndarray:
+    """0, 0, 1, 2, 2, ... for 3, 3, 5, 9, 9, ..."""
+    return np.cumsum(np.diff(ascending, prepend=ascending[0]) != 0)
+
+
+def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
+    """(points, triangles, edges) of the convex solids of a geom, in the geom's frame."""
+    kind, size = model.geom_type[index], model.geom_size[index]
+    types = mujoco.mjtGeom
+    if kind == types.mjGEOM_PLANE:
+        rectangle = plane_rectangle(model, index, pose, square)
+        return [_hull(_extruded(rectangle, -_DEEP, 0.0))]
+    if kind == types.mjGEOM_BOX:
+        return [_hull(_extruded(size[:2] * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]), -size[2], size[2]))]
+    if kind == types.mjGEOM_CYLINDER:
+        angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
+        circle = size[0] / np.cos(np.pi / _SIDES) * np.column_stack([np.cos(angle), np.sin(angle)])
+        return [_hull(_extruded(circle, -size[1], size[1]))]
+    if kind == types.mjGEOM_SPHERE:
+        return [_hull(trimesh.creation.icosphere(subdivisions=3, radius=size[0]).vertices)]
+    if kind == types.mjGEOM_ELLIPSOID:
+        return [_hull(trimesh.creation.icosphere(subdivisions=3).vertices * size)]
+    if kind == types.mjGEOM_CAPSULE:
+        ball = np.asarray(trimesh.creation.icosphere(subdivisions=3, radius=size[0]).vertices)
+        return [_hull(np.concatenate([ball + [0, 0, size[1]], ball - [0, 0, size[1]]]))]
+    if kind == types.mjGEOM_MESH:
+        mesh = int(model.geom_dataid[index])
+        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        return [_hull(model.mesh_vert[first : first + count].astype(float))]
+    if kind == types.mjGEOM_HFIELD:
+        return _height_field_prisms(model, int(model.geom_dataid[index]))
+    return []
+
+
+def _extruded(ring: np.ndarray, low: float, high: float) -> np.ndarray:
+    """(2 k, 3) vertices of a prism over a ring (k, 2)."""
+    return np.concatenate([np.column_stack([ring, np.full(len(ring), z)]) for z in (low, high)])
+
+
+def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices, triangles and edges of a convex hull."""
+    hull = trimesh.convex.convex_hull(np.asarray(points, float))
+    return np.asarray(hull.vertices), np.asarray(hull.faces), np.asarray(hull.edges_unique)
+
+
+_PRISM_EDGES = np.array([[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]])
+_PRISM_FACES = np.array([[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]])
+
+
+def _height_field_prisms(model: mujoco.MjModel, field: int):
+    """Prisms from the base of a height field up to its triangles."""
+    points, triangles = height_field_triangles(model, field)
+    base = -model.hfield_size[field, 3]
+    prisms = []
+    for corners in points[triangles]:
+        prisms.append((np.concatenate([corners * [1, 1, 0] + [0, 0, base], corners]), _PRISM_FACES, _PRISM_EDGES))
+    return prisms
+
+
+def height_field_triangles(model: mujoco.MjModel, field: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points (r * c, 3) and upward triangles (k, 3) of a height field in its geom's frame, split as MuJoCo does."""
+    rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
+    half_x, half_y, top, _ = model.hfield_size[field]
+    first = int(model.hfield_adr[field])
+    height = model.hfield_data[first : first + rows * columns].astype(float) * top
+    y, x = np.meshgrid(np.linspace(-half_y, half_y, rows), np.linspace(-half_x, half_x, columns), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), height])
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    right, up, across = corner + 1, corner + columns, corner + columns + 1
+    lower = np.column_stack([corner, right, across])
+    upper = np.column_stack([corner, across, up])
+    return points, np.stack([lower, upper], axis=1).reshape(-1, 3)
