@@ -1,0 +1,152 @@
+"""recording.rrd: a run for the rerun viewer, with the layout it opens in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+
+from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.report.blueprint import blueprint
+from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, start_recording
+from toolkit.report.motion_scene import (
+    TIMELINE,
+    draw_centres,
+    draw_forces,
+    draw_made_contacts,
+    draw_motion,
+    draw_plan,
+    draw_search,
+    frames,
+    standing,
+)
+from toolkit.report.run_report import RunReport
+from toolkit.report.series import plot_execution, plot_motion, send_contact_states, touchdown_entries
+from toolkit.report.summary import summary
+from toolkit.robot.model import RobotModel
+from toolkit.search.result import SearchResult, Solution
+from toolkit.simulation.execution import Execution
+from toolkit.wholebody.trajectory import WholeBodyTrajectory
+from toolkit.world.world import World
+
+APPLICATION = "humanoid contact planning"
+
+
+def write_recording(
+    path: Path,
+    *,
+    world: World,
+    robot: RobotModel,
+    report: RunReport | None = None,
+    search: SearchResult | None = None,
+    solution: Solution | None = None,
+    sequence: ContactSequence | None = None,
+    schedule: ContactSchedule | None = None,
+    motion: CentroidalMotion | None = None,
+    trajectory: WholeBodyTrajectory | None = None,
+    execution: Execution | None = None,
+    rate: float = 30.0,
+) -> None:
+    """Write the recording of a run, as far as the run came.
+
+    Entities: `world/...` is the 3D scene in metres, `series/...` the curves, `contacts/...` the lanes of contacts,
+    `search/...` the search on its own timeline, `summary` the text, `events` a log. Time is in seconds of the motion.
+
+    Args:
+        path: file to write.
+        world: the world.
+        robot: the robot.
+        report: verdict and checks for the text.
+        search: result of the contact search.
+        solution: the solution that was taken, for the CoM that the search predicted.
+        sequence: the planned contacts; None for the solution's.
+        schedule: when they hold; None where no motion was planned, or for `ContactSchedule.of(sequence)`.
+        motion: centroidal motion.
+        trajectory: whole-body trajectory; moves the robot where there is no execution.
+        execution: simulated run.
+        rate: Hz of everything drawn in 3D.
+    """
+    if solution is None and sequence is None and search is not None and search.solutions:
+        solution = search.solutions[-1]
+    if sequence is None and solution is not None:
+        sequence = solution.sequence
+    if schedule is None and sequence is not None:
+        schedule = ContactSchedule.of(sequence)
+    executed = execution is not None and len(execution.tick_times) > 0
+
+    stream = start_recording(path, APPLICATION, f"{robot.name} in {world.name}")
+    try:
+        stream.send_blueprint(
+            blueprint(world.start.position, world.goal.position, executed=executed, searched=search is not None)
+        )
+        stream.log("summary", rr.TextDocument(summary(report), media_type=rr.MediaType.MARKDOWN), static=True)
+        draw_scene(stream, world.mujoco_model)
+        draw_surfaces(stream, world.surfaces)
+        draw_goal(stream, world.goal)
+        _draw_robot(stream, robot, world, sequence, trajectory, execution if executed else None, rate)
+        if sequence is not None:
+            draw_plan(stream, sequence, schedule, robot.half_sizes)
+        predicted = solution.com if solution is not None else None
+        draw_centres(stream, schedule, predicted, motion, execution if executed else None, rate)
+        if execution is not None and executed:
+            rows = frames(execution.tick_times, rate)
+            times, pose = execution.tick_times[rows], execution.limb_pose[rows]
+            draw_made_contacts(stream, execution, robot.half_sizes)
+            draw_forces(stream, "planned", times, execution.wrench_planned[rows], pose, 0.006)
+            draw_forces(stream, "measured", times, execution.wrench[rows], pose, 0.014)
+            plot_execution(stream, execution, trajectory)
+            for time, text in touchdown_entries(execution):
+                stream.set_time(TIMELINE, duration=time)
+                stream.log("events", rr.TextLog(text))
+            if execution.fell:
+                stream.set_time(TIMELINE, duration=float(execution.tick_times[-1]))
+                stream.log("events", rr.TextLog(execution.fall_reason, level=rr.TextLogLevel.ERROR))
+            stream.reset_time()
+        elif motion is not None and np.isfinite(motion.linear_momentum).all():
+            plot_motion(stream, motion)
+        send_contact_states(stream, schedule, execution)
+        if search is not None:
+            draw_search(stream, search, _ground(world, sequence))
+    finally:
+        stream.disconnect()
+
+
+def _draw_robot(
+    stream: rr.RecordingStream,
+    robot: RobotModel,
+    world: World,
+    sequence: ContactSequence | None,
+    trajectory: WholeBodyTrajectory | None,
+    execution: Execution | None,
+    rate: float,
+) -> None:
+    """Draw the robot as executed, else as planned, else standing at the start."""
+    if execution is not None:
+        rows = frames(execution.tick_times, rate)
+        draw_motion(stream, execution.scene, execution.tick_times[rows], execution.qpos[rows])
+    elif trajectory is not None and len(trajectory.times) and np.isfinite(trajectory.qpos).all():
+        rows = frames(trajectory.times, rate)
+        draw_motion(stream, robot.mujoco_model, trajectory.times[rows], trajectory.qpos[rows])
+    else:
+        feet = sequence.start.mean_feet if sequence is not None else world.start
+        draw_motion(stream, robot.mujoco_model, np.zeros(1), standing(robot, feet))
+
+
+class _ground:
+    """Height of the nearest planned contact of a foot, or of the start: where to draw points of the plane."""
+
+    def __init__(self, world: World, sequence: ContactSequence | None):
+        points = [world.start.position]
+        if sequence is not None:
+            points = [contact.pose.position for contact in sequence.start.contacts if contact.limb.is_foot]
+            made = [t.contact for t in sequence.transitions if t.contact is not None and t.limb.is_foot]
+            points += [contact.pose.position for contact in made]
+        self.points = np.array(points)
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Heights (n,) m for points (n, 2)."""
+        distance = np.linalg.norm(points[:, None] - self.points[None, :, :2], axis=-1)
+        return self.points[distance.argmin(1), 2]

@@ -1,0 +1,179 @@
+"""Time series of a recording: tracking, momenta, centres of pressure, torques, slip, contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+
+from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.geometry.limb import Limb
+from toolkit.report.draw import EXECUTED, LIMB_COLORS, Color
+from toolkit.report.motion_scene import LEAST_FORCE, TIMELINE, at, limb_of
+from toolkit.simulation.execution import Execution
+from toolkit.wholebody.trajectory import WholeBodyTrajectory
+
+AXES: tuple[Color, Color, Color] = ((228, 80, 80), (90, 190, 90), (90, 140, 240))
+RATE = 100.0
+"""Hz to which series are thinned; each sample then holds the worst value of its interval."""
+
+
+def thinned(times: np.ndarray, values: np.ndarray, rate: float = RATE, worst: str = "mean") -> tuple[np.ndarray, ...]:
+    """Cut samples into intervals of 1 / rate and keep one value of each.
+
+    Args:
+        times: (n,) s, ascending.
+        values: (n, ...) float; NaN where undefined.
+        rate: Hz.
+        worst: "max" or "min" keep the extreme, "mean" the mean, all without NaN (NaN where nothing is defined).
+
+    Returns:
+        (m,) s first time of each interval, (m, ...) values.
+    """
+    if not len(times):
+        return times, values
+    _, first = np.unique(np.floor((times - times[0]) * rate + 1e-6).astype(int), return_index=True)
+    undefined = np.isnan(values)
+    if worst == "mean":
+        total = np.add.reduceat(np.where(undefined, 0.0, values), first)
+        count = np.add.reduceat((~undefined).astype(float), first)
+        return times[first], np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    function, neutral = (np.maximum, -np.inf) if worst == "max" else (np.minimum, np.inf)
+    reduced = function.reduceat(np.where(undefined, neutral, values), first)
+    return times[first], np.where(np.isinf(reduced), np.nan, reduced)
+
+
+def plot(
+    stream: rr.RecordingStream,
+    entity: str,
+    times: np.ndarray,
+    values: np.ndarray,
+    names: str | Sequence[str],
+    colors: Color | Sequence[Color],
+    width: float = 1.5,
+) -> None:
+    """Send curves (n,) or (n, k) over (n,) s; a sample that is NaN leaves a gap."""
+    values = np.asarray(values, float).reshape(len(times), -1)
+    columns = values.shape[1]
+    style = rr.SeriesLines(names=names, colors=colors, widths=[width] * columns)
+    stream.log(entity, style, static=True)
+    scalars = rr.Scalars.columns(scalars=values.ravel())
+    stream.send_columns(entity, at(times), scalars.partition([columns] * len(times)))
+
+
+def plot_execution(stream: rr.RecordingStream, execution: Execution, trajectory: WholeBodyTrajectory | None) -> None:
+    """Send every series of a simulated run."""
+    times = execution.tick_times
+    if not len(times):
+        return
+    error = np.linalg.norm(execution.com - execution.com_planned, axis=1)
+    plot(stream, "series/tracking/com", *thinned(times, 1e3 * error, worst="max"), "CoM", EXECUTED)
+    if trajectory is not None:
+        for limb, values in limb_errors(execution, trajectory).items():
+            curve = thinned(times, 1e3 * values, worst="max")
+            plot(stream, f"series/tracking/{limb.label}", *curve, limb.label, LIMB_COLORS[limb])
+    for part, name in ((slice(0, 3), "linear"), (slice(3, 6), "angular")):
+        for source, values, width in (
+            ("planned", execution.momentum_planned, 1.0),
+            ("measured", execution.momentum, 2.0),
+        ):
+            names = [f"{axis} {source}" for axis in "xyz"]
+            plot(stream, f"series/{name}_momentum/{source}", *thinned(times, values[:, part]), names, AXES, width)
+    for limb in Limb:
+        mine = LIMB_COLORS[limb]
+        if np.isfinite(execution.cop_margin[:, limb]).any():
+            curve = thinned(times, 1e3 * execution.cop_margin[:, limb], worst="min")
+            plot(stream, f"series/cop_margin/{limb.label}", *curve, limb.label, mine)
+        for source, wrench, width in (("planned", execution.wrench_planned, 1.0), ("measured", execution.wrench, 2.0)):
+            force = np.linalg.norm(wrench[:, limb, :3], axis=1)
+            if force.max() > LEAST_FORCE:
+                name = f"{limb.label} {source}"
+                plot(stream, f"series/force/{limb.label}/{source}", *thinned(times, force), name, mine, width)
+    plot(
+        stream,
+        "series/torque_ratio/largest",
+        *thinned(times, execution.torque_ratio, worst="max"),
+        "torque / limit",
+        EXECUTED,
+    )
+    plot(stream, "series/torque_ratio/limit", times[[0, -1]], np.ones(2), "limit", (228, 62, 62), 1.0)
+    if execution.slip:
+        edges, values = slip_steps(execution)
+        plot(stream, "series/slip", edges, 1e3 * values, "slip of the stance", EXECUTED)
+
+
+def plot_motion(stream: rr.RecordingStream, motion: CentroidalMotion) -> None:
+    """Send the planned momenta of a centroidal motion that was not executed."""
+    for name, values in (("linear", motion.linear_momentum), ("angular", motion.angular_momentum)):
+        names = [f"{axis} planned" for axis in "xyz"]
+        plot(stream, f"series/{name}_momentum/planned", motion.problem.times, values, names, AXES, 1.0)
+
+
+def limb_errors(execution: Execution, trajectory: WholeBodyTrajectory) -> dict[Limb, np.ndarray]:
+    """(C,) m distance of each measured patch from the trajectory's, for limbs that have both."""
+    errors = {}
+    for limb in Limb:
+        planned, measured = trajectory.limb_pose[:, limb, :3], execution.limb_pose[:, limb, :3]
+        if np.isfinite(planned).all() and np.isfinite(measured).any():
+            axes = [np.interp(execution.tick_times, trajectory.times, planned[:, axis]) for axis in range(3)]
+            errors[limb] = np.linalg.norm(measured - np.column_stack(axes), axis=1)
+    return errors
+
+
+def slip_steps(execution: Execution) -> tuple[np.ndarray, np.ndarray]:
+    """Slip of each stance as a staircase: times (2k,) s of its ends, values (2k,) m."""
+    end = float(execution.tick_times[-1])
+    touched = [float(touch["time"]) for touch in execution.touchdowns if touch.get("time") is not None]
+    edges = np.clip([0.0, *sorted(touched), end], 0.0, end)
+    count = min(len(execution.slip), len(edges) - 1)
+    return np.column_stack([edges[:count], edges[1 : count + 1]]).ravel(), np.repeat(execution.slip[:count], 2)
+
+
+def send_contact_states(
+    stream: rr.RecordingStream, schedule: ContactSchedule | None, execution: Execution | None
+) -> None:
+    """Send when each limb is in contact, planned and measured, as lanes of states."""
+    lanes: dict[tuple[Limb, str], list[tuple[float, bool]]] = {}
+    if schedule is not None:
+        for phase in schedule.phases:
+            held = {contact.limb for contact in phase.contacts}
+            for limb in Limb:
+                lanes.setdefault((limb, "planned"), []).append((phase.start, limb in held))
+        for limb in Limb:
+            lanes[limb, "planned"].append((schedule.duration, False))
+    if execution is not None and len(execution.tick_times):
+        force = np.linalg.norm(execution.wrench[..., :3], axis=-1) > LEAST_FORCE
+        for limb in Limb:
+            samples = zip(execution.tick_times.tolist(), force[:, limb].tolist(), strict=True)
+            lanes[limb, "measured"] = [*samples, (float(execution.tick_times[-1]), False)]
+    for (limb, source), samples in lanes.items():
+        if not any(held for _, held in samples):
+            continue
+        entity = f"contacts/{limb.label}/{source}"
+        color = LIMB_COLORS[limb] if source == "measured" else tuple(int(0.6 * part) for part in LIMB_COLORS[limb])
+        style = rr.StateConfiguration(values=["contact"], labels=[source], colors=[color])
+        stream.log(entity, style, static=True)
+        before = False
+        for time, held in samples:
+            if held != before:
+                stream.set_time(TIMELINE, duration=time)
+                stream.log(entity, rr.StateChange(state="contact" if held else None))
+            before = held
+    stream.reset_time()
+
+
+def touchdown_entries(execution: Execution) -> list[tuple[float, str]]:
+    """(s, text) of every touchdown, for the log."""
+    entries = []
+    for touch in execution.touchdowns:
+        if touch.get("time") is None:
+            continue
+        text = f"{int(touch['transition']) + 1}: {limb_of(touch['limb']).label} touched down"
+        if touch.get("planned_time") is not None:
+            text += f" {1e3 * (touch['time'] - touch['planned_time']):+.0f} ms from plan"
+        if touch.get("position_error") is not None:
+            text += f", {1e3 * touch['position_error']:.1f} mm off"
+        entries.append((float(touch["time"]), text))
+    return entries

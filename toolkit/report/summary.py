@@ -1,0 +1,48 @@
+"""The verdict, the figures, the checks and the legend of a run as markdown."""
+
+from __future__ import annotations
+
+from toolkit.report.motion_scene import NEWTON_PER_METRE
+from toolkit.report.run_report import RunReport
+
+SIGNS = {"PASS": "✔", "FAIL": "✘", "NOT_CHECKED": "–"}
+
+LEGEND = f"""## Legend
+
+| what | looks like |
+|---|---|
+| planned contacts | filled rectangles, numbered by transition: left foot red, right foot green, left palm cyan, right palm magenta; thick while they hold |
+| made contacts | white outlines, from touchdown on |
+| CoM | predicted by the search orange, optimised blue, executed white |
+| forces | arrows at the centre of pressure, 1 m = {NEWTON_PER_METRE:.0f} N: planned thin, measured thick |
+| surfaces | for feet blue, for palms amber |
+| search | states from old (blue) to new (yellow): switch on `world/search`; its own timeline is `search` |
+"""  # noqa: E501
+
+
+def summary(report: RunReport | None) -> str:
+    """Markdown text of a run; only the legend where there is no report."""
+    if report is None:
+        return LEGEND
+    lines = [f"# {report.verdict}: {report.robot} in {report.world}", ""]
+    if report.reason:
+        lines += [f"**{report.reason}**", ""]
+    planning, execution = report.stages.get("planning", {}), report.stages.get("execution", {})
+    facts = []
+    if planning.get("contacts") is not None:
+        facts.append(f"{planning['contacts']} transitions, {planning['palm_contacts']} with a palm")
+        facts.append(f"first sequence after {planning['first_solution_seconds']:.2f} s")
+    if execution.get("simulated_seconds") is not None:
+        facts.append(
+            f"{execution['simulated_seconds']:.1f} s simulated at {execution['real_time_factor']:.2f} x real time"
+        )
+    facts.append(f"seed {report.seed}")
+    lines += [" · ".join(facts), ""]
+    if report.checks:
+        lines += ["| check | value | limit | result |", "|---|---:|---:|---|"]
+        for check in report.checks:
+            unit = f" {check.unit}" if check.unit else ""
+            value = "–" if check.value is None else f"{check.value:.4g}{unit}"
+            lines.append(f"| {check.name} | {value} | {check.limit:.4g}{unit} | {SIGNS[check.result]} {check.result} |")
+        lines.append("")
+    return "\n".join([*lines, LEGEND])
