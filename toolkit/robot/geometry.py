@@ -1,0 +1,226 @@
+"""Legs as two links and arms as a reach, derived from the compiled model in its home posture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from toolkit.errors import RobotError
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.robot.model import ArmGeometry, LegGeometry
+
+STRAIGHT_LEG_MARGIN = 0.015  # of the length from hip to ankle
+STRAIGHT_ARM_MARGIN = 0.05  # of the length from shoulder to palm
+_ROLES = ("roll", "pitch", "yaw")
+_ALIGNED = 0.8  # least |cosine| between a joint axis in the home posture and the base axis that names its role
+
+
+def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegGeometry:
+    """A leg between hip centre and ankle centre.
+
+    Angles are those of the two-link leg: zero is a straight leg at right angles to the level sole, also where the
+    joints' own zeros are elsewhere.
+
+    Args:
+        model: the robot alone; sites named after the limbs.
+        data: forward kinematics and CoM of the home posture done.
+        limb: a foot.
+
+    Returns:
+        The leg.
+
+    Raises:
+        RobotError: the chain from base to foot is not hip (yaw, roll, pitch in any order), knee, ankle (two).
+    """
+    joints = _chain(model, model.site_bodyid[model.site(limb.label).id])
+    roles = _leg_roles(model, data, joints, limb)
+    base = data.xmat[1].reshape(3, 3)
+    site = model.site(limb.label).id
+    sole = data.site_xmat[site].reshape(3, 3)
+    hip = _axes_crossing(data, [roles[role] for role in ("hip_yaw", "hip_roll", "hip_pitch")])
+    ankle = _axes_crossing(data, [roles["ankle_pitch"], roles["ankle_roll"]])
+
+    # The plane of the leg: across the knee axis.
+    across = data.xaxis[roles["knee"]] * np.sign(data.xaxis[roles["knee"]] @ base[:, 1])
+    knee = data.xanchor[roles["knee"]]
+    upward_thigh, upward_shin = _across(hip - knee, across), _across(knee - ankle, across)
+    thigh, shin = float(np.linalg.norm(upward_thigh)), float(np.linalg.norm(upward_shin))
+    angles = {
+        "hip_pitch": _angle(base[:, 2], upward_thigh, across),
+        "knee": _angle(upward_thigh, upward_shin, across),
+        "ankle_pitch": _angle(upward_shin, sole[:, 2], across),
+    }
+
+    ranges, torques = {}, {}
+    torque = _torque_limits(model)
+    for role, joint in roles.items():
+        reference = sole if role == "ankle_roll" else base
+        sign = float(np.sign(data.xaxis[joint] @ reference[:, _ROLES.index(_role_axis(role))]))
+        value = data.qpos[model.jnt_qposadr[joint]]
+        offset = angles[role] - sign * value if role in angles else 0.0
+        low, high = sorted(offset + sign * limit for limit in model.jnt_range[joint])
+        ranges[role], torques[role] = (float(low), float(high)), float(torque[joint])
+    flexed, straight = ranges["knee"][1], max(ranges["knee"][0], 0.0)
+    if flexed < 0.1:
+        raise RobotError(f"{limb.label}: the knee does not flex backwards in the home posture; bend it in [home]")
+    return LegGeometry(
+        hip_in_com=base.T @ (hip - data.subtree_com[1]),
+        ankle_in_sole=sole.T @ (ankle - data.site_xpos[site]),
+        thigh=thigh,
+        shin=shin,
+        min_length=_length(thigh, shin, min(flexed, np.pi)),
+        max_length=min(_length(thigh, shin, straight), (1 - STRAIGHT_LEG_MARGIN) * (thigh + shin)),
+        ranges=ranges,
+        torques=torques,
+    )
+
+
+def arm_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> ArmGeometry:
+    """An arm's reach around its shoulder, by bending the elbow alone.
+
+    Args:
+        model: the robot alone; sites named after the limbs.
+        data: forward kinematics and CoM of the home posture done.
+        limb: a palm.
+
+    Returns:
+        The arm.
+
+    Raises:
+        RobotError: fewer than four joints between the trunk and the palm.
+    """
+    site = model.site(limb.label).id
+    joints = _arm_joints(model, limb)
+    if len(joints) < 4:
+        raise RobotError(
+            f"{limb.label}: {len(joints)} joints between the trunk and the palm; an arm needs four or more"
+        )
+    shoulder, palm = _axes_crossing(data, joints[:3]), data.site_xpos[site]
+
+    def distances(joint: int) -> np.ndarray:
+        home = data.qpos[model.jnt_qposadr[joint]]
+        axis, anchor = data.xaxis[joint], data.xanchor[joint]
+        angles = np.linspace(*model.jnt_range[joint], 200) - home
+        arm = palm - anchor
+        along = axis * (axis @ arm)
+        turned = along + np.cos(angles)[:, None] * (arm - along) + np.sin(angles)[:, None] * np.cross(axis, arm)
+        return np.linalg.norm(anchor + turned - shoulder, axis=1)
+
+    reach = max((distances(joint) for joint in joints[3:]), key=np.ptp)
+    base = data.xmat[1].reshape(3, 3)
+    return ArmGeometry(
+        shoulder_in_com=base.T @ (shoulder - data.subtree_com[1]),
+        min_reach=float(reach.min()),
+        max_reach=float((1 - STRAIGHT_ARM_MARGIN) * reach.max()),
+    )
+
+
+def derive_limbs(
+    model: mujoco.MjModel, home: np.ndarray, limbs: Mapping[Limb, object]
+) -> tuple[dict[Limb, LegGeometry], dict[Limb, ArmGeometry]]:
+    """Geometry of all limbs in a home posture.
+
+    Args:
+        model: the robot alone.
+        home: (7 + n,) qpos.
+        limbs: keyed by the limbs that the robot has.
+
+    Returns:
+        Legs by foot, arms by palm.
+
+    Raises:
+        RobotError: a limb whose joints are not understood.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = home
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    legs = {limb: leg_geometry(model, data, limb) for limb in limbs if limb in FEET}
+    arms = {limb: arm_geometry(model, data, limb) for limb in limbs if limb not in FEET}
+    return legs, arms
+
+
+def _chain(model: mujoco.MjModel, body: int) -> list[int]:
+    """Actuated joints from the base to a body, in that order."""
+    joints: list[int] = []
+    while model.body_parentid[body] != 0:
+        first, count = model.body_jntadr[body], model.body_jntnum[body]
+        joints = [*range(first, first + count), *joints]
+        body = model.body_parentid[body]
+    return joints
+
+
+def _arm_joints(model: mujoco.MjModel, limb: Limb) -> list[int]:
+    """Joints from the trunk to a palm; the trunk is the first body above that carries another limb."""
+    others = [
+        model.site(i).bodyid[0]
+        for i in range(model.nsite)
+        if model.site(i).name in {other.label for other in Limb if other != limb}
+    ]
+    carriers = set()
+    for other in others:
+        while other:
+            carriers.add(int(other))
+            other = model.body_parentid[other]
+    chain = _chain(model, model.site_bodyid[model.site(limb.label).id])
+    return [joint for joint in chain if int(model.jnt_bodyid[joint]) not in carriers]
+
+
+def _leg_roles(model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], limb: Limb) -> dict[str, int]:
+    base = data.xmat[1].reshape(3, 3)
+    names = [model.joint(joint).name for joint in joints]
+    cosines = np.abs(data.xaxis[joints] @ base)
+    found = [_ROLES[k] if row[k] >= _ALIGNED else "oblique" for row, k in zip(cosines, cosines.argmax(1), strict=True)]
+    if (
+        len(joints) != 6
+        or sorted(found[:3]) != sorted(_ROLES)
+        or found[3] != "pitch"
+        or (sorted(found[4:]) != ["pitch", "roll"])
+    ):
+        listed = ", ".join(f"{name} ({role})" for name, role in zip(names, found, strict=True)) or "none"
+        raise RobotError(
+            f"{limb.label}: the leg must be hip yaw, roll and pitch in any order, knee pitch, ankle pitch and roll in "
+            f"any order; found from the base down: {listed}; lock other joints or correct [home]"
+        )
+    roles = {f"hip_{role}": joint for role, joint in zip(found[:3], joints[:3], strict=True)}
+    roles["knee"] = joints[3]
+    roles |= {f"ankle_{role}": joint for role, joint in zip(found[4:], joints[4:], strict=True)}
+    order = ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle_pitch", "ankle_roll")
+    return {role: roles[role] for role in order}
+
+
+def _role_axis(role: str) -> str:
+    return "pitch" if role == "knee" else role.partition("_")[2]
+
+
+def _axes_crossing(data: mujoco.MjData, joints: list[int]) -> np.ndarray:
+    """Point (3,) nearest to the axes of joints, in the world: the least-squares solution of P_i (x - a_i) = 0."""
+    axes, anchors = data.xaxis[joints], data.xanchor[joints]
+    projections = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    # Parallel axes leave the point free along them: the solution nearest to the mean anchor.
+    middle = anchors.mean(0)
+    pull = np.einsum("nij,nj->i", projections, anchors - middle)
+    return middle + np.linalg.lstsq(projections.sum(0), pull, rcond=1e-9)[0]
+
+
+def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    return vector - axis * (axis @ vector)
+
+
+def _angle(start: np.ndarray, end: np.ndarray, axis: np.ndarray) -> float:
+    """Angle in rad about a unit axis that turns one vector into the other, both seen along the axis."""
+    start, end = _across(start, axis), _across(end, axis)
+    return float(np.arctan2(axis @ np.cross(start, end), start @ end))
+
+
+def _length(thigh: float, shin: float, flexion: float) -> float:
+    return float(np.sqrt(thigh**2 + shin**2 + 2 * thigh * shin * np.cos(flexion)))
+
+
+def _torque_limits(model: mujoco.MjModel) -> np.ndarray:
+    limits = np.full(model.njnt, np.inf)
+    for actuator in range(model.nu):
+        limits[model.actuator_trnid[actuator, 0]] = model.actuator_forcerange[actuator, 1]
+    return limits

@@ -1,0 +1,117 @@
+"""The home posture: joints by pattern, base so that the soles lie on the ground."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from toolkit.errors import RobotError
+from toolkit.geometry.limb import FEET
+from toolkit.geometry.pose import Pose, yaw_of
+from toolkit.robot.description import RobotDescription, match_joints
+
+MAX_SOLE_TILT = 0.02  # rad
+MAX_SOLE_STEP = 0.005  # m
+MAX_SINK = 0.003  # m; how far another part of the robot may reach below the soles
+
+
+def home_posture(description: RobotDescription, model: mujoco.MjModel) -> np.ndarray:
+    """Stand a robot on its soles.
+
+    Args:
+        description: the robot.toml.
+        model: the robot alone, with its contact sites.
+
+    Returns:
+        (7 + n,) qpos: soles on z = 0, mean of the feet above the origin, heading +x.
+
+    Raises:
+        RobotError: a pattern without joint, a joint out of its range, soles not level with each other, or a CoM that
+            is not above the feet.
+    """
+    where = description.path
+    names = [model.joint(j).name for j in range(1, model.njnt)]
+    values = match_joints(where, "home", description.home, names)
+    data = mujoco.MjData(model)
+    data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
+    for joint, name in enumerate(names, start=1):
+        low, high = model.jnt_range[joint]
+        value = values.get(name, 0.0)
+        if not low <= value <= high:
+            raise RobotError(f"{where}: [home] joint '{name}' = {value:g} is outside its range {low:g} to {high:g}")
+        data.qpos[model.jnt_qposadr[joint]] = value
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+
+    sites = [model.site(foot.label).id for foot in FEET]
+    soles = [Pose(data.site_xmat[site].reshape(3, 3), data.site_xpos[site]) for site in sites]
+    _check_level(description, soles)
+    up = soles[0].normal + soles[1].normal
+    up = up / np.linalg.norm(up)
+    x = soles[0].rotation[:, 0] + soles[1].rotation[:, 0]
+    x = x - up * (up @ x)
+    x = x / np.linalg.norm(x)
+    level = np.stack([x, np.cross(up, x), up])  # rows: the world's axes in the base
+    centre = (soles[0].position + soles[1].position) / 2
+    base = Pose(level, -level @ centre)
+    if abs(yaw_of(base.rotation)) > np.pi / 2:
+        raise RobotError(f"{where}: the feet point against the base's x axis; correct the poses of the contact limbs")
+    data.qpos[:3], data.qpos[3:7] = base.position, base.quaternion_wxyz
+    _check_balance(description, base @ data.subtree_com[1], [base @ sole for sole in soles])
+    _check_lowest(description, model, data)
+    return data.qpos.copy()
+
+
+def exclude_touching(model: mujoco.MjModel, home: np.ndarray) -> list[tuple[str, str]]:
+    """Pairs of bodies whose collision shapes overlap in the home posture: neighbours by construction."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = home
+    mujoco.mj_fwdPosition(model, data)
+    bodies = model.geom_bodyid[data.contact.geom]
+    return sorted({tuple(sorted((model.body(a).name, model.body(b).name))) for a, b in bodies})
+
+
+def _check_level(description: RobotDescription, soles: list[Pose]) -> None:
+    tilt = float(np.arccos(np.clip(soles[0].normal @ soles[1].normal, -1, 1)))
+    step = abs(float((soles[1].position - soles[0].position) @ soles[0].normal))
+    if tilt > MAX_SOLE_TILT or step > MAX_SOLE_STEP:
+        raise RobotError(
+            f"{description.path}: [home] leaves the soles {np.degrees(tilt):.1f}° and {1e3 * step:.1f} mm apart from one "
+            f"plane (at most {np.degrees(MAX_SOLE_TILT):.1f}° and {1e3 * MAX_SOLE_STEP:.0f} mm); correct [home] or [limbs]"
+        )
+
+
+def _check_balance(description: RobotDescription, com: np.ndarray, soles: list[Pose]) -> None:
+    half = np.array([description.limbs[foot].patch[0] / 2 for foot in FEET])
+    front = max(sole.position[0] + h for sole, h in zip(soles, half, strict=True))
+    back = min(sole.position[0] - h for sole, h in zip(soles, half, strict=True))
+    left, right = max(sole.position[1] for sole in soles), min(sole.position[1] for sole in soles)
+    if not (back < com[0] < front and right <= com[1] <= left and com[2] > 0):
+        raise RobotError(
+            f"{description.path}: [home] puts the CoM at x {com[0]:.3f}, y {com[1]:.3f}, z {com[2]:.3f} m, not above the feet "
+            f"(x {back:.3f} to {front:.3f}, y {right:.3f} to {left:.3f}); correct [home] or [limbs]"
+        )
+
+
+def _check_lowest(description: RobotDescription, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Nothing may reach below the soles: what touches the ground is the patch."""
+    mujoco.mj_kinematics(model, data)
+    for geom in range(model.ngeom):
+        if not model.geom_contype[geom] | model.geom_conaffinity[geom]:
+            continue
+        centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+        corners = centre + half * (np.stack(np.meshgrid(*[[-1, 1]] * 3), -1).reshape(-1, 3))
+        points = corners
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+            mesh = model.geom_dataid[geom]
+            first = model.mesh_vertadr[mesh]
+            points = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
+        lowest = float((points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])[:, 2].min())
+        if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_BOX:
+            lowest = max(lowest, float(data.geom_xpos[geom][2] - model.geom_rbound[geom]))
+        if lowest < -MAX_SINK:
+            body = model.body(model.geom_bodyid[geom]).name
+            raise RobotError(
+                f"{description.path}: in the home posture a collision shape of body '{body}' reaches "
+                f"{-1e3 * lowest:.1f} mm below the soles; move the [limbs] poses down, or correct [home] or the model"
+            )

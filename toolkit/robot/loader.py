@@ -1,0 +1,168 @@
+"""Finding robots and loading them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from toolkit.errors import RobotError
+from toolkit.geometry.pose import Pose
+from toolkit.robot.agreement import check_agreement
+from toolkit.robot.assemble import Assembly, assemble
+from toolkit.robot.description import FILE_NAME, RobotDescription, match_joints, read_description, suggestion
+from toolkit.robot.geometry import derive_limbs
+from toolkit.robot.home import home_posture
+from toolkit.robot.model import LimbModel, RobotModel
+from toolkit.robot.source import find_model_file, read_model
+from toolkit.robot.urdf import urdf_from_model
+
+DEFAULT_GAINS = (200.0, 8.0)
+
+
+def robots_folder(robots_dir: Path | None = None) -> Path:
+    """The folder with one folder per robot: given, else `robots/` here, else the one beside the toolkit."""
+    if robots_dir is not None:
+        return Path(robots_dir)
+    here = Path.cwd() / "robots"
+    return here if here.is_dir() else Path(__file__).resolve().parents[2] / "robots"
+
+
+def find_robots(robots_dir: Path | None = None) -> tuple[str, ...]:
+    """Names of all robots, sorted: folders that hold a robot.toml.
+
+    Args:
+        robots_dir: where to look; see `robots_folder`.
+
+    Returns:
+        Folder names.
+    """
+    return tuple(sorted(path.parent.name for path in robots_folder(robots_dir).glob(f"*/{FILE_NAME}")))
+
+
+def robot_folder(name: str, robots_dir: Path | None = None) -> Path:
+    """The folder of a robot.
+
+    Args:
+        name: of a folder in the robots folder, or a path to a folder with a robot.toml.
+        robots_dir: where to look; see `robots_folder`.
+
+    Returns:
+        Existing folder.
+
+    Raises:
+        RobotError: no such robot.
+    """
+    folder = robots_folder(robots_dir)
+    for path in (folder / name, Path(name)):
+        if name and (path / FILE_NAME).is_file():
+            return path.resolve()
+    if name and Path(name).is_dir():
+        raise RobotError(f"{name}: no {FILE_NAME} in this folder")
+    raise RobotError(f"robot '{name}' is not in {folder}; {suggestion(name, find_robots(robots_dir))}")
+
+
+def load_robot(name: str, robots_dir: Path | None = None) -> RobotModel:
+    """Load a robot and prove that MuJoCo, Pinocchio and placo agree about it.
+
+    Args:
+        name: of a folder in the robots folder, or a path to a folder with a robot.toml.
+        robots_dir: where to look; see `robots_folder`.
+
+    Returns:
+        The robot.
+
+    Raises:
+        RobotError: no such robot, or a broken, incomplete or inconsistent description; the message says where.
+    """
+    folder = robot_folder(name, robots_dir)
+    description = read_description(folder / FILE_NAME)
+    assembly = assemble(description, read_model(find_model_file(description)))
+    model, where = assembly.mujoco_model, description.path
+
+    home = home_posture(description, model)
+    joint_names = tuple(model.joint(j).name for j in range(1, model.njnt))
+    gains = match_joints(where, "gains", description.gains, joint_names)
+    kp, kd = np.array([gains.get(joint, DEFAULT_GAINS) for joint in joint_names]).T
+    try:
+        urdf = urdf_from_model(model, folder.name)
+        legs, arms = derive_limbs(model, home, assembly.bodies)
+    except RobotError as error:
+        raise RobotError(f"{where}: {error}") from None
+    data = mujoco.MjData(model)
+    data.qpos[:] = home
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    robot = RobotModel(
+        name=folder.name,
+        folder=folder,
+        mjcf=assembly.mjcf,
+        assets=assembly.assets,
+        mujoco_model=model,
+        urdf=urdf,
+        base=model.body(1).name,
+        joint_names=joint_names,
+        lower=model.jnt_range[1:, 0].copy(),
+        upper=model.jnt_range[1:, 1].copy(),
+        velocity_limit=np.array([assembly.velocity[joint] for joint in joint_names]),
+        torque_limit=model.actuator_forcerange[:, 1].copy(),
+        armature=model.dof_armature[6:].copy(),
+        kp=kp,
+        kd=kd,
+        home=home,
+        mass=float(model.body_subtreemass[1]),
+        com_height=float(data.subtree_com[1, 2]),
+        limbs={
+            limb: LimbModel(limb, limb.label, assembly.bodies[limb], item.patch / 2, item.max_force)
+            for limb, item in description.limbs.items()
+        },
+        legs=legs,
+        arms=arms,
+        fingerprint=fingerprint(description, assembly, home),
+    )
+    check_agreement(robot)
+    return robot
+
+
+def fingerprint(description: RobotDescription, assembly: Assembly, home: np.ndarray) -> str:
+    """Hash of what the dynamics depend on: kinematics, inertia, limits, shapes, contact patches and home.
+
+    Taken over numbers of the compiled model rounded to 1e-6, so that colours, comments and the way in which a
+    release of MuJoCo prints XML do not matter.
+
+    Args:
+        description: the robot.toml.
+        assembly: the compiled robot.
+        home: (7 + n,) qpos.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    model = assembly.mujoco_model
+    joints = [model.joint(j).name for j in range(1, model.njnt)]
+    rotations = [Pose.from_quaternion(np.zeros(3), q).rotation for q in model.body_iquat]
+    inertia = [r @ np.diag(i) @ r.T for r, i in zip(rotations, model.body_inertia, strict=True)]
+    shapes = [model.geom_bodyid, model.geom_type, model.geom_contype, model.geom_conaffinity, model.geom_condim]
+    numbers = [
+        model.body_parentid, model.body_pos[2:], _signless(model.body_quat[2:]), model.body_mass, model.body_ipos, inertia,
+        model.jnt_type, model.jnt_bodyid, model.jnt_pos, model.jnt_axis, model.jnt_range, model.qpos0[7:],
+        model.dof_armature, model.dof_damping, model.dof_frictionloss, model.jnt_stiffness, model.actuator_forcerange,
+        [assembly.velocity[joint] for joint in joints],
+        *shapes, model.geom_size, model.geom_pos, _signless(model.geom_quat), model.geom_friction,
+        model.site_bodyid, model.site_pos, _signless(model.site_quat),
+        *[[*item.patch, min(item.max_force, 1e9)] for item in description.limbs.values()],
+        home,
+    ]  # fmt: skip
+    digest = hashlib.sha256(json.dumps([joints, [int(limb) for limb in description.limbs]]).encode())
+    for array in numbers:
+        rounded = np.round(np.asarray(array, float), 6) + 0.0  # no negative zero
+        digest.update(json.dumps([rounded.shape, rounded.ravel().tolist()]).encode())
+    return digest.hexdigest()
+
+
+def _signless(quaternions: np.ndarray) -> np.ndarray:
+    """Outer products q qᵀ: the same for q and -q."""
+    return quaternions[:, :, None] * quaternions[:, None, :]

@@ -1,0 +1,127 @@
+"""Pinocchio and placo views of a robot, and the one place where states change between their orders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio
+import placo
+
+from toolkit.geometry.pose import rotation_from_quaternion
+from toolkit.robot.model import RobotModel
+
+_WXYZ = [3, 4, 5, 6]
+_XYZW = [4, 5, 6, 3]
+
+
+@dataclass(frozen=True)
+class PinocchioMap:
+    """Conversions between MuJoCo's and Pinocchio's states of one robot.
+
+    MuJoCo: qpos = (position, quaternion wxyz, joints), qvel = (linear velocity in the WORLD, angular velocity in the
+    BODY, joints). Pinocchio: q = (position, quaternion xyzw, joints), v = (linear and angular velocity in the BODY,
+    joints), and joints in another order.
+
+    Attributes:
+        q_index: (n,) int; joint_names[i] stands at q[q_index[i]].
+        v_index: (n,) int; joint_names[i] stands at v[v_index[i]], also in torques and Jacobian columns.
+    """
+
+    q_index: np.ndarray
+    v_index: np.ndarray
+
+    def q_from_qpos(self, qpos: np.ndarray) -> np.ndarray:
+        """Pinocchio configuration (..., 7 + n) of MuJoCo's qpos (..., 7 + n)."""
+        qpos = np.asarray(qpos, float)
+        q = np.empty_like(qpos)
+        q[..., :3], q[..., 3:7] = qpos[..., :3], qpos[..., _XYZW]
+        q[..., self.q_index] = qpos[..., 7:]
+        return q
+
+    def qpos_from_q(self, q: np.ndarray) -> np.ndarray:
+        """MuJoCo's qpos (..., 7 + n) of a Pinocchio configuration (..., 7 + n)."""
+        q = np.asarray(q, float)
+        qpos = np.empty_like(q)
+        qpos[..., :3], qpos[..., _XYZW] = q[..., :3], q[..., 3:7]
+        qpos[..., 7:] = q[..., self.q_index]
+        return qpos
+
+    def v_from_qvel(self, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
+        """Pinocchio velocity (..., 6 + n) of MuJoCo's qvel (..., 6 + n) at qpos (..., 7 + n)."""
+        qvel = np.asarray(qvel, float)
+        v = np.empty_like(qvel)
+        v[..., :3] = np.einsum(
+            "...ji,...j->...i", rotation_from_quaternion(np.asarray(qpos)[..., _WXYZ]), qvel[..., :3]
+        )
+        v[..., 3:6] = qvel[..., 3:6]
+        v[..., self.v_index] = qvel[..., 6:]
+        return v
+
+    def qvel_from_v(self, qpos: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """MuJoCo's qvel (..., 6 + n) of a Pinocchio velocity (..., 6 + n) at qpos (..., 7 + n)."""
+        v = np.asarray(v, float)
+        qvel = np.empty_like(v)
+        qvel[..., :3] = np.einsum(
+            "...ij,...j->...i", rotation_from_quaternion(np.asarray(qpos)[..., _WXYZ]), v[..., :3]
+        )
+        qvel[..., 3:6] = v[..., 3:6]
+        qvel[..., 6:] = v[..., self.v_index]
+        return qvel
+
+    def a_from_qacc(self, qpos: np.ndarray, qvel: np.ndarray, qacc: np.ndarray) -> np.ndarray:
+        """Pinocchio acceleration (..., 6 + n) of MuJoCo's qacc (..., 6 + n).
+
+        d/dt (Rᵀ v) = Rᵀ a - ω × (Rᵀ v), with ω in the body.
+        """
+        a, v = self.v_from_qvel(qpos, qacc), self.v_from_qvel(qpos, qvel)
+        a[..., :3] -= np.cross(v[..., 3:6], v[..., :3])
+        return a
+
+    def qacc_from_a(self, qpos: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """MuJoCo's qacc (..., 6 + n) of a Pinocchio acceleration and velocity (..., 6 + n)."""
+        a, v = np.array(a, float), np.asarray(v, float)
+        a[..., :3] += np.cross(v[..., 3:6], v[..., :3])
+        return self.qvel_from_v(qpos, a)
+
+    def joints_of_v(self, v: np.ndarray) -> np.ndarray:
+        """Joint part (..., n) in `joint_names` order of velocities, accelerations or torques (..., 6 + n)."""
+        return np.asarray(v)[..., self.v_index]
+
+    def matrix_to_mujoco(self, qpos: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+        """A symmetric (6 + n, 6 + n) matrix over Pinocchio velocities, such as the mass matrix, over qvel instead."""
+        basis = np.stack([self.v_from_qvel(qpos, row) for row in np.eye(len(matrix))], axis=1)  # v = basis @ qvel
+        return basis.T @ matrix @ basis
+
+
+def placo_wrapper(robot: RobotModel) -> placo.RobotWrapper:
+    """A fresh placo robot with the robot's armature; `wrapper.model` is its pinocchio.Model.
+
+    Args:
+        robot: loaded robot.
+
+    Returns:
+        A wrapper at its neutral configuration; frames carry the names of bodies and contact sites.
+    """
+    wrapper = placo.RobotWrapper("", placo.Flags.ignore_collisions, robot.urdf)
+    wrapper.model.armature = _armature(robot, pinocchio_map(robot, wrapper.model))
+    return wrapper
+
+
+def pinocchio_model(robot: RobotModel) -> pinocchio.Model:
+    """A Pinocchio model of the robot alone, with its armature (lighter than a placo wrapper)."""
+    model = pinocchio.buildModelFromXML(robot.urdf, pinocchio.JointModelFreeFlyer())
+    model.armature = _armature(robot, pinocchio_map(robot, model))
+    return model
+
+
+def pinocchio_map(robot: RobotModel, model: pinocchio.Model) -> PinocchioMap:
+    """Index maps between `robot.joint_names` and a Pinocchio model's vectors."""
+    joints = [model.joints[model.getJointId(name)] for name in robot.joint_names]
+    return PinocchioMap(np.array([joint.idx_q for joint in joints]), np.array([joint.idx_v for joint in joints]))
+
+
+def _armature(robot: RobotModel, order: PinocchioMap) -> np.ndarray:
+    armature = np.zeros(6 + len(robot.joint_names))
+    armature[order.v_index] = robot.armature
+    return armature

@@ -1,0 +1,181 @@
+"""Reading a robot's model file, MJCF or URDF, into one MjSpec."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+
+from toolkit.errors import RobotError
+from toolkit.robot.description import RobotDescription, suggestion
+
+_MESH_ENDINGS = {".stl", ".obj", ".msh"}
+
+
+@dataclass(frozen=True)
+class ModelSource:
+    """A model file, read but not changed yet.
+
+    Attributes:
+        path: the model file.
+        spec: its content; compiles, with absolute mesh and texture paths.
+        velocity: joint -> rad/s, as far as the file says (URDF only: MuJoCo drops them).
+    """
+
+    path: Path
+    spec: mujoco.MjSpec
+    velocity: dict[str, float]
+
+
+def find_model_file(description: RobotDescription) -> Path:
+    """The model file that a robot.toml names.
+
+    Args:
+        description: the robot.toml.
+
+    Returns:
+        Existing path.
+
+    Raises:
+        RobotError: the file or the package that brings it is missing, or a package has several such files.
+    """
+    where = description.path
+    if description.package is None:
+        path = description.path.parent / description.file
+        if not path.is_file():
+            raise RobotError(f"{where}: model.file '{description.file}' does not exist in {path.parent}")
+        return path
+    try:
+        files = importlib.metadata.files(description.package) or []
+    except importlib.metadata.PackageNotFoundError:
+        package = description.package
+        raise RobotError(f"{where}: package '{package}' is not installed; `pip install {package}`") from None
+    matches = [file for file in files if f"/{file.as_posix()}".endswith("/" + description.file.lstrip("/"))]
+    if len(matches) != 1:
+        models = [file.name for file in files if file.suffix in (".urdf", ".xml")]
+        found = "several files" if matches else "no file"
+        hint = "give more of its path" if matches else suggestion(Path(description.file).name, models[:200])
+        raise RobotError(f"{where}: package '{description.package}' has {found} '{description.file}'; {hint}")
+    return Path(str(matches[0].locate())).resolve()
+
+
+def read_model(path: Path) -> ModelSource:
+    """Read an MJCF or URDF file.
+
+    A URDF keeps its fixed links, loses visual shapes that MuJoCo cannot draw, and gets `package://` paths resolved.
+
+    Args:
+        path: the file.
+
+    Returns:
+        The model.
+
+    Raises:
+        RobotError: not valid XML, neither MJCF nor URDF, a missing mesh, or MuJoCo cannot compile it.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, OSError, UnicodeDecodeError) as error:
+        raise RobotError(f"{path}: not valid XML: {error}") from None
+    if root.tag not in ("mujoco", "robot"):
+        raise RobotError(f"{path}: root element <{root.tag}>; expected <mujoco> (MJCF) or <robot> (URDF)")
+    velocity: dict[str, float] = {}
+    try:
+        if root.tag == "mujoco":
+            spec = mujoco.MjSpec.from_file(str(path))
+        else:
+            velocity = _velocity_limits(path, root)
+            _prepare_urdf(path, root)
+            spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+            spec.compiler.fusestatic = False
+        _absolute_files(spec, path.parent)
+        spec.compile()
+    except ValueError as error:
+        raise RobotError(f"{path}: MuJoCo cannot load it: {' '.join(str(error).split())}") from None
+    return ModelSource(path, spec, velocity)
+
+
+def collect_assets(spec: mujoco.MjSpec) -> dict[str, bytes]:
+    """Make a spec independent of its folder: short unique file names, and the bytes behind them.
+
+    Args:
+        spec: with absolute file paths; its mesh and texture paths are changed.
+
+    Returns:
+        File name -> content.
+    """
+    assets: dict[str, bytes] = {}
+    names: dict[str, str] = {}
+    for item in [*spec.meshes, *spec.textures]:
+        if item.file:
+            if item.file not in names:
+                path = Path(item.file)
+                names[item.file] = path.name if path.name not in assets else f"{len(names)}_{path.name}"
+                assets[names[item.file]] = path.read_bytes()
+            item.file = names[item.file]
+    return assets
+
+
+def _absolute_files(spec: mujoco.MjSpec, folder: Path) -> None:
+    for items, directory in ((spec.meshes, spec.compiler.meshdir), (spec.textures, spec.compiler.texturedir)):
+        for item in items:
+            if item.file:
+                name = Path(item.file).name if spec.strippath else item.file
+                item.file = str((folder / directory / name).resolve())
+    spec.compiler.meshdir = spec.compiler.texturedir = ""
+    spec.strippath = False
+
+
+def _velocity_limits(path: Path, root: ElementTree.Element) -> dict[str, float]:
+    limits = {}
+    for joint in root.iter("joint"):
+        limit = joint.find("limit")
+        text = limit.get("velocity") if limit is not None else None
+        if text is not None and joint.get("name"):
+            try:
+                value = float(text)
+            except ValueError:
+                raise RobotError(f"{path}: joint '{joint.get('name')}' has the velocity limit '{text}'") from None
+            if value > 0:
+                limits[joint.get("name", "")] = value
+    return limits
+
+
+def _prepare_urdf(path: Path, root: ElementTree.Element) -> None:
+    for link in root.iter("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            file = _resolve(path, mesh.get("filename", ""))
+            readable = file is not None and file.suffix.lower() in _MESH_ENDINGS
+            if readable:
+                mesh.set("filename", str(file))
+            elif shape.tag == "visual":
+                link.remove(shape)
+            else:
+                reason = "is missing" if file is None else f"is not one of {', '.join(sorted(_MESH_ENDINGS))}"
+                raise RobotError(
+                    f"{path}: collision mesh '{mesh.get('filename')}' of link '{link.get('name')}' {reason}; "
+                    "add the file or remove the <collision>"
+                )
+    for extension in root.findall("mujoco"):
+        root.remove(extension)
+    extension = ElementTree.SubElement(root, "mujoco")
+    ElementTree.SubElement(
+        extension, "compiler", {"strippath": "false", "fusestatic": "false", "discardvisual": "false"}
+    )
+
+
+def _resolve(path: Path, name: str) -> Path | None:
+    """Existing file behind a URDF file name; `package://` is looked for in the folders above the URDF."""
+    if name.startswith("package://"):
+        package, _, rest = name.removeprefix("package://").partition("/")
+        candidates = [parent / package / rest for parent in path.parents]
+        candidates += [parent / rest for parent in path.parents if parent.name == package]
+    else:
+        candidates = [path.parent / name.removeprefix("file://")]
+    return next((file.resolve() for file in candidates if file.is_file()), None)
