@@ -14,7 +14,8 @@ def random_rotation(rng, angle):
 @pytest.fixture
 def path():
     rng = np.random.default_rng(3)
-    start, end = Pose(random_rotation(rng, 0.4), rng.normal(size=3)), Pose(random_rotation(rng, 0.8), rng.normal(size=3))
+    start = Pose(random_rotation(rng, 0.4), rng.normal(size=3))
+    end = Pose(random_rotation(rng, 0.8), rng.normal(size=3))
     up, aside = np.array([0, 0, 0.1]), np.array([0.05, 0.02, 0])
     moves = (
         Move(up, Window(0.0, 0.4)),

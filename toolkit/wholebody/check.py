@@ -84,7 +84,7 @@ def check(
     position, orientation, tracking = _tracking(robot, paths, motion, times, qpos, config)
     torque, residual = inverse_dynamics(robot, motion, times, qpos)
     limits = _limits(robot, times, qpos, torque, config)
-    hit = first_collision(robot, world, paths, times, qpos, config.collision)
+    hit = first_collision(robot, world, times, qpos, config.collision)
     reasons = tracking + limits + ([hit] if hit else [])
     return CheckReport(position, orientation, torque, residual, not limits, tuple(reasons))
 

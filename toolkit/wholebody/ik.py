@@ -17,7 +17,7 @@ from toolkit.errors import PlanningError
 from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose, rotation_about_z
 from toolkit.robot.model import RobotModel
-from toolkit.robot.placo import PinocchioMap, placo_wrapper
+from toolkit.robot.placo import pinocchio_map, placo_wrapper
 from toolkit.wholebody.knee import knee_range
 from toolkit.wholebody.limb_paths import LimbPaths
 
@@ -29,7 +29,8 @@ class IKConfig:
     Attributes:
         substeps: quadratic programs per sample of the trajectory.
         settle: iterations for the first sample.
-        foot_position, foot_orientation, com, palm_position, palm_normal, palm_twist, base: weights per squared m or rad.
+        foot_position, foot_orientation, com, palm_position, palm_normal, palm_twist, base: weights per squared m or
+            rad.
         posture: weight per squared rad of a tick's deviation from the eased return to the home posture.
         posture_time: s; time constant of that return.
         angular_momentum: weight per squared kg m^2.
@@ -68,7 +69,7 @@ class WholeBodyIK:
         """
         self.robot, self.config, self.tick = robot, config, tick
         self.wrapper = placo_wrapper(robot)
-        self.map = PinocchioMap(robot, self.wrapper)
+        self.order = pinocchio_map(robot, self.wrapper.model)
         self.solver = self.wrapper.make_solver()
         self.solver.dt = tick
         self.home = dict(zip(robot.joint_names, robot.home[7:], strict=True))
@@ -100,9 +101,10 @@ class WholeBodyIK:
             self.feet[foot] = task
         for palm in PALMS:
             if palm in robot.limbs:
-                position = solver.add_position_task(robot.limbs[palm].site, np.zeros(3))
-                normal = solver.add_axisalign_task(robot.limbs[palm].site, np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.0]))
-                twist = solver.add_orientation_task(robot.limbs[palm].site, np.eye(3))
+                site, z = robot.limbs[palm].site, np.array([0.0, 0.0, 1.0])
+                position = solver.add_position_task(site, np.zeros(3))
+                normal = solver.add_axisalign_task(site, z, z)
+                twist = solver.add_orientation_task(site, np.eye(3))
                 self.palms[palm] = (position, normal, twist)
         self.base = solver.add_orientation_task(robot.base, np.eye(3))
         self.base.configure("base", "soft", config.base)
@@ -124,7 +126,8 @@ class WholeBodyIK:
         """
         guess = qpos.copy()
         guess[7:] = np.clip(guess[7:], self.lower, self.upper)
-        self.map.set_qpos(guess)
+        self.wrapper.state.q = self.order.q_from_qpos(guess)
+        self.wrapper.update_kinematics()
         self.solver.enable_velocity_limits(False)
         self._set_targets(0.0, paths, motion)
         self.momentum.configure("momentum", "soft", 0.0)
@@ -137,7 +140,7 @@ class WholeBodyIK:
         self.posture.configure("posture", "soft", self.config.posture)
         self.momentum.configure("momentum", "soft", self.config.angular_momentum)
         self.solver.enable_velocity_limits(True)
-        return self.map.get_qpos()
+        return self.order.qpos_from_q(self.wrapper.state.q)
 
     def advance(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
         """Move on by one tick to a time in s; returns (7 + n,) qpos.
@@ -150,7 +153,7 @@ class WholeBodyIK:
             angle = self.wrapper.get_joint(name)
             self.posture.set_joint(name, angle + self._ease * (home - angle))
         self._solve(time)
-        return self.map.get_qpos()
+        return self.order.qpos_from_q(self.wrapper.state.q)
 
     @property
     def _ease(self) -> float:

@@ -26,7 +26,8 @@ class TrajectorySampler:
         self.step = float(self.times[1] - self.times[0])
         qpos, qvel, step = trajectory.qpos, trajectory.qvel, self.step
         self.rotations = rotation_from_quaternion(qpos[:, 3:7])
-        turns = np.array([rotation_vector(a.T @ b) for a, b in zip(self.rotations[:-1], self.rotations[1:], strict=True)])
+        pairs = zip(self.rotations[:-1], self.rotations[1:], strict=True)
+        turns = np.array([rotation_vector(before.T @ after) for before, after in pairs])
         # The end's body velocity in the coordinates of the start's tangent space, to second order in the turn.
         spin = qvel[:, 3:6]
         spin_end = spin[1:] + 0.5 * np.cross(turns, spin[1:]) + np.cross(turns, np.cross(turns, spin[1:])) / 12.0

@@ -19,6 +19,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.wholebody.profile import Window
 from toolkit.wholebody.swing import PathSample, SwingPath
 from toolkit.wholebody.swing_planner import Collide, SwingConfig, SwingTask, plan_swing
+from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
 
 
@@ -135,11 +136,7 @@ def limb_paths(
     """
     config = config or SwingConfig()
     if collide is None:
-        from toolkit.world.clearance import boxes_collide
-
-        def collide(centers, rotations, half_sizes):
-            return boxes_collide(world, centers, rotations, half_sizes)
-
+        collide = box_collide(world)
     segments: list[tuple[Segment, ...]] = []
     for limb in Limb:
         row = []
@@ -153,6 +150,18 @@ def limb_paths(
                 row.append(Segment(phase.start, phase.end, phase.transition))
         segments.append(tuple(row))
     return LimbPaths(tuple(segments))
+
+
+def box_collide(world: World) -> Collide:
+    """The collision test of the world's geometry."""
+    collider = BoxCollider(world)
+
+    def collide(centers: np.ndarray, rotations: np.ndarray, half_sizes: np.ndarray) -> np.ndarray:
+        poses = np.tile(np.eye(4), (len(centers), 1, 1))
+        poses[:, :3, :3], poses[:, :3, 3] = rotations, centers
+        return collider.collide(poses, half_sizes)
+
+    return collide
 
 
 def _contact(phase: Phase, limb: Limb) -> Contact | None:

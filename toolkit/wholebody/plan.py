@@ -141,9 +141,7 @@ def _trajectory(
     )
 
 
-def _failed(
-    robot: RobotModel, paths: LimbPaths, times: np.ndarray, reason: str, seconds: float
-) -> WholeBodyTrajectory:
+def _failed(robot: RobotModel, paths: LimbPaths, times: np.ndarray, reason: str, seconds: float) -> WholeBodyTrajectory:
     """A trajectory without postures, because the inverse kinematics gave up."""
     pose, velocity, contact = _limb_arrays(paths, times)
     joints = len(robot.joint_names)

@@ -100,7 +100,8 @@ class SwingPath:
         vector = self.rotation_vector
         velocity[3:] = rate / self.duration * vector
         acceleration[3:] = second / self.duration**2 * vector
-        return PathSample(Pose(rotation_exponential(value * vector) @ self.start.rotation, position), velocity, acceleration)
+        rotation = rotation_exponential(value * vector) @ self.start.rotation
+        return PathSample(Pose(rotation, position), velocity, acceleration)
 
 
 def rotation_exponential(vector: np.ndarray) -> np.ndarray:

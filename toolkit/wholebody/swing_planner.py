@@ -207,10 +207,11 @@ def _corners(positions: np.ndarray, rotations: np.ndarray, half_size: np.ndarray
 
 
 def _gaps(moving: np.ndarray, standing: np.ndarray) -> np.ndarray:
-    """(k,) m; the largest separation along any edge normal of convex quadrilaterals, negative where they overlap.
+    """(k,) m; largest separation of convex quadrilaterals along any edge normal, negative where they overlap.
 
     Args:
-        moving: (k, 4, 2). standing: (4, 2).
+        moving: (k, 4, 2) m; corners in order around.
+        standing: (4, 2) m.
     """
     standing = np.broadcast_to(standing, moving.shape)
     gaps = np.full(len(moving), -np.inf)

@@ -1,0 +1,90 @@
+"""Collisions of a whole-body motion with the world and with itself, by MuJoCo on the composed scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from toolkit.robot.model import RobotModel
+from toolkit.world.scene import compose_scene
+from toolkit.world.world import World
+
+
+@dataclass(frozen=True)
+class CollisionConfig:
+    """What counts as a collision.
+
+    Attributes:
+        rate: Hz; at most this many postures per second are looked at.
+        patch_depth: m; a limb's last link may press this deep into the world: it makes the planned contacts.
+        body_depth: m; any other link into the world.
+        self_depth: m; links of the robot into each other.
+    """
+
+    rate: float = 25.0
+    patch_depth: float = 4e-3
+    body_depth: float = 1e-3
+    self_depth: float = 2e-3
+
+
+def first_collision(
+    robot: RobotModel, world: World, times: np.ndarray, qpos: np.ndarray, config: CollisionConfig
+) -> str:
+    """The first collision of a motion in one line, "" if there is none.
+
+    Pairs of links that touch each other in the home posture are left out.
+
+    Args:
+        robot: the robot.
+        world: the world.
+        times: (T,) s, uniform.
+        qpos: (T, 7 + n).
+        config: what counts.
+    """
+    model = compose_scene(robot, world)
+    data = mujoco.MjData(model)
+    static = model.body_weldid[model.geom_bodyid] == 0
+    patch = np.isin(model.geom_bodyid, [model.body(limb.body).id for limb in robot.limbs.values()])
+    resting = _touching_at_home(model, data, static, robot.home)
+    stride = max(int(np.floor(1.0 / (config.rate * (times[1] - times[0])) + 1e-9)), 1)
+    for index in [*range(0, len(times) - 1, stride), len(times) - 1]:
+        data.qpos[:] = qpos[index]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_collision(model, data)
+        if not data.ncon:
+            continue
+        for (first, second), depth in zip(data.contact.geom, -data.contact.dist, strict=True):
+            if static[first] or static[second]:
+                link = second if static[first] else first
+                allowed = config.patch_depth if patch[link] else config.body_depth
+            else:
+                allowed = np.inf if _bodies(model, first, second) in resting else config.self_depth
+            if depth > allowed:
+                return (
+                    f"{_label(model, first)} and {_label(model, second)} collide at {times[index]:.2f} s, "
+                    f"{depth * 1e3:.1f} mm deep (allowed {allowed * 1e3:.1f} mm)"
+                )
+    return ""
+
+
+def _touching_at_home(
+    model: mujoco.MjModel, data: mujoco.MjData, static: np.ndarray, home: np.ndarray
+) -> set[tuple[int, int]]:
+    """Pairs of the robot's bodies that touch in the home posture."""
+    data.qpos[:] = home
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_collision(model, data)
+    return {_bodies(model, a, b) for a, b in data.contact.geom if not static[a] and not static[b]}
+
+
+def _bodies(model: mujoco.MjModel, first: int, second: int) -> tuple[int, int]:
+    low, high = sorted((int(model.geom_bodyid[first]), int(model.geom_bodyid[second])))
+    return low, high
+
+
+def _label(model: mujoco.MjModel, geom: int) -> str:
+    """Name of a geom, or of its body."""
+    name = model.geom(geom).name
+    return name or f"a geom of {model.body(model.geom_bodyid[geom]).name or 'the world'}"
