@@ -182,9 +182,7 @@ class AnaStar:
         self._pushes = 0
         self._forbidden: set[tuple[State, State]] = set()
 
-    def run(
-        self, time_limit: float = math.inf, observer: Callable[[Progress], None] | None = None
-    ) -> AnaStarResult:
+    def run(self, time_limit: float = math.inf, observer: Callable[[Progress], None] | None = None) -> AnaStarResult:
         """Search until nothing can improve, or a limit is reached.
 
         Args:
@@ -237,9 +235,7 @@ class AnaStar:
             return []
         states = [edge.state for edge in edges]
         goals = []
-        for edge, h, is_goal in zip(
-            edges, self._problem.heuristic(states), self._problem.is_goal(states), strict=True
-        ):
+        for edge, h, is_goal in zip(edges, self._problem.heuristic(states), self._problem.is_goal(states), strict=True):
             if is_goal:
                 goals.append(edge)
             else:

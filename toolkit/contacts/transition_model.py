@@ -1,0 +1,107 @@
+"""The discrete set of moves that the search may make (paper, Fig. 2): steps of a foot, reaches of a palm.
+
+Steps are rows (x, y, yaw) of the new left foot in the upright frame of the standing right foot; the right foot's are
+their mirror image. Reaches are unit rays from the left shoulder in the upright frame of the mean feet; the right's are
+their mirror image.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.geometry.limb import Limb
+from toolkit.robot.model import RobotModel
+
+REFERENCE_LEG = 0.80  # m; thigh and shin of the robot that the paper's numbers fit
+_MIRROR_STEP = np.array([1.0, -1.0, -1.0])
+_MIRROR_RAY = np.array([1.0, -1.0, 1.0])
+
+
+def foot_steps(yaws_deg: tuple[float, ...]) -> np.ndarray:
+    """Steps of a left foot: the grid of the paper's figure.
+
+    x from -0.2 m to 0.4 m by 0.1 m; y 0.2, 0.3 and 0.4 m, backwards only 0.2 m; in place (x = 0) and at the longest
+    (x = 0.4 m) only straight. The corner (0.4, 0.4) m, 0.57 m away, is left out, which gives the paper's counts.
+
+    Args:
+        yaws_deg: headings of the other rows in degrees.
+
+    Returns:
+        (n, 3) float; x m, y m, yaw rad.
+    """
+    rows: list[tuple[float, float, float]] = []
+    for x in (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4):
+        for y in (0.2, 0.3, 0.4):
+            if (x < 0.0 and y > 0.2) or (x == 0.4 and y == 0.4):
+                continue
+            rows += [(x, y, yaw) for yaw in ((0.0,) if x in (0.0, 0.4) else yaws_deg)]
+    return np.array(rows) * [1.0, 1.0, np.pi / 180]
+
+
+def steps_38() -> np.ndarray:
+    """(38, 3) float; the steps of the paper's data collection (yaw 0, +-30 deg)."""
+    return foot_steps((0.0, -30.0, 30.0))
+
+
+def steps_60() -> np.ndarray:
+    """(60, 3) float; the steps of the paper's experiments (yaw 0, +-15, +-30 deg)."""
+    return foot_steps((0.0, -15.0, 15.0, -30.0, 30.0))
+
+
+def wide_steps() -> np.ndarray:
+    """(14, 3) float; straight steps of 0.45 m to 0.75 m that are added for wide gaps."""
+    return np.array([(x, y, 0.0) for x in (0.45, 0.50, 0.55, 0.60, 0.65, 0.70, 0.75) for y in (0.2, 0.3)])
+
+
+def palm_rays() -> np.ndarray:
+    """(18, 3) float unit rays from the left shoulder.
+
+    10 to 60 degrees from straight sideways towards the front, each level and 20 degrees up and down.
+    """
+    forward, elevation = np.meshgrid(np.radians([10, 20, 30, 40, 50, 60]), np.radians([0, -20, 20]), indexing="ij")
+    rays = np.stack(
+        [np.cos(elevation) * np.sin(forward), np.cos(elevation) * np.cos(forward), np.sin(elevation)], axis=-1
+    )
+    return rays.reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class TransitionModel:
+    """The moves of every limb of one robot.
+
+    Attributes:
+        steps: (n, 3) float; of the left foot beside the right one: x m, y m, yaw rad.
+        rays: (m, 3) float; of the left palm, unit.
+    """
+
+    steps: np.ndarray
+    rays: np.ndarray
+
+    @classmethod
+    def of(cls, robot: RobotModel, steps: np.ndarray) -> TransitionModel:
+        """Moves for a robot: steps scaled with its legs, wide enough apart for its soles; rays if it has arms.
+
+        The scale is 1 within 10 % of the leg that the paper's numbers fit.
+        """
+        leg = robot.legs[Limb.LEFT_FOOT]
+        scale = (leg.thigh + leg.shin) / REFERENCE_LEG
+        scale = 1.0 if abs(scale - 1.0) < 0.1 else scale
+        scaled = steps * [scale, scale, 1.0]
+        apart = 2.0 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04
+        scaled[:, 1] += max(0.0, apart - scaled[:, 1].min())
+        return cls(scaled, palm_rays() if robot.arms else np.zeros((0, 3)))
+
+    def steps_of(self, limb: Limb) -> np.ndarray:
+        """(n, 3) steps of a foot in the upright frame of the other, which stands."""
+        return self.steps if limb.is_left else self.steps * _MIRROR_STEP
+
+    def rays_of(self, limb: Limb) -> np.ndarray:
+        """(m, 3) rays of a palm in the upright frame of the mean feet."""
+        return self.rays if limb.is_left else self.rays * _MIRROR_RAY
+
+    @property
+    def longest_step(self) -> float:
+        """m; longest distance between the standing and the new foot along x."""
+        return float(self.steps[:, 0].max())
