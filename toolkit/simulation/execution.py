@@ -39,6 +39,7 @@ class Execution:
         tick_seconds: (C,) wall-clock of each control tick.
         simulated_seconds, real_time_factor: of the whole loop.
         checks: every check of the verdict that execution decides.
+        replayable: the controls alone reproduce the run; False where it was pushed.
     """
 
     scene: mujoco.MjModel = field(repr=False)
@@ -78,3 +79,4 @@ class Execution:
     simulated_seconds: float
     real_time_factor: float
     checks: tuple[Check, ...]
+    replayable: bool = True

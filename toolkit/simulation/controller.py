@@ -1,0 +1,187 @@
+"""Controller: joint torques that carry a reference out, by inverse dynamics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.centroidal.problem import Margins
+from toolkit.geometry.limb import Limb
+from toolkit.robot.model import RobotModel
+from toolkit.simulation.config import ExecutionConfig
+from toolkit.simulation.dynamics import RobotDynamics, carries
+from toolkit.simulation.joint_box import JointBox
+from toolkit.simulation.limb_target import LimbTargets
+from toolkit.simulation.qp import FORCE_UNIT, ContactQP
+from toolkit.simulation.reference import Reference
+from toolkit.simulation.touchdown import ContactTracker, LimbState
+
+
+class Controller:
+    """Tracks a reference with an inverse-dynamics QP, once per control tick.
+
+    A tick evaluates the robot's dynamics at the given state, decides which limbs are in contact, and solves for joint
+    accelerations and contact wrenches that follow all tasks best while respecting physics and the robot's limits.
+
+    Attributes:
+        tracker: which limbs are in contact.
+        failures: ticks whose QP was not solved as posed; each was then solved without acceleration boxes and least
+            forces, or, where that failed too (`blind`), held its posture with joint gains.
+        wrench: (4, 6) wanted wrenches in the contact frames at the last tick.
+    """
+
+    def __init__(self, robot: RobotModel, reference: Reference, margins: Margins, config: ExecutionConfig):
+        """Prepare for a run.
+
+        Args:
+            robot: the robot as the controller knows it.
+            reference: the plan at the control ticks.
+            margins: the plan's margins; the controller's lie between them and none.
+            config: settings.
+        """
+        self._robot, self._reference, self._config = robot, reference, config.controller
+        self._period = config.control_period
+        self.dynamics = RobotDynamics(robot)
+        self.limbs = self.dynamics.limbs
+        weight = self.dynamics.mass * float(np.linalg.norm(self.dynamics.gravity))
+        limit = np.zeros(4)
+        for limb, model in robot.limbs.items():
+            limit[limb] = model.max_normal_force
+        self.tracker = ContactTracker(reference, self.limbs, weight, limit, config.controller, config.touchdown)
+        self.targets = LimbTargets(reference, self.tracker, config.touchdown)
+        self._box = JointBox(robot, config.controller)
+        self._torque_limit = config.controller.torque_fraction * robot.torque_limit
+        nesting, half_sizes = config.controller.nesting, robot.half_sizes
+        self._friction_factor = 1.0 + nesting * (margins.friction - 1.0)
+        self._yaw_factor = 1.0 + nesting * (margins.yaw - 1.0)
+        self._half_size = half_sizes - nesting * np.minimum(margins.cop, half_sizes / 2.0)
+        legs = np.zeros(len(robot.joint_names), bool)
+        for limb in self.limbs:
+            if limb.is_foot:
+                legs |= carries(robot, limb)
+        gains, nv = config.controller, self.dynamics.nv
+        self._posture_weight = np.where(legs, gains.leg_posture, 1.0) * gains.posture.weight
+        self._diagonal = np.full(nv + 18, gains.acceleration)
+        self._diagonal[3:6] += gains.base.weight
+        self._diagonal[6:nv] += self._posture_weight
+        self._diagonal[nv:] = gains.force * FORCE_UNIT**2
+        self._target = np.zeros(nv + 18)
+        self._tasks, self._wanted = np.zeros((6 + 24, nv)), np.zeros(6 + 24)
+        self._qps: dict[tuple[Limb, ...], ContactQP] = {}
+        self._error = np.zeros(3)
+        self.failures = self.blind = 0
+        self.wrench = np.zeros((4, 6))
+
+    def tick(self, index: int, qpos: np.ndarray, qvel: np.ndarray, normal_force: np.ndarray) -> np.ndarray:
+        """One control tick.
+
+        Args:
+            index: row of the reference.
+            qpos: (7 + n,) MuJoCo order.
+            qvel: (6 + n,) MuJoCo order.
+            normal_force: (4,) N; measured along the patches' normals.
+
+        Returns:
+            (n,) joint torques in N m within the limits.
+        """
+        self.dynamics.update(qpos, qvel)
+        self.tracker.update(float(self._reference.times[index]), self._period, normal_force)
+        self.targets.update(index, self.dynamics)
+        limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
+        qp = self._qps.get(limbs)
+        if qp is None:
+            qp = self._qps[limbs] = ContactQP(limbs, self.dynamics.nv)
+        self._constrain(qp, index, qpos, qvel)
+        self._pursue(qp, index, qpos, qvel)
+        x = qp.solve()
+        if x is None:
+            self.failures += 1
+            x = qp.solve_relaxed()
+        if x is None:
+            self.blind += 1
+            return self._hold(index, qpos, qvel)
+        self.wrench[:] = 0.0
+        for limb in limbs:
+            self.wrench[limb] = qp.wrench(x, limb)
+        torque = (qp.rows[6 : qp.nv] @ x) + self.dynamics.bias[6:]
+        limit = self._robot.torque_limit
+        return np.clip(torque, -limit, limit)
+
+    def _constrain(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Fill in dynamics, cones and boxes."""
+        dynamics, tracker = self.dynamics, self.tracker
+        friction = self._reference.friction[index]
+        qp.set_dynamics(
+            dynamics.mass_matrix, dynamics.bias, dynamics.jacobian, dynamics.limb_rotation, self._torque_limit
+        )
+        for limb in qp.limbs:
+            qp.set_cone(limb, friction[limb] * self._friction_factor, self._half_size[limb], self._yaw_factor)
+            qp.set_normal_force(limb, tracker.min_force[limb], tracker.max_force[limb])
+        self._box.update(qpos[7:], qvel[6:])
+        qp.set_acceleration(self._box.lower, self._box.upper)
+
+    def _pursue(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Fill in the objective."""
+        reference, dynamics, gains, nv = self._reference, self.dynamics, self._config, self.dynamics.nv
+        tasks, wanted, target = self._tasks, self._wanted, self._target
+        root = gains.com.weight**0.5
+        np.multiply(dynamics.com_jacobian, root, out=tasks[:3])
+        error = gains.com.kp * (reference.com[index] - dynamics.com)
+        error += gains.com.kd * (reference.com_velocity[index] - dynamics.com_velocity)
+        wanted[:3] = root * (error + reference.com_acceleration[index] - dynamics.com_drift)
+        root = gains.angular_momentum.weight**0.5 / gains.angular_momentum_scale
+        np.multiply(dynamics.momentum_jacobian, root, out=tasks[3:6])
+        error = gains.angular_momentum.kp * (reference.angular_momentum[index] - dynamics.angular_momentum)
+        wanted[3:6] = root * (error + reference.angular_momentum_rate[index] - dynamics.momentum_drift)
+        rows = 6
+        for limb in self.limbs:
+            rows = self._pursue_limb(limb, rows)
+        self._orient_base(index, qvel, target)
+        posture = gains.posture
+        target[6:nv] = reference.joint_acceleration[index]
+        target[6:nv] += posture.kp * (reference.joints[index] - qpos[7:])
+        target[6:nv] += posture.kd * (reference.joint_velocity[index] - qvel[6:])
+        target[6:nv] *= self._posture_weight / self._diagonal[6:nv]
+        diagonal = self._diagonal[: qp.size]
+        for limb, slot in qp.slots.items():
+            moments = slice(slot.start + 3, slot.stop)
+            diagonal[slot] = gains.force * FORCE_UNIT**2
+            diagonal[moments] = gains.moment * FORCE_UNIT**2
+            target[slot] = reference.wrench[index, limb, : slot.stop - slot.start] / FORCE_UNIT
+        qp.set_objective(tasks[:rows], wanted[:rows], diagonal, target[: qp.size])
+
+    def _pursue_limb(self, limb: Limb, rows: int) -> int:
+        """Append a limb's task rows after the first `rows`; returns their new number."""
+        gains, dynamics, targets = self._config, self.dynamics, self.targets
+        if self.tracker.in_contact[limb]:
+            linear = gains.stance
+            angular = gains.stance if limb.is_foot else gains.stance_palm_rotation
+        elif self.tracker.state[limb] is LimbState.FREE or targets.authority[limb] <= 0.0:
+            return rows
+        else:
+            linear = angular = gains.swing if limb.is_foot else gains.hand
+        share = 1.0 if self.tracker.in_contact[limb] else targets.authority[limb]
+        for part, task in ((slice(0, 3), linear), (slice(3, 6), angular)):
+            root = (share * task.weight) ** 0.5
+            here = slice(rows, rows + 3)
+            np.multiply(dynamics.jacobian[limb, part], root, out=self._tasks[here])
+            error = task.kd * (targets.velocity[limb, part] - dynamics.limb_velocity[limb, part])
+            error += task.kp * targets.error[limb, part]
+            self._wanted[here] = root * (error + targets.acceleration[limb, part] - dynamics.drift[limb, part])
+            rows += 3
+        return rows
+
+    def _orient_base(self, index: int, qvel: np.ndarray, target: np.ndarray) -> None:
+        """Wanted angular acceleration of the base, in the base."""
+        task, reference = self._config.base, self._reference
+        turn = self.dynamics.base_rotation.T @ reference.base_rotation[index]
+        error = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        acceleration = reference.base_acceleration[index] + task.kp * error
+        acceleration += task.kd * (reference.base_velocity[index] - qvel[3:6])
+        target[3:6] = acceleration * (task.weight / self._diagonal[3:6])
+
+    def _hold(self, index: int, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
+        """Last resort of a tick: gravity and Coriolis forces, and joint gains to the planned posture."""
+        reference, robot = self._reference, self._robot
+        torque = self.dynamics.bias[6:] + robot.kp * (reference.joints[index] - qpos[7:])
+        torque += robot.kd * (reference.joint_velocity[index] - qvel[6:])
+        return np.clip(torque, -robot.torque_limit, robot.torque_limit)

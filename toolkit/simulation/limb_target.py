@@ -1,0 +1,76 @@
+"""LimbTargets: where limbs should be now, given where they really are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.geometry.limb import Limb
+from toolkit.simulation.config import TouchdownConfig
+from toolkit.simulation.dynamics import RobotDynamics
+from toolkit.simulation.reference import Reference
+from toolkit.simulation.touchdown import ContactTracker, LimbState
+
+
+class LimbTargets:
+    """Task errors and feed-forward of the limbs that are not in contact; zeros for those that are.
+
+    A swing starts from where the limb rests, not from where it was planned to rest: that offset fades away during the
+    first part of the swing. A limb that has not met its surface in time goes on along the inward normal.
+
+    Attributes:
+        error: (4, 6) m and rad; from the limb to its target, world frame.
+        velocity, acceleration: (4, 6).
+        authority: (4,) in [0, 1]; how binding the target is (palms blend to and from their free posture).
+        shift: (4, 3) m; displacement of the landing point, and shift_velocity: (4, 3) m/s.
+    """
+
+    fade = 0.7  # fraction of a swing over which the initial offset is lost
+
+    def __init__(self, reference: Reference, tracker: ContactTracker, config: TouchdownConfig):
+        self._reference, self._tracker, self._config = reference, tracker, config
+        self.error, self.velocity, self.acceleration = np.zeros((4, 6)), np.zeros((4, 6)), np.zeros((4, 6))
+        self.authority = np.ones(4)
+        self.shift, self.shift_velocity = np.zeros((4, 3)), np.zeros((4, 3))
+        self._offset = np.zeros((4, 3))
+
+    def update(self, index: int, dynamics: RobotDynamics) -> None:
+        """Evaluate at a row of the reference and the measured limbs."""
+        reference, tracker = self._reference, self._tracker
+        for limb in dynamics.limbs:
+            state = tracker.state[limb]
+            self.error[limb] = self.velocity[limb] = self.acceleration[limb] = 0.0
+            self.authority[limb] = reference.authority[index, limb]
+            if state in (LimbState.REST, LimbState.FREE):
+                continue
+            if tracker.begun[limb]:
+                self._offset[limb] = dynamics.limb_position[limb] - reference.limb_position[index, limb]
+                if not tracker.current[limb].breaks:
+                    self._offset[limb] = 0.0
+                self.shift[limb] = self.shift_velocity[limb] = 0.0
+            target = reference.limb_position[index, limb] + self.shift[limb]
+            self.velocity[limb] = reference.limb_velocity[index, limb]
+            self.velocity[limb, :3] += self.shift_velocity[limb]
+            self.acceleration[limb] = reference.limb_acceleration[index, limb]
+            if state is LimbState.SEARCH:
+                normal = tracker.current[limb].contact.pose.normal
+                target = target - tracker.depth[limb] * normal
+                self.velocity[limb, :3] -= tracker.search_speed(limb) * normal
+            else:
+                target = target + self._remaining(limb, reference.times[index]) * self._offset[limb]
+            self.error[limb, :3] = target - dynamics.limb_position[limb]
+            self.error[limb, 3:] = rotation_error(reference.limb_rotation[index, limb], dynamics.limb_rotation[limb])
+
+    def _remaining(self, limb: Limb, time: float) -> float:
+        """Share of the initial offset that is left."""
+        swing = self._tracker.current[limb]
+        share = min((time - swing.start) / (self.fade * (swing.end - swing.start)), 1.0)
+        return 1.0 - share * share * (3.0 - 2.0 * share)
+
+
+def rotation_error(wanted: np.ndarray, actual: np.ndarray) -> np.ndarray:
+    """Rotation vector (3,) in rad, world frame, that turns `actual` towards `wanted` (exact for small angles).
+
+    The sine of the angle along its axis: monotonic to 90 degrees.
+    """
+    turn = wanted @ actual.T
+    return 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])

@@ -1,0 +1,225 @@
+"""Reference: the plan sampled at every control tick, as plain arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.stance import Contact
+from toolkit.geometry.limb import Limb
+from toolkit.geometry.pose import Pose, rotation_from_quaternion
+from toolkit.wholebody.trajectory import WholeBodyTrajectory
+
+
+class LimbPathSampler(Protocol):
+    """Planned motion of the limbs' patches."""
+
+    def sample(self, limb: Limb, time: float) -> tuple[Pose | None, np.ndarray, np.ndarray, bool]:
+        """World pose (None: hangs free), (6,) velocity and (6,) acceleration of a patch, and whether it rests."""
+        ...
+
+    def authority(self, limb: Limb, time: float) -> float:
+        """How binding that pose is, in [0, 1]."""
+        ...
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A limb's planned move.
+
+    Attributes:
+        limb: which.
+        start, end: s.
+        transition: index in the sequence.
+        contact: what it makes; None where a palm's contact is broken.
+        breaks: whether the limb was in contact before.
+    """
+
+    limb: Limb
+    start: float
+    end: float
+    transition: int
+    contact: Contact | None
+    breaks: bool
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The plan at C times; MuJoCo conventions, world frame unless said otherwise.
+
+    Attributes:
+        times: (C,) s.
+        com, com_velocity, com_acceleration: (C, 3).
+        angular_momentum, angular_momentum_rate: (C, 3) about the CoM.
+        joints, joint_velocity, joint_acceleration: (C, n).
+        base_rotation: (C, 3, 3); base_velocity: (C, 3) rad/s in the base; base_acceleration: (C, 3).
+        limb_position: (C, 4, 3); limb_rotation: (C, 4, 3, 3); limb_velocity, limb_acceleration: (C, 4, 6).
+        authority: (C, 4) in [0, 1]; how binding a limb's pose is (0: it hangs free).
+        in_contact: (C, 4) bool; as planned.
+        friction: (C, 4); of the contact that holds or that the limb moves to; 1 where there is none.
+        wrench: (C, 4, 6); planned force and moment about the patch's centre, in the contact frame.
+        swings: in order of time.
+        duration: s; of the plan, without the rest added to it.
+    """
+
+    times: np.ndarray
+    com: np.ndarray
+    com_velocity: np.ndarray
+    com_acceleration: np.ndarray
+    angular_momentum: np.ndarray
+    angular_momentum_rate: np.ndarray
+    joints: np.ndarray
+    joint_velocity: np.ndarray
+    joint_acceleration: np.ndarray
+    base_rotation: np.ndarray
+    base_velocity: np.ndarray
+    base_acceleration: np.ndarray
+    limb_position: np.ndarray
+    limb_rotation: np.ndarray
+    limb_velocity: np.ndarray
+    limb_acceleration: np.ndarray
+    authority: np.ndarray
+    in_contact: np.ndarray
+    friction: np.ndarray
+    wrench: np.ndarray
+    swings: tuple[Swing, ...]
+    duration: float
+
+    @property
+    def momentum(self) -> np.ndarray:
+        """(C, 6) linear momentum per kg, then angular momentum about the CoM."""
+        return np.hstack([self.com_velocity, self.angular_momentum])
+
+
+def sample_reference(
+    times: np.ndarray,
+    sequence: ContactSequence,
+    schedule: ContactSchedule,
+    motion: CentroidalMotion,
+    trajectory: WholeBodyTrajectory,
+    paths: LimbPathSampler,
+    limbs: tuple[Limb, ...],
+) -> Reference:
+    """Sample a plan.
+
+    Args:
+        times: (C,) s, increasing; beyond the plan's end it rests.
+        sequence: contacts.
+        schedule: when they hold.
+        motion: CoM, angular momentum and wrenches.
+        trajectory: joints and base.
+        paths: limbs.
+        limbs: those the robot has.
+
+    Returns:
+        The plan at `times`.
+    """
+    moving = times < motion.problem.times[-1]
+    com = np.array([np.stack(motion.sample(float(time))) for time in times])
+    com[~moving, 1:] = 0.0
+    knots, problem = motion.problem.times, motion.problem
+    interval = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, problem.steps - 1)
+    momentum = np.column_stack([np.interp(times, knots, motion.angular_momentum[:, k]) for k in range(3)])
+    rate = (np.diff(motion.angular_momentum, axis=0) / problem.dt[:, None])[interval] * moving[:, None]
+    joints, base_rotation, qvel, qacc = _posture(times, trajectory)
+    position, rotation = np.zeros((len(times), 4, 3)), np.tile(np.eye(3), (len(times), 4, 1, 1))
+    velocity, acceleration = np.zeros((2, len(times), 4, 6))
+    authority, in_contact = np.zeros((len(times), 4)), np.zeros((len(times), 4), bool)
+    for limb in limbs:
+        for k, time in enumerate(times):
+            pose, *rates, in_contact[k, limb] = paths.sample(limb, float(time))
+            if pose is not None:
+                position[k, limb], rotation[k, limb] = pose.position, pose.rotation
+                velocity[k, limb], acceleration[k, limb] = rates
+                authority[k, limb] = paths.authority(limb, float(time))
+    swings = swings_of(sequence, schedule)
+    return Reference(
+        times=times,
+        com=com[:, 0],
+        com_velocity=com[:, 1],
+        com_acceleration=com[:, 2],
+        angular_momentum=momentum,
+        angular_momentum_rate=rate,
+        joints=joints,
+        joint_velocity=qvel[:, 6:],
+        joint_acceleration=qacc[:, 6:],
+        base_rotation=base_rotation,
+        base_velocity=qvel[:, 3:6],
+        base_acceleration=qacc[:, 3:6],
+        limb_position=position,
+        limb_rotation=rotation,
+        limb_velocity=velocity,
+        limb_acceleration=acceleration,
+        authority=authority,
+        in_contact=in_contact,
+        friction=_friction(times, sequence, swings),
+        wrench=planned_wrench(motion)[interval],
+        swings=swings,
+        duration=schedule.duration,
+    )
+
+
+def swings_of(sequence: ContactSequence, schedule: ContactSchedule) -> tuple[Swing, ...]:
+    """The planned moves, in order of time."""
+    stances = sequence.stances
+    return tuple(
+        Swing(
+            limb=phase.swing,
+            start=phase.start,
+            end=phase.end,
+            transition=phase.transition,
+            contact=sequence.transitions[phase.transition].contact,
+            breaks=phase.swing in stances[phase.transition],
+        )
+        for phase in schedule.phases
+        if phase.swing is not None
+    )
+
+
+def planned_wrench(motion: CentroidalMotion) -> np.ndarray:
+    """Planned wrenches in the contact frames.
+
+    Returns:
+        (N, 4, 6); force, and moment about the patch's centre: CoP times force plus the yaw torque.
+    """
+    force = np.einsum("nlji,nlj->nli", motion.problem.rotation, motion.force)
+    lever = np.concatenate([motion.cop, np.zeros_like(motion.cop[..., :1])], axis=-1)
+    moment = np.cross(lever, force)
+    moment[..., 2] += motion.yaw_torque
+    return np.where(motion.problem.active[..., None], np.concatenate([force, moment], axis=-1), 0.0)
+
+
+def _posture(times: np.ndarray, trajectory: WholeBodyTrajectory) -> tuple[np.ndarray, ...]:
+    """Joints (C, n), base rotation (C, 3, 3), qvel (C, nv) and its derivative, at rest beyond the ends."""
+    grid = trajectory.times
+    clamped = np.clip(times, grid[0], grid[-1])
+    cell = np.clip(np.searchsorted(grid, clamped, side="right") - 1, 0, len(grid) - 2) if len(grid) > 1 else 0 * clamped
+    if len(grid) == 1:
+        qpos, qvel = np.repeat(trajectory.qpos, len(times), 0), np.zeros((len(times), trajectory.qvel.shape[1]))
+        return qpos[:, 7:], rotation_from_quaternion(qpos[:, 3:7]), qvel, np.zeros_like(qvel)
+    share = ((clamped - grid[cell]) / (grid[cell + 1] - grid[cell]))[:, None]
+    first, second = trajectory.qpos[cell], trajectory.qpos[cell + 1]
+    # Neighbouring samples are a few degrees apart at most: normalised interpolation is as good as slerp.
+    sign = np.where((first[:, 3:7] * second[:, 3:7]).sum(1, keepdims=True) < 0.0, -1.0, 1.0)
+    quaternion = (1.0 - share) * first[:, 3:7] + share * sign * second[:, 3:7]
+    joints = (1.0 - share) * first[:, 7:] + share * second[:, 7:]
+    qvel = (1.0 - share) * trajectory.qvel[cell] + share * trajectory.qvel[cell + 1]
+    qacc = (trajectory.qvel[cell + 1] - trajectory.qvel[cell]) / (grid[cell + 1] - grid[cell])[:, None]
+    rest = (times > grid[-1])[:, None]
+    return joints, rotation_from_quaternion(quaternion), np.where(rest, 0.0, qvel), np.where(rest, 0.0, qacc)
+
+
+def _friction(times: np.ndarray, sequence: ContactSequence, swings: tuple[Swing, ...]) -> np.ndarray:
+    """(C, 4) coefficient of the contact that each limb has or moves to."""
+    friction = np.ones((len(times), 4))
+    for contact in sequence.start.contacts:
+        friction[:, contact.limb] = contact.friction
+    for swing in swings:
+        if swing.contact is not None:
+            friction[times >= swing.start, swing.limb] = swing.contact.friction
+    return friction

@@ -1,0 +1,66 @@
+"""Replay a saved run in plain MuJoCo."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from toolkit.errors import InputError
+
+_NAMES = ("timestep", "qpos0", "qvel0", "ctrl", "qpos")
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A replayed run.
+
+    Attributes:
+        qpos: (nq,) after the last step.
+        difference: largest absolute difference to the recorded final state; 0 where the controls tell the whole story.
+    """
+
+    qpos: np.ndarray
+    difference: float
+
+
+def replay(scene_path: Path | str, execution_path: Path | str) -> Replay:
+    """Replay a saved run: nothing acts but its controls.
+
+    Args:
+        scene_path: scene.mjb.
+        execution_path: execution.npz with `timestep`, `qpos0`, `qvel0`, `ctrl` and `qpos` (its last row counts).
+
+    Raises:
+        InputError: a file is missing or is not what its name says.
+    """
+    for path in (scene_path, execution_path):
+        if not Path(path).is_file():
+            raise InputError(f"{path}: no such file; name the scene.mjb and execution.npz of a run")
+    try:
+        scene = mujoco.MjModel.from_binary_path(str(scene_path))
+    except (ValueError, mujoco.FatalError) as error:
+        raise InputError(f"{scene_path}: not a compiled MuJoCo model of this version ({error})") from error
+    with np.load(execution_path) as run:
+        missing = [name for name in _NAMES if name not in run]
+        if missing:
+            raise InputError(f"{execution_path}: lacks {', '.join(missing)}; it is not the record of a run")
+        timestep, qpos0, qvel0, ctrl, qpos = (run[name] for name in _NAMES)
+    if ctrl.ndim != 2 or ctrl.shape[1] != scene.nu or qpos0.shape != (scene.nq,):
+        raise InputError(f"{execution_path}: does not belong to {scene_path}; take both from the same run")
+    if scene.opt.timestep != float(timestep):
+        raise InputError(f"{scene_path}: steps of {scene.opt.timestep} s where the run made {float(timestep)} s")
+    final = replay_controls(scene, qpos0, qvel0, ctrl)
+    return Replay(final, float(np.abs(final - qpos[-1]).max()))
+
+
+def replay_controls(scene: mujoco.MjModel, qpos0: np.ndarray, qvel0: np.ndarray, ctrl: np.ndarray) -> np.ndarray:
+    """Final qpos (nq,) after one mj_step per row of (S, nu) controls from an initial state."""
+    data = mujoco.MjData(scene)
+    data.qpos[:], data.qvel[:] = qpos0, qvel0
+    for row in ctrl:
+        data.ctrl[:] = row
+        mujoco.mj_step(scene, data)
+    return data.qpos.copy()
