@@ -19,7 +19,10 @@ ROBOT = """
     <geom friction="1.2" contype="2" conaffinity="4" priority="3"/>
     <default class="tile"><geom rgba="0 1 0 1"/></default>
   </default>
-  <asset><material name="checker" rgba="1 0 1 1"/><texture name="sky" type="2d" builtin="flat" width="4" height="4"/></asset>
+  <asset>
+    <material name="checker" rgba="1 0 1 1"/>
+    <texture name="sky" type="2d" builtin="flat" width="4" height="4"/>
+  </asset>
   <worldbody>
     <body name="floor" pos="0 0 0.5">
       <freejoint name="root_joint"/>

@@ -24,7 +24,8 @@ class Solids:
         edges: (k, 2) int; pairs of vertices. All of a solid's convex edges are among them.
         edge_solid: (k,) int; solid of each edge, ascending.
         point_solid: (n,) int; solid of each vertex, ascending.
-        triangles: (t, 3) int; the solids' faces as triangles of vertices, counterclockwise from outside.
+        triangles: (t, 3) int; their faces as triangles of vertices, counterclockwise from outside. Of half spaces and
+            height fields the upper side only.
     """
 
     points: np.ndarray
@@ -151,7 +152,8 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
     types = mujoco.mjtGeom
     if kind == types.mjGEOM_PLANE:
         rectangle = plane_rectangle(model, index, pose, square)
-        return [_hull(_extruded(rectangle, -_DEEP, 0.0))]
+        points, faces, edges = _hull(_extruded(rectangle, -_DEEP, 0.0))
+        return [(points, faces[(points[faces][..., 2] == 0.0).all(axis=1)], edges)]
     if kind == types.mjGEOM_BOX:
         return [_hull(_extruded(size[:2] * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]), -size[2], size[2]))]
     if kind == types.mjGEOM_CYLINDER:
@@ -186,7 +188,7 @@ def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 _PRISM_EDGES = np.array([[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]])
-_PRISM_FACES = np.array([[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]])
+_PRISM_TOP = np.array([[3, 4, 5]])
 
 
 def _height_field_prisms(model: mujoco.MjModel, field: int):
@@ -195,7 +197,7 @@ def _height_field_prisms(model: mujoco.MjModel, field: int):
     base = -model.hfield_size[field, 3]
     prisms = []
     for corners in points[triangles]:
-        prisms.append((np.concatenate([corners * [1, 1, 0] + [0, 0, base], corners]), _PRISM_FACES, _PRISM_EDGES))
+        prisms.append((np.concatenate([corners * [1, 1, 0] + [0, 0, base], corners]), _PRISM_TOP, _PRISM_EDGES))
     return prisms
 
 

@@ -1,0 +1,193 @@
+"""Where the world leaves room: heights, triangles, and boxes against it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from toolkit.world.solids import solids_of
+from toolkit.world.world import World
+
+_FAR = (0.0, 0.0, 1e4)  # m; where unused boxes wait
+
+
+@dataclass(frozen=True)
+class HeightMap:
+    """Height of the ground on a grid.
+
+    Attributes:
+        origin: (2,) float, m; world xy of the centre of cell (0, 0).
+        resolution: m; edge of a cell.
+        height: (nx, ny) float, m; world z of the highest point at each cell's centre, -inf where there is nothing.
+    """
+
+    origin: np.ndarray
+    resolution: float
+    height: np.ndarray
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Heights (...,) of the cells that points (..., 2) lie in; -inf outside."""
+        cell = np.rint((np.asarray(points, float) - self.origin) / self.resolution).astype(int)
+        inside = ((cell >= 0) & (cell < self.height.shape)).all(axis=-1)
+        cell = np.where(inside[..., None], cell, 0)
+        return np.where(inside, self.height[cell[..., 0], cell[..., 1]], -np.inf)
+
+
+def collision_triangles(world: World) -> np.ndarray:
+    """Triangles of everything that collides.
+
+    Args:
+        world: the world; infinite planes are cut to `world.square`.
+
+    Returns:
+        (n, 3, 3) float, m; corners in the world frame, counterclockwise seen from outside.
+    """
+    return solids_of(world.mujoco_model, square=world.square).corners
+
+
+def height_map(world: World, resolution: float, *, below: float = np.inf) -> HeightMap:
+    """Height of the highest geometry over a grid on `world.square`.
+
+    Args:
+        world: the world.
+        resolution: m; edge of a cell. Only cell centres are looked at: what is thinner may be missed.
+        below: m; what lies above this height is not seen (a ceiling).
+
+    Returns:
+        The grid.
+    """
+    x0, y0, x1, y1 = world.square
+    count = np.maximum(np.ceil(np.array([x1 - x0, y1 - y0]) / resolution - 1e-9).astype(int), 1)
+    origin = np.array([x0, y0]) + resolution / 2
+    height = np.full(count, -np.inf)
+    for corners in collision_triangles(world):
+        first = np.clip(np.ceil((corners[:, :2].min(axis=0) - origin) / resolution - 1e-6).astype(int), 0, count)
+        last = np.clip(np.floor((corners[:, :2].max(axis=0) - origin) / resolution + 1e-6).astype(int) + 1, 0, count)
+        if (last <= first).any():
+            continue
+        first_edge, second_edge = corners[1] - corners[0], corners[2] - corners[0]
+        area = first_edge[0] * second_edge[1] - first_edge[1] * second_edge[0]
+        if abs(area) < 1e-12:  # upright
+            continue
+        x = (origin[0] + resolution * np.arange(first[0], last[0]) - corners[0, 0])[:, None]
+        y = (origin[1] + resolution * np.arange(first[1], last[1]) - corners[0, 1])[None]
+        u = (x * second_edge[1] - y * second_edge[0]) / area
+        v = (y * first_edge[0] - x * first_edge[1]) / area
+        z = corners[0, 2] + u * first_edge[2] + v * second_edge[2]
+        slack = 1e-9
+        hit = (u >= -slack) & (v >= -slack) & (u + v <= 1 + slack) & (z <= below)
+        block = height[first[0] : last[0], first[1] : last[1]]
+        np.maximum(block, np.where(hit, z, -np.inf), out=block)
+    return HeightMap(origin, resolution, height)
+
+
+class BoxCollider:
+    """Tests oriented boxes against a world with MuJoCo's own collision detection.
+
+    Holds a model of the world's colliding geoms and a batch of free boxes that see the world but not each other. A box
+    deep inside a mesh that is not convex, or below a height field's base, touches nothing and counts as free.
+    """
+
+    def __init__(self, world: World, *, batch: int = 32):
+        """Build the model.
+
+        Args:
+            world: the world.
+            batch: boxes tested in one go.
+        """
+        self._batch = batch
+        self._model = _box_model(world.mujoco_model, batch)
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_kinematics(self._model, self._data)
+        self._first = self._model.ngeom - batch
+
+    def collide(self, poses: np.ndarray, half_sizes: np.ndarray) -> np.ndarray:
+        """Whether boxes penetrate the world.
+
+        Args:
+            poses: (n, 4, 4) float; world_from_box matrices, origin at the centre of the box, m.
+            half_sizes: (3,) or (n, 3) float, m; half extents along the axes of the box.
+
+        Returns:
+            (n,) bool.
+        """
+        model, data = self._model, self._data
+        poses = np.asarray(poses, float)
+        half_sizes = np.broadcast_to(np.asarray(half_sizes, float), (len(poses), 3))
+        result = np.zeros(len(poses), bool)
+        boxes = slice(self._first, model.ngeom)
+        for begin in range(0, len(poses), self._batch):
+            pose, size = poses[begin : begin + self._batch], half_sizes[begin : begin + self._batch]
+            count = len(pose)
+            model.geom_size[boxes] = 1e-4
+            model.geom_size[self._first : self._first + count] = size
+            model.geom_rbound[boxes] = np.linalg.norm(model.geom_size[boxes], axis=1)
+            model.geom_aabb[boxes, 3:] = model.geom_size[boxes]
+            data.geom_xpos[boxes] = _FAR
+            data.geom_xpos[self._first : self._first + count] = pose[:, :3, 3]
+            data.geom_xmat[self._first : self._first + count] = pose[:, :3, :3].reshape(-1, 9)
+            # Kinematics is skipped: the boxes' frames are written where it would put them.
+            bodies = model.geom_bodyid[boxes]
+            data.xpos[bodies] = data.xipos[bodies] = data.geom_xpos[boxes]
+            data.xmat[bodies] = data.ximat[bodies] = data.geom_xmat[boxes]
+            model.bvh_aabb[model.body_bvhadr[bodies], 3:] = model.geom_size[boxes]
+            mujoco.mj_collision(model, data)
+            if data.ncon:
+                touching = data.contact.geom.max(axis=1) - self._first  # the boxes are the last geoms
+                result[begin + touching[data.contact.dist < 0]] = True
+        return result
+
+
+def boxes_collide(world: World, poses: np.ndarray, half_sizes: np.ndarray) -> np.ndarray:
+    """Whether oriented boxes penetrate the world; for repeated questions keep a `BoxCollider`.
+
+    Args:
+        world: the world.
+        poses: (n, 4, 4) float; world_from_box matrices, m.
+        half_sizes: (3,) or (n, 3) float, m.
+
+    Returns:
+        (n,) bool.
+    """
+    return BoxCollider(world).collide(poses, half_sizes)
+
+
+def _box_model(world: mujoco.MjModel, batch: int) -> mujoco.MjModel:
+    """The colliding geoms of a world, all in the world body, followed by `batch` boxes that see only them."""
+    data = mujoco.MjData(world)
+    mujoco.mj_kinematics(world, data)
+    spec = mujoco.MjSpec()
+    for index in np.flatnonzero((world.geom_contype | world.geom_conaffinity) != 0).tolist():
+        geom = spec.worldbody.add_geom(type=mujoco.mjtGeom(int(world.geom_type[index])), contype=1, conaffinity=0)
+        geom.pos = data.geom_xpos[index]
+        geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+        quat = np.empty(4)
+        mujoco.mju_mat2Quat(quat, data.geom_xmat[index])
+        geom.quat = quat
+        source = int(world.geom_dataid[index])
+        if world.geom_type[index] == mujoco.mjtGeom.mjGEOM_MESH:
+            first, count = int(world.mesh_vertadr[source]), int(world.mesh_vertnum[source])
+            if spec.mesh(f"mesh{source}") is None:
+                spec.add_mesh(name=f"mesh{source}", uservert=world.mesh_vert[first : first + count].ravel())
+            geom.meshname = f"mesh{source}"
+        elif world.geom_type[index] == mujoco.mjtGeom.mjGEOM_HFIELD:
+            rows, columns = int(world.hfield_nrow[source]), int(world.hfield_ncol[source])
+            first = int(world.hfield_adr[source])
+            if spec.hfield(f"field{source}") is None:
+                spec.add_hfield(
+                    name=f"field{source}",
+                    nrow=rows,
+                    ncol=columns,
+                    size=world.hfield_size[source],
+                    userdata=world.hfield_data[first : first + rows * columns],
+                )
+            geom.hfieldname = f"field{source}"
+        else:
+            geom.size = world.geom_size[index]
+    for _ in range(batch):
+        body = spec.worldbody.add_body()
+        body.add_freejoint()
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1], contype=2, conaffinity=1)
+    return spec.compile()
