@@ -53,7 +53,7 @@ def blueprint(start: np.ndarray, goal: np.ndarray, *, executed: bool, searched: 
         rrb.Tabs(*tabs, active_tab=0), rrb.TextDocumentView(origin="summary", name="Verdict"), row_shares=[3, 2]
     )
     return rrb.Blueprint(
-        rrb.Horizontal(rrb.Vertical(scene, lanes, row_shares=[5, 1]), right, column_shares=[3, 2]),
+        rrb.Horizontal(rrb.Vertical(scene, lanes, row_shares=[7, 2]), right, column_shares=[3, 2]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
@@ -73,6 +73,6 @@ def _eye(start: np.ndarray, goal: np.ndarray) -> rrb.EyeControls3D:
     ahead = way / length if length > 0.1 else np.array([1.0, 0.0])
     side = np.array([ahead[1], -ahead[0]])
     middle = np.array([*(start[:2] + goal[:2]) / 2, (start[2] + goal[2]) / 2 + 0.7])
-    distance = 2.6 + 0.75 * length
-    position = middle + distance * np.array([*(0.8 * side + 0.45 * ahead), 0.45])
+    distance = 2.3 + 0.75 * length
+    position = middle + distance * np.array([*(0.8 * side + 0.45 * ahead), 0.38])
     return rrb.EyeControls3D(position=position, look_target=middle, eye_up=(0.0, 0.0, 1.0))

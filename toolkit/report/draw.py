@@ -25,12 +25,14 @@ LIMB_COLORS: dict[Limb, Color] = {
     Limb.RIGHT_PALM: (214, 74, 206),
 }
 FOOT_SURFACE: Color = (70, 150, 230)
-PALM_SURFACE: Color = (232, 164, 58)
+PALM_SURFACE: Color = (206, 158, 96)
 OTHER_SURFACE: Color = (130, 130, 130)
 GOAL: Color = (250, 204, 60)
-PREDICTED: Color = (250, 160, 60)
-OPTIMISED: Color = (110, 168, 254)
-EXECUTED: Color = (245, 245, 245)
+PREDICTED: Color = (164, 92, 232)
+OPTIMISED: Color = (48, 122, 246)
+EXECUTED: Color = (255, 136, 0)
+
+SCENE_SHADE = 0.8  # darkens the scene a little, so that what is drawn on a bright floor stands out
 
 SURFACE_OFFSET = 0.002  # m along the normal, so that a surface does not flicker with the geom it lies on
 
@@ -61,7 +63,8 @@ def draw_scene(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "w
         mesh = mesh_of_geom(model, geom, plane_extent=extent)
         pose = Pose(data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom])
         entity = [*path.split("/"), name_of(model, mujoco.mjtObj.mjOBJ_GEOM, geom)]
-        stream.log(entity, mesh_archetype(_moved(mesh, pose), geom_rgba(model, geom)), static=True)
+        shade = geom_rgba(model, geom) * [SCENE_SHADE, SCENE_SHADE, SCENE_SHADE, 1.0]
+        stream.log(entity, mesh_archetype(_moved(mesh, pose), shade), static=True)
 
 
 def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "world/robot") -> dict[int, list[str]]:
@@ -113,7 +116,7 @@ def draw_surfaces(stream: rr.RecordingStream, surfaces: Iterable[Surface], path:
         stream.log(f"{path}/{name}/outline", outline, static=True)
         fill = _fill([_on_surface(surface, piece) for surface in group for piece in surface.pieces])
         if len(fill.triangles):
-            rgba = np.array([*color, 70]) / 255
+            rgba = np.array([*color, 50]) / 255
             stream.log(f"{path}/{name}/fill", mesh_archetype(fill, rgba), static=True)
 
 

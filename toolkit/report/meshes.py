@@ -39,10 +39,18 @@ def static_bodies(model: mujoco.MjModel) -> np.ndarray:
 
 
 def geom_rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """(4,) float in 0..1; the geom's own colour, or its material's where it has one and kept the default colour."""
+    """(4,) float in 0..1: the geom's colour, or its material's times its texture's mean where it kept the default."""
     material = model.geom_matid[geom]
-    default = np.allclose(model.geom_rgba[geom], [0.5, 0.5, 0.5, 1.0])
-    return np.array(model.mat_rgba[material] if material >= 0 and default else model.geom_rgba[geom], float)
+    if material < 0 or not np.allclose(model.geom_rgba[geom], [0.5, 0.5, 0.5, 1.0]):
+        return np.array(model.geom_rgba[geom], float)
+    rgba = np.array(model.mat_rgba[material], float)
+    texture = model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB]
+    if texture >= 0:
+        channels, first = int(model.tex_nchannel[texture]), int(model.tex_adr[texture])
+        count = int(model.tex_height[texture]) * int(model.tex_width[texture]) * channels
+        mean = model.tex_data[first : first + count].reshape(-1, channels).mean(0) / 255
+        rgba[:3] *= mean[:3] if channels >= 3 else mean[0]
+    return rgba
 
 
 def name_of(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:

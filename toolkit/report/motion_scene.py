@@ -102,7 +102,7 @@ def draw_centres(
             draw_com(stream, "predicted", PREDICTED, predicted, None)
         stances = rr.Points3D(predicted, radii=0.012, colors=PREDICTED)
         stream.log("world/com/predicted/stances", stances, static=True)
-    if motion is not None and np.isfinite(motion.com).all():
+    if motion is not None and motion.feasible:
         times = np.arange(0.0, motion.problem.times[-1] + 1 / rate, 1 / rate)
         draw_com(stream, "optimised", OPTIMISED, np.array([motion.sample(time)[0] for time in times]), times)
     if execution is not None and len(execution.tick_times):

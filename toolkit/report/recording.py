@@ -105,7 +105,7 @@ def write_recording(
                 stream.set_time(TIMELINE, duration=float(execution.tick_times[-1]))
                 stream.log("events", rr.TextLog(execution.fall_reason, level=rr.TextLogLevel.ERROR))
             stream.reset_time()
-        elif motion is not None and np.isfinite(motion.linear_momentum).all():
+        elif motion is not None and motion.feasible:
             plot_motion(stream, motion)
         send_contact_states(stream, schedule, execution)
         if search is not None:

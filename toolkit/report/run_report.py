@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.centroidal.residual import check, cop_margin, friction_margin
 from toolkit.errors import InputError
@@ -254,14 +252,13 @@ def _dynamics(motion: CentroidalMotion | None) -> dict[str, Any]:
     """Figures of the centroidal motion; residual and margins recomputed in NumPy, not the solver's."""
     if motion is None:
         return _figures(DYNAMICS, None)
-    defined = all(np.isfinite(array).all() and array.size for array in (motion.com, motion.force, motion.cop))
     return {
         "feasible": motion.feasible,
         "seconds": motion.seconds,
-        "objective": motion.objective,
+        "objective": motion.objective if motion.feasible else None,
         "max_residual": check(motion).largest,
-        "min_friction_margin": friction_margin(motion) if defined else None,
-        "min_cop_margin": cop_margin(motion) if defined else None,
+        "min_friction_margin": friction_margin(motion) if motion.feasible else None,
+        "min_cop_margin": cop_margin(motion) if motion.feasible else None,
         "status": motion.status,
     }
 

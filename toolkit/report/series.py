@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -53,12 +54,13 @@ def plot(
     names: str | Sequence[str],
     colors: Color | Sequence[Color],
     width: float = 1.5,
+    **style: Any,
 ) -> None:
-    """Send curves (n,) or (n, k) over (n,) s; a sample that is NaN leaves a gap."""
+    """Send curves (n,) or (n, k) over (n,) s; a sample that is NaN leaves a gap; `style` goes to `SeriesLines`."""
     values = np.asarray(values, float).reshape(len(times), -1)
     columns = values.shape[1]
-    style = rr.SeriesLines(names=names, colors=colors, widths=[width] * columns)
-    stream.log(entity, style, static=True)
+    lines = rr.SeriesLines(names=names, colors=colors, widths=[width] * columns, **style)
+    stream.log(entity, lines, static=True)
     scalars = rr.Scalars.columns(scalars=values.ravel())
     stream.send_columns(entity, at(times), scalars.partition([columns] * len(times)))
 
@@ -101,7 +103,8 @@ def plot_execution(stream: rr.RecordingStream, execution: Execution, trajectory:
     plot(stream, "series/torque_ratio/limit", times[[0, -1]], np.ones(2), "limit", (228, 62, 62), 1.0)
     if execution.slip:
         edges, values = slip_steps(execution)
-        plot(stream, "series/slip", edges, 1e3 * values, "slip of the stance", EXECUTED)
+        style = {"interpolation_mode": rr.components.InterpolationMode.StepAfter}
+        plot(stream, "series/slip", edges, 1e3 * values, "slip of the stance", EXECUTED, **style)
 
 
 def plot_motion(stream: rr.RecordingStream, motion: CentroidalMotion) -> None:
@@ -123,12 +126,12 @@ def limb_errors(execution: Execution, trajectory: WholeBodyTrajectory) -> dict[L
 
 
 def slip_steps(execution: Execution) -> tuple[np.ndarray, np.ndarray]:
-    """Slip of each stance as a staircase: times (2k,) s of its ends, values (2k,) m."""
+    """Slip of each stance: (k + 1,) s at which it begins, and the end of the run; (k + 1,) m, the last one repeated."""
     end = float(execution.tick_times[-1])
     touched = [float(touch["time"]) for touch in execution.touchdowns if touch.get("time") is not None]
     edges = np.clip([0.0, *sorted(touched), end], 0.0, end)
     count = min(len(execution.slip), len(edges) - 1)
-    return np.column_stack([edges[:count], edges[1 : count + 1]]).ravel(), np.repeat(execution.slip[:count], 2)
+    return edges[: count + 1], np.array([*execution.slip[:count], execution.slip[count - 1]])
 
 
 def send_contact_states(
@@ -153,13 +156,13 @@ def send_contact_states(
             continue
         entity = f"contacts/{limb.label}/{source}"
         color = LIMB_COLORS[limb] if source == "measured" else tuple(int(0.6 * part) for part in LIMB_COLORS[limb])
-        style = rr.StateConfiguration(values=["contact"], labels=[source], colors=[color])
+        style = rr.StateConfiguration(values=["contact"], labels=[" "], colors=[color])
         stream.log(entity, style, static=True)
         before = False
         for time, held in samples:
             if held != before:
                 stream.set_time(TIMELINE, duration=time)
-                stream.log(entity, rr.StateChange(state="contact" if held else None))
+                stream.log(entity, rr.StateChange(state="contact" if held else ""))
             before = held
     stream.reset_time()
 

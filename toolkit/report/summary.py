@@ -12,10 +12,10 @@ LEGEND = f"""## Legend
 | what | looks like |
 |---|---|
 | planned contacts | filled rectangles, numbered by transition: left foot red, right foot green, left palm cyan, right palm magenta; thick while they hold |
-| made contacts | white outlines, from touchdown on |
-| CoM | predicted by the search orange, optimised blue, executed white |
+| made contacts | orange outlines, from touchdown on |
+| CoM | predicted by the search violet, optimised blue, executed orange |
 | forces | arrows at the centre of pressure, 1 m = {NEWTON_PER_METRE:.0f} N: planned thin, measured thick |
-| surfaces | for feet blue, for palms amber |
+| surfaces | for feet blue, for palms brown |
 | search | states from old (blue) to new (yellow): switch on `world/search`; its own timeline is `search` |
 """  # noqa: E501
 
