@@ -1,0 +1,72 @@
+"""A picture of a robot in its home posture, rendered off screen."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from toolkit.errors import ToolkitError
+from toolkit.robot.model import RobotModel
+
+
+def standing_scene(robot: RobotModel, friction: float = 1.0) -> mujoco.MjModel:
+    """The robot over a plane at z = 0, with light and checkered ground.
+
+    Args:
+        robot: loaded robot.
+        friction: of every contact with the ground.
+
+    Returns:
+        Compiled model; the robot's part of qpos and ctrl is that of `robot.mujoco_model`.
+    """
+    spec = mujoco.MjSpec.from_string(robot.mjcf, assets=robot.assets)
+    spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 100.0
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    sky = mujoco.mjtTexture.mjTEXTURE_SKYBOX
+    spec.add_texture(name="sky", type=sky, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, width=256, height=1536,
+                     rgb1=[0.75, 0.83, 0.92], rgb2=[1.0, 1.0, 1.0])  # fmt: skip
+    spec.add_texture(name="tiles", type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+                     width=512, height=512, rgb1=[0.80, 0.82, 0.84], rgb2=[0.72, 0.74, 0.77])  # fmt: skip
+    material = spec.add_material(name="tiles", texrepeat=[2, 2], texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
+    spec.worldbody.add_geom(name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1], priority=1, condim=3,
+                            friction=[friction, 0.005, 0.0001], material="tiles")  # fmt: skip
+    spec.worldbody.add_light(type=mujoco.mjtLightType.mjLIGHT_SPOT, pos=[3, 2, 5], dir=[-0.5, -0.33, -0.7], cutoff=60,
+                             diffuse=[0.7] * 3, castshadow=True)  # fmt: skip
+    spec.worldbody.add_light(type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=[0, 0, 4], dir=[0.3, 0.6, -0.6],
+                             diffuse=[0.25] * 3, castshadow=False)  # fmt: skip
+    spec.visual.quality.shadowsize = 4096
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1440
+    return spec.compile()
+
+
+def render_home(
+    robot: RobotModel, width: int = 900, height: int = 1200, azimuth: float = 150.0, elevation: float = -8.0
+) -> np.ndarray:
+    """Render the home posture on a plane.
+
+    Args:
+        robot: loaded robot.
+        width, height: pixels.
+        azimuth, elevation: direction of view in degrees.
+
+    Returns:
+        (height, width, 3) uint8.
+
+    Raises:
+        ToolkitError: no off-screen OpenGL context; the message says what to set.
+    """
+    model = standing_scene(robot)
+    data = mujoco.MjData(model)
+    data.qpos[:] = robot.home
+    mujoco.mj_forward(model, data)
+    camera = mujoco.MjvCamera()
+    camera.lookat[:] = [0.0, 0.0, 0.88 * robot.com_height]
+    camera.distance, camera.azimuth, camera.elevation = 2.75 * robot.com_height, azimuth, elevation
+    try:
+        renderer = mujoco.Renderer(model, height, width)
+    except (RuntimeError, ImportError, AttributeError) as error:
+        raise ToolkitError(f"no off-screen rendering: {error}; set MUJOCO_GL=egl or MUJOCO_GL=osmesa") from None
+    with renderer:
+        renderer.update_scene(data, camera)
+        return renderer.render()
