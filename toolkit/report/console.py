@@ -1,0 +1,126 @@
+"""What a run shows on the terminal: a row per stage, progress while it works, the checks, the verdict."""
+
+from __future__ import annotations
+
+import sys
+import weakref
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+from toolkit.simulation.check import Check, Result
+
+STYLES = {Result.PASS: "bold green", Result.FAIL: "bold red", Result.NOT_CHECKED: "yellow"}
+PLAIN_WIDTH = 160  # columns assumed where the output is no terminal
+
+
+def make_console() -> Console:
+    """A console on standard output; plain, uncoloured and wide where that is no terminal."""
+    return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH, highlight=False)
+
+
+class StageConsole:
+    """Shows a run as it goes: an observer of the pipeline.
+
+    On a terminal the stage at work has a line with a spinner, a bar where its share is known, and the time; a stage
+    that ended leaves a row. Where the output is no terminal, only the rows are printed.
+    """
+
+    def __init__(self, console: Console | None = None):
+        """Show on `console`; None for `make_console()`."""
+        self.console = make_console() if console is None else console
+        self._progress = Progress(
+            SpinnerColumn(),
+            TextColumn("{task.description}", markup=False),
+            BarColumn(bar_width=30),
+            TimeElapsedColumn(),
+            TextColumn("{task.fields[detail]}", markup=False),
+            console=self.console,
+            transient=True,
+            disable=not self.console.is_terminal,
+        )
+        self._task: TaskID | None = None
+        self._headed = False
+        weakref.finalize(self, self._progress.stop)  # gives the cursor back however the run ends
+
+    def started(self, stage: str, detail: str = "") -> None:
+        """A stage begins."""
+        self._clear()
+        if self.console.is_terminal:
+            self._progress.start()
+            self._task = self._progress.add_task(f"{stage:<10}", total=None, detail=detail)
+
+    def progress(self, stage: str, fraction: float | None, detail: str = "") -> None:
+        """A stage goes on; `fraction` in [0, 1] where known."""
+        if self._task is None:
+            return
+        if fraction is None:
+            self._progress.update(self._task, detail=detail)
+        else:
+            self._progress.update(self._task, total=1.0, completed=fraction, detail=detail)
+
+    def finished(self, stage: str, passed: bool, seconds: float, detail: str = "") -> None:
+        """A stage ended: print its row."""
+        self._clear()
+        if not self._headed:
+            self._line(Text(f"{'stage':<11}{'result':<8}{'time':>9}  ", style="dim"))
+            self._headed = True
+        result = Result.PASS if passed else Result.FAIL
+        row = Text(f"{stage:<11}").append(f"{result.value:<8}", style=STYLES[result]).append(f"{seconds:>7.2f} s  ")
+        self._line(row.append(" ".join(detail.split())))
+
+    def verdict(
+        self,
+        checks: Sequence[Check],
+        passed: bool,
+        reason: str,
+        folder: Path | None = None,
+        seconds: float | None = None,
+    ) -> None:
+        """Print the checks, then `PASS` or `FAIL: reason` on a line of its own, then where the files are.
+
+        Args:
+            checks: of the verdict; no table where there is none.
+            passed: the verdict.
+            reason: one line where it did not pass.
+            folder: of the run's files.
+            seconds: from command to verdict.
+        """
+        self._clear()
+        if checks:
+            self.console.print(check_table(checks))
+        text = "PASS" if passed else f"FAIL: {' '.join(reason.split())}"
+        self._line(Text(text, style=STYLES[Result.PASS if passed else Result.FAIL]))
+        if folder is not None:
+            self._line(Text(f"written to {folder}" + ("" if seconds is None else f", {seconds:.1f} s in all")))
+
+    def _line(self, text: Text) -> None:
+        """Print one line, never wrapped."""
+        self.console.print(text, soft_wrap=True)
+
+    def _clear(self) -> None:
+        """Take the line of the stage at work away."""
+        if self._task is not None:
+            self._progress.remove_task(self._task)
+            self._progress.stop()
+            self._task = None
+
+
+def check_table(checks: Sequence[Check]) -> Table:
+    """The checks with value, limit and result."""
+    table = Table(box=box.SIMPLE, pad_edge=False)
+    table.add_column("check")
+    for name in ("value", "limit"):
+        table.add_column(name, justify="right")
+    table.add_column("unit")
+    table.add_column("result")
+    for check in checks:
+        value = "-" if check.value is None else f"{check.value:.4g}"
+        result = Text(check.result.value, style=STYLES[check.result])
+        table.add_row(Text(check.name), value, f"{check.limit:.4g}", check.unit, result)
+    return table
