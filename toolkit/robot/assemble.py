@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -53,7 +54,11 @@ def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
     spec, where = source.spec, description.path
     _check_tree(description, source)
     names = [joint.name for joint in spec.joints if joint.type != mujoco.mjtJoint.mjJNT_FREE]
-    lock_joints(spec, match_joints(where, "model.locked_joints", description.locked_joints, names))
+    locked = match_joints(where, "model.locked_joints", description.locked_joints, names)
+    try:
+        lock_joints(spec, locked)
+    except RobotError as error:
+        raise RobotError(f"{source.path}: {error}") from None
     _strip(source)
     _check_names(source)
     try:
@@ -71,6 +76,18 @@ def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
     except ValueError as error:
         raise RobotError(f"{source.path}: MuJoCo cannot compile it: {' '.join(str(error).split())}") from None
     return Assembly(mjcf, assets, model, velocity, bodies)
+
+
+def exclude_pairs(assembly: Assembly, pairs: Sequence[tuple[str, str]]) -> Assembly:
+    """The same robot without contacts between pairs of its bodies."""
+    if not pairs:
+        return assembly
+    spec = mujoco.MjSpec.from_string(assembly.mjcf, assets=assembly.assets)
+    for first, second in pairs:
+        spec.add_exclude(bodyname1=first, bodyname2=second)
+    spec.compile()
+    mjcf = spec.to_xml()
+    return replace(assembly, mjcf=mjcf, mujoco_model=mujoco.MjModel.from_xml_string(mjcf, assembly.assets))
 
 
 def _check_tree(description: RobotDescription, source: ModelSource) -> None:

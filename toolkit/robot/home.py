@@ -12,6 +12,7 @@ from toolkit.robot.description import RobotDescription, match_joints
 
 MAX_SOLE_TILT = 0.02  # rad
 MAX_SOLE_STEP = 0.005  # m
+MAX_NEIGHBOUR_JOINTS = 5  # on the path between bodies whose shapes may overlap by construction
 MAX_SINK = 0.003  # m; how far another part of the robot may reach below the soles
 
 
@@ -62,13 +63,45 @@ def home_posture(description: RobotDescription, model: mujoco.MjModel) -> np.nda
     return data.qpos.copy()
 
 
-def exclude_touching(model: mujoco.MjModel, home: np.ndarray) -> list[tuple[str, str]]:
-    """Pairs of bodies whose collision shapes overlap in the home posture: neighbours by construction."""
+def touching_neighbours(
+    description: RobotDescription, model: mujoco.MjModel, home: np.ndarray
+) -> list[tuple[str, str]]:
+    """Pairs of bodies close in the chain whose collision shapes overlap in the home posture.
+
+    Such shapes overlap by construction (meshes around a joint), so their contacts are to be ignored.
+
+    Args:
+        description: the robot.toml.
+        model: the robot alone.
+        home: (7 + n,) qpos.
+
+    Returns:
+        Pairs of body names.
+
+    Raises:
+        RobotError: bodies further apart touch: the posture itself is wrong.
+    """
     data = mujoco.MjData(model)
     data.qpos[:] = home
     mujoco.mj_fwdPosition(model, data)
-    bodies = model.geom_bodyid[data.contact.geom]
-    return sorted({tuple(sorted((model.body(a).name, model.body(b).name))) for a, b in bodies})
+    pairs = sorted({(int(min(pair)), int(max(pair))) for pair in model.geom_bodyid[data.contact.geom]})
+    for first, second in pairs:
+        if _joints_between(model, first, second) > MAX_NEIGHBOUR_JOINTS:
+            raise RobotError(
+                f"{description.path}: in the home posture '{model.body(first).name}' touches "
+                f"'{model.body(second).name}'; correct [home], or <exclude> the pair in the model"
+            )
+    return [(model.body(first).name, model.body(second).name) for first, second in pairs]
+
+
+def _joints_between(model: mujoco.MjModel, first: int, second: int) -> int:
+    """Number of joints on the path between two bodies of one tree."""
+    count = 0
+    while first != second:
+        deeper = max(first, second)  # a child's index is larger than its parent's
+        count += int(model.body_jntnum[deeper])
+        first, second = min(first, second), int(model.body_parentid[deeper])
+    return count
 
 
 def _check_level(description: RobotDescription, soles: list[Pose]) -> None:
@@ -76,8 +109,9 @@ def _check_level(description: RobotDescription, soles: list[Pose]) -> None:
     step = abs(float((soles[1].position - soles[0].position) @ soles[0].normal))
     if tilt > MAX_SOLE_TILT or step > MAX_SOLE_STEP:
         raise RobotError(
-            f"{description.path}: [home] leaves the soles {np.degrees(tilt):.1f}° and {1e3 * step:.1f} mm apart from one "
-            f"plane (at most {np.degrees(MAX_SOLE_TILT):.1f}° and {1e3 * MAX_SOLE_STEP:.0f} mm); correct [home] or [limbs]"
+            f"{description.path}: [home] leaves the soles {np.degrees(tilt):.1f}° and {1e3 * step:.1f} mm apart from "
+            f"one plane (at most {np.degrees(MAX_SOLE_TILT):.1f}° and {1e3 * MAX_SOLE_STEP:.0f} mm); correct [home] or "
+            "the poses in [limbs]"
         )
 
 
@@ -88,8 +122,8 @@ def _check_balance(description: RobotDescription, com: np.ndarray, soles: list[P
     left, right = max(sole.position[1] for sole in soles), min(sole.position[1] for sole in soles)
     if not (back < com[0] < front and right <= com[1] <= left and com[2] > 0):
         raise RobotError(
-            f"{description.path}: [home] puts the CoM at x {com[0]:.3f}, y {com[1]:.3f}, z {com[2]:.3f} m, not above the feet "
-            f"(x {back:.3f} to {front:.3f}, y {right:.3f} to {left:.3f}); correct [home] or [limbs]"
+            f"{description.path}: [home] puts the CoM at {com[0]:.3f}, y {com[1]:.3f}, z {com[2]:.3f} m, not over the "
+            f"feet (x {back:.3f} to {front:.3f}, y {right:.3f} to {left:.3f}); correct [home] or the poses in [limbs]"
         )
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from toolkit.errors import RobotError
 from toolkit.geometry.pose import Pose
 from toolkit.robot.agreement import check_agreement
-from toolkit.robot.assemble import Assembly, assemble
+from toolkit.robot.assemble import Assembly, assemble, exclude_pairs
 from toolkit.robot.description import FILE_NAME, RobotDescription, match_joints, read_description, suggestion
 from toolkit.robot.geometry import derive_limbs
-from toolkit.robot.home import home_posture
+from toolkit.robot.home import home_posture, touching_neighbours
 from toolkit.robot.model import LimbModel, RobotModel
 from toolkit.robot.source import find_model_file, read_model
 from toolkit.robot.urdf import urdf_from_model
@@ -81,9 +81,10 @@ def load_robot(name: str, robots_dir: Path | None = None) -> RobotModel:
     folder = robot_folder(name, robots_dir)
     description = read_description(folder / FILE_NAME)
     assembly = assemble(description, read_model(find_model_file(description)))
-    model, where = assembly.mujoco_model, description.path
-
-    home = home_posture(description, model)
+    where = description.path
+    home = home_posture(description, assembly.mujoco_model)
+    assembly = exclude_pairs(assembly, touching_neighbours(description, assembly.mujoco_model, home))
+    model = assembly.mujoco_model
     joint_names = tuple(model.joint(j).name for j in range(1, model.njnt))
     gains = match_joints(where, "gains", description.gains, joint_names)
     kp, kd = np.array([gains.get(joint, DEFAULT_GAINS) for joint in joint_names]).T
@@ -147,10 +148,11 @@ def fingerprint(description: RobotDescription, assembly: Assembly, home: np.ndar
     inertia = [r @ np.diag(i) @ r.T for r, i in zip(rotations, model.body_inertia, strict=True)]
     shapes = [model.geom_bodyid, model.geom_type, model.geom_contype, model.geom_conaffinity, model.geom_condim]
     numbers = [
-        model.body_parentid, model.body_pos[2:], _signless(model.body_quat[2:]), model.body_mass, model.body_ipos, inertia,
+        model.body_parentid, model.body_pos[2:], _signless(model.body_quat[2:]),
+        model.body_mass, model.body_ipos, inertia,
         model.jnt_type, model.jnt_bodyid, model.jnt_pos, model.jnt_axis, model.jnt_range, model.qpos0[7:],
-        model.dof_armature, model.dof_damping, model.dof_frictionloss, model.jnt_stiffness, model.actuator_forcerange,
-        [assembly.velocity[joint] for joint in joints],
+        model.jnt_stiffness, model.dof_armature, model.dof_damping, model.dof_frictionloss,
+        model.actuator_forcerange, [assembly.velocity[joint] for joint in joints],
         *shapes, model.geom_size, model.geom_pos, _signless(model.geom_quat), model.geom_friction,
         model.site_bodyid, model.site_pos, _signless(model.site_quat),
         *[[*item.patch, min(item.max_force, 1e9)] for item in description.limbs.values()],

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
+import os
+from typing import Any
+
 import mujoco
 import numpy as np
 
@@ -47,8 +51,10 @@ def render_home(
 
     Args:
         robot: loaded robot.
-        width, height: pixels.
-        azimuth, elevation: direction of view in degrees.
+        width: pixels.
+        height: pixels.
+        azimuth: direction of view about z in degrees.
+        elevation: direction of view above the horizon in degrees.
 
     Returns:
         (height, width, 3) uint8.
@@ -63,10 +69,34 @@ def render_home(
     camera = mujoco.MjvCamera()
     camera.lookat[:] = [0.0, 0.0, 0.88 * robot.com_height]
     camera.distance, camera.azimuth, camera.elevation = 2.75 * robot.com_height, azimuth, elevation
+
+    model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+    window = _context(width, height)
+    context = None
     try:
-        renderer = mujoco.Renderer(model, height, width)
-    except (RuntimeError, ImportError, AttributeError) as error:
-        raise ToolkitError(f"no off-screen rendering: {error}; set MUJOCO_GL=egl or MUJOCO_GL=osmesa") from None
-    with renderer:
-        renderer.update_scene(data, camera)
-        return renderer.render()
+        window.make_current()
+        scene = mujoco.MjvScene(model, maxgeom=1000 + model.ngeom)
+        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
+        options, rectangle = mujoco.MjvOption(), mujoco.MjrRect(0, 0, width, height)
+        mujoco.mjv_updateScene(model, data, options, None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
+        mujoco.mjr_render(rectangle, scene, context)
+        pixels = np.empty((height, width, 3), np.uint8)
+        mujoco.mjr_readPixels(pixels, None, rectangle, context)
+    finally:
+        if context is not None:
+            context.free()
+        window.free()
+    return pixels[::-1]
+
+
+def _context(width: int, height: int) -> Any:
+    """An off-screen OpenGL context: MUJOCO_GL where set, else EGL, else OSMesa; unlike MuJoCo's, chosen on call."""
+    wanted = os.environ.get("MUJOCO_GL", "").lower()
+    failures = []
+    for name in [wanted] if wanted else ["egl", "osmesa"]:
+        try:
+            return importlib.import_module(f"mujoco.{name}").GLContext(width, height)
+        except (ImportError, AttributeError, RuntimeError, OSError) as error:
+            failures.append(f"{name}: {error}")
+    raise ToolkitError(f"no off-screen rendering ({'; '.join(failures)}); install EGL (libegl1) and set MUJOCO_GL=egl")

@@ -15,7 +15,9 @@ def urdf_from_model(model: mujoco.MjModel, name: str = "robot") -> str:
     """Describe a robot compiled alone as a URDF with the same kinematics and inertia.
 
     Every body and site becomes a link of the same name. A body with several joints gets massless links between them.
-    With `M` the pose of the body in its parent, each joint stands at `M ← M T(anchor - previous anchor) Rot(axis, -ref)`.
+    With `M` the pose of the body in its parent, each joint stands at
+    `M ← M T(anchor - previous anchor) Rot(axis, -ref)`.
+
     Armature has no place in URDF and must be set on the Pinocchio model (`toolkit.robot.placo` does).
 
     Args:

@@ -1,0 +1,112 @@
+"""Command line: list the robots, or picture one.
+
+python -m toolkit.robots                               all robots in a table
+python -m toolkit.robots NAME                          one robot: limbs, legs, arms, joints
+python -m toolkit.robots NAME --picture OUT.png        its home posture, rendered off screen
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import imageio.v3 as imageio
+from rich.console import Console
+from rich.table import Table
+
+from toolkit import cli
+from toolkit.errors import InputError, RobotError
+from toolkit.robot.description import FILE_NAME, read_description
+from toolkit.robot.loader import find_robots, load_robot, robots_folder
+from toolkit.robot.model import RobotModel
+from toolkit.robot.picture import render_home
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        argv: words after the program's name; those of the process where None.
+
+    Returns:
+        Exit code: 0, or 2 where a listed robot cannot be loaded.
+
+    Raises:
+        ToolkitError: bad input, or no way to render.
+    """
+    parser = cli.parser("robots", "List the robots, describe one, or picture one.")
+    parser.add_argument("name", nargs="?", help="a robot's name or folder; all robots where left out")
+    parser.add_argument("--picture", type=Path, metavar="OUT.png", help="render the home posture into this file")
+    parser.add_argument("--robots", type=Path, metavar="DIR", help="folder with the robots (default: robots/)")
+    options = parser.parse_args(argv)
+    console = Console()
+    if options.name is None:
+        if options.picture:
+            raise InputError("--picture needs the name of a robot: one of " + ", ".join(find_robots(options.robots)))
+        return _list(console, options.robots)
+    if options.picture and options.picture.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        raise InputError(f"--picture {options.picture}: a picture ends in .png or .jpg")
+    robot = load_robot(options.name, options.robots)
+    if options.picture:
+        _picture(robot, options.picture)
+        console.print(f"{options.picture}: {robot.name} in its home posture", soft_wrap=True, markup=False)
+    else:
+        _describe(console, robot)
+    return 0
+
+
+def _list(console: Console, robots_dir: Path | None) -> int:
+    names = find_robots(robots_dir)
+    if not names:
+        raise RobotError(f"no robot in {robots_folder(robots_dir)}: a robot is a folder with a {FILE_NAME}")
+    table = Table("robot", "mass, kg", "CoM, m", "joints", "limbs", "licence", show_lines=True)
+    for column in table.columns:
+        column.no_wrap = column.header != "limbs"
+    broken: dict[str, RobotError] = {}
+    for name in names:
+        try:
+            robot = load_robot(name, robots_dir)
+            facts = read_description(robot.folder / FILE_NAME)
+            limbs = ", ".join(limb.label for limb in robot.limbs)
+            numbers = (f"{robot.mass:.1f}", f"{robot.com_height:.2f}", str(len(robot.joint_names)))
+            table.add_row(name, *numbers, limbs, facts.licence)
+        except RobotError as error:
+            broken[name] = error
+            table.add_row(name, "", "", "", "cannot be loaded", "", style="red")
+    console.print(table)
+    for name, error in broken.items():
+        console.print(f"{name}: {error}", style="red", soft_wrap=True, markup=False)
+    return next(iter(broken.values())).exit_code if broken else 0
+
+
+def _describe(console: Console, robot: RobotModel) -> None:
+    facts = read_description(robot.folder / FILE_NAME)
+    console.print(f"{robot.name}: {facts.description}\nlicence {facts.licence}; source: {facts.source}", markup=False)
+    console.print(f"{robot.mass:.2f} kg, CoM at {robot.com_height:.3f} m, {len(robot.joint_names)} joints")
+    limbs = Table("limb", "patch, m", "max N", "segments, m", "reach, m")
+    for limb, model in robot.limbs.items():
+        if limb in robot.legs:
+            leg = robot.legs[limb]
+            segments, low, high = f"{leg.thigh:.3f} + {leg.shin:.3f}", leg.min_length, leg.max_length
+        else:
+            segments, low, high = "", robot.arms[limb].min_reach, robot.arms[limb].max_reach
+        patch = " x ".join(f"{2 * half:.3f}" for half in model.half_size)
+        limbs.add_row(limb.label, patch, f"{model.max_normal_force:g}", segments, f"{low:.3f}…{high:.3f}")
+    console.print(limbs)
+    joints = Table("joint", "range, rad", "N m", "rad/s", "armature", "home, rad")
+    for i, name in enumerate(robot.joint_names):
+        numbers = (robot.torque_limit[i], robot.velocity_limit[i], robot.armature[i], robot.home[7 + i])
+        joints.add_row(name, f"{robot.lower[i]:.3f}…{robot.upper[i]:.3f}", *(f"{value:g}" for value in numbers))
+    console.print(joints)
+
+
+def _picture(robot: RobotModel, path: Path) -> None:
+    pixels = render_home(robot)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        imageio.imwrite(path, pixels)
+    except OSError as error:
+        raise InputError(f"--picture {path}: cannot be written ({error.strerror})") from None
+
+
+if __name__ == "__main__":
+    cli.run(main)
