@@ -18,7 +18,7 @@ from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose, rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
-from toolkit.wholebody.knee import knee_range
+from toolkit.wholebody.knee import chain_to, knee_range
 from toolkit.wholebody.limb_paths import LimbPaths
 
 
@@ -31,9 +31,11 @@ class IKConfig:
         settle: iterations for the first sample.
         foot_position, foot_orientation, com, palm_position, palm_normal, palm_twist, base: weights per squared m or
             rad.
-        posture: weight per squared rad of a tick's deviation from the eased return to the home posture.
+        arms, trunk, legs: weights per squared rad of a tick's deviation from the eased return to the home posture; the
+            trunk is what carries both arms, or all that is neither leg nor arm.
         posture_time: s; time constant of that return.
-        angular_momentum: weight per squared kg m^2.
+        angular_momentum: weight per squared rad of a tick's deviation from the planned angular momentum, in units of
+            mass times squared CoM height; a large one makes trunk and arms swing wide.
         velocity_fraction: share of the joint velocity limits that may be used.
         range_margin: rad; kept from each end of a joint's range.
         min_knee: rad; least knee flexion.
@@ -48,9 +50,11 @@ class IKConfig:
     palm_normal: float = 1e2
     palm_twist: float = 0.1
     base: float = 1.0
-    posture: float = 0.05
-    posture_time: float = 0.3
-    angular_momentum: float = 0.02
+    arms: float = 0.15
+    trunk: float = 5.0
+    legs: float = 0.01
+    posture_time: float = 0.15
+    angular_momentum: float = 1.4
     velocity_fraction: float = 0.95
     range_margin: float = 0.02
     min_knee: float = 0.2
@@ -108,10 +112,26 @@ class WholeBodyIK:
                 self.palms[palm] = (position, normal, twist)
         self.base = solver.add_orientation_task(robot.base, np.eye(3))
         self.base.configure("base", "soft", config.base)
-        self.posture = solver.add_joints_task()
-        self.posture.set_joints(self.home)
+        self.postures = []
+        for joints, weight in self._groups():
+            task = solver.add_joints_task()
+            self.postures.append((task, {name: self.home[name] for name in joints}, weight))
         self.momentum = solver.add_centroidal_momentum_task(np.zeros(3))
         solver.add_regularization_task(1e-6)
+
+    def _groups(self) -> list[tuple[list[str], float]]:
+        """Joint names with the weight of their posture: arms, trunk, legs."""
+        model, config = self.robot.mujoco_model, self.config
+        chains = {limb: chain_to(model, item.body) for limb, item in self.robot.limbs.items()}
+        legs = set(chains[Limb.LEFT_FOOT]) | set(chains[Limb.RIGHT_FOOT])
+        reaching = [set(chains[palm]) for palm in PALMS if palm in chains]
+        both = set.intersection(*reaching) if len(reaching) == 2 else set()
+        arms = set().union(*reaching) - both - legs
+        groups: dict[float, list[str]] = {}
+        for joint in range(1, model.njnt):
+            weight = config.legs if joint in legs else config.arms if joint in arms else config.trunk
+            groups.setdefault(weight, []).append(model.joint(joint).name)
+        return [(names, weight) for weight, names in groups.items()]
 
     def start(self, qpos: np.ndarray, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
         """Settle on the first sample.
@@ -132,13 +152,16 @@ class WholeBodyIK:
         self._set_targets(0.0, paths, motion)
         self.momentum.configure("momentum", "soft", 0.0)
         # At rest, an eased posture task of weight w weighs as much as a plain one of weight w * ease.
-        self.posture.set_joints(self.home)
-        self.posture.configure("posture", "soft", self.config.posture * self._ease)
+        for task, home, weight in self.postures:
+            task.set_joints(home)
+            task.configure("posture", "soft", weight * self._ease)
         for _ in range(self.config.settle):
             if np.abs(self._solve(0.0)).max() < 1e-7:
                 break
-        self.posture.configure("posture", "soft", self.config.posture)
-        self.momentum.configure("momentum", "soft", self.config.angular_momentum)
+        for task, _, weight in self.postures:
+            task.configure("posture", "soft", weight)
+        inertia = self.robot.mass * self.robot.com_height**2
+        self.momentum.configure("momentum", "soft", self.config.angular_momentum / inertia**2)
         self.solver.enable_velocity_limits(True)
         return self.order.qpos_from_q(self.wrapper.state.q)
 
@@ -149,9 +172,10 @@ class WholeBodyIK:
             PlanningError: if the quadratic program has no solution.
         """
         self._set_targets(time, paths, motion)
-        for name, home in self.home.items():
-            angle = self.wrapper.get_joint(name)
-            self.posture.set_joint(name, angle + self._ease * (home - angle))
+        for task, homes, _ in self.postures:
+            for name, home in homes.items():
+                angle = self.wrapper.get_joint(name)
+                task.set_joint(name, angle + self._ease * (home - angle))
         self._solve(time)
         return self.order.qpos_from_q(self.wrapper.state.q)
 

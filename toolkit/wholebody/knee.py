@@ -28,7 +28,7 @@ def knee_range(robot: RobotModel, foot: Limb, min_angle: float) -> tuple[int, fl
     data.qpos[:] = robot.home
     mujoco.mj_kinematics(model, data)
     site = data.site(robot.limbs[foot].site).xpos
-    chain = _chain(model, robot.limbs[foot].body)
+    chain = chain_to(model, robot.limbs[foot].body)
     if len(chain) < 3:
         return None
     hip = data.xanchor[chain[0]]
@@ -49,8 +49,8 @@ def knee_range(robot: RobotModel, foot: Limb, min_angle: float) -> tuple[int, fl
     return joint, lower, max(min(upper, straight - min_angle), lower)
 
 
-def _chain(model: mujoco.MjModel, body: str) -> list[int]:
-    """Hinge and slide joints from the base to a body, in order."""
+def chain_to(model: mujoco.MjModel, body: str) -> list[int]:
+    """Indices of the hinge and slide joints of a model from its base to a body, in order."""
     joints: list[int] = []
     index = model.body(body).id
     while index > 0:

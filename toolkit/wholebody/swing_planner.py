@@ -16,6 +16,21 @@ Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
+class SwingTiming:
+    """When, as fractions of a swing, the patch leaves its surface, rises, crosses, descends and lands."""
+
+    leave: Window = Window(0.0, 0.35)
+    rise: Window = Window(0.0, 0.5)
+    across: Window = Window(0.05, 0.85)
+    descend: Window = Window(0.5, 0.95)
+    land: Window = Window(0.6, 1.0)
+
+
+EASY = SwingTiming()
+STEEP = SwingTiming(Window(0.0, 0.3), Window(0.0, 0.4), Window(0.2, 0.8), Window(0.6, 1.0), Window(0.7, 1.0))
+
+
+@dataclass(frozen=True)
 class SwingConfig:
     """Shape of swing paths.
 
@@ -26,7 +41,10 @@ class SwingConfig:
         raise_step, max_raise: m; what the path is raised by until it is clear, and the most it may be.
         gap: m; kept between the soles of the swinging and the standing foot.
         detour_step, max_detour: m; the same for the sideways detour around the standing foot.
-        slow, fast: m/s; mean speed up to which `across` holds, and from which `across_fast` does.
+        easy, steep: timing for the open, and timing that rises first, crosses then, and descends last.
+        easy_raise: m; paths raised by more than that are first tried with the steep timing.
+        fast_across: window of the crossing for swings faster than `fast`.
+        slow, fast: m/s; mean speed up to which the window of the crossing is kept, and from which it is `fast_across`.
         samples: poses per swing that are checked.
     """
 
@@ -41,12 +59,10 @@ class SwingConfig:
     max_detour: float = 0.16
     slow: float = 1.0
     fast: float = 2.5
-    across: Window = Window(0.05, 0.85)
-    across_fast: Window = Window(0.0, 1.0)
-    leave: Window = Window(0.0, 0.35)
-    rise: Window = Window(0.0, 0.5)
-    descend: Window = Window(0.5, 0.95)
-    land: Window = Window(0.6, 1.0)
+    easy: SwingTiming = EASY
+    steep: SwingTiming = STEEP
+    easy_raise: float = 0.04
+    fast_across: Window = Window(0.0, 1.0)
     samples: int = 33
 
 
@@ -83,13 +99,22 @@ def plan_swing(task: SwingTask, collide: Collide, config: SwingConfig) -> SwingP
     detour = _detour(task, config)
     highest = None
     for share in (1.0, 0.5, 0.0):
-        for before, after in _raises(task, config):
-            path = _path(task, before, after, detour, config)
+        for before, after, timing in _candidates(task, config):
+            path = _path(task, before, after, timing, detour, config)
             if not collide(*_swept_boxes(task, path, share * config.margin, config)).any():
                 return path
             highest = path
     assert highest is not None
     return replace(highest, clear=False)
+
+
+def _candidates(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float, SwingTiming]]:
+    """Extra height (m) before and after the crossing, with the timing, from the easiest to the highest."""
+    raises = list(_raises(task, config))
+    level = abs(task.end.position[2] - task.start.position[2]) if task.is_foot else 0.0
+    low = [pair for pair in raises if max(pair) <= level + config.easy_raise]
+    yield from ((*pair, config.easy) for pair in low)
+    yield from ((*pair, config.steep) for pair in raises)
 
 
 def _raises(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float]]:
@@ -106,20 +131,22 @@ def _raises(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float
     yield from ((up + step, down + step) for step in steps[1:])
 
 
-def _path(task: SwingTask, before: float, after: float, detour: np.ndarray, config: SwingConfig) -> SwingPath:
-    """The path with given extra heights and detour."""
+def _path(
+    task: SwingTask, before: float, after: float, timing: SwingTiming, detour: np.ndarray, config: SwingConfig
+) -> SwingPath:
+    """The path with given extra heights, timing and detour."""
     lift = config.foot_lift if task.is_foot else config.palm_lift
     off = np.zeros(3) if task.free_start else lift * task.start.normal
     onto = np.zeros(3) if task.free_end else -lift * task.end.normal
     up = np.array([0.0, 0.0, 1.0]) if task.is_foot else _outward(task)
     travel = task.end.position - task.start.position - off - onto - (before - after) * up
-    across = _across(float(np.linalg.norm(travel)) / task.duration, config)
+    across = _across(float(np.linalg.norm(travel)) / task.duration, timing.across, config)
     moves = [
-        Move(off, config.leave),
-        Move(before * up, config.rise),
+        Move(off, timing.leave),
+        Move(before * up, timing.rise),
         Move(travel, across),
-        Move(-after * up, config.descend),
-        Move(onto, config.land),
+        Move(-after * up, timing.descend),
+        Move(onto, timing.land),
         Move(detour, across, returns=True),
     ]
     moves = tuple(move for move in moves if np.any(move.vector))
@@ -135,10 +162,10 @@ def _outward(task: SwingTask) -> np.ndarray:
     return outward / length if length > 1e-3 else np.array([0.0, 0.0, 1.0])
 
 
-def _across(speed: float, config: SwingConfig) -> Window:
+def _across(speed: float, slow: Window, config: SwingConfig) -> Window:
     """Window of the crossing: fast swings take all the time there is, to keep the peak velocity low."""
     share = min(max((speed - config.slow) / (config.fast - config.slow), 0.0), 1.0)
-    slow, fast = config.across, config.across_fast
+    fast = config.fast_across
     return Window(slow.start + share * (fast.start - slow.start), slow.end + share * (fast.end - slow.end))
 
 
@@ -174,7 +201,7 @@ def _detour(task: SwingTask, config: SwingConfig) -> np.ndarray:
     u = np.linspace(0.0, 1.0, config.samples)
 
     def gap(detour: np.ndarray) -> tuple[float, float]:
-        path = _path(task, 0.0, 0.0, detour, config)
+        path = _path(task, 0.0, 0.0, config.easy, detour, config)
         gaps = _gaps(_corners(path.positions(u), path.rotations(u), task.half_size), standing)
         return float(gaps.min()), float(min(gaps[0], gaps[-1]))
 
