@@ -10,27 +10,11 @@ import numpy as np
 import rerun as rr
 
 from toolkit.contacts.stance import Contact
-from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_from_quaternion
+from toolkit.report.colors import FOOT_SURFACE, GOAL, LIMB_COLORS, OTHER_SURFACE, PALM_SURFACE
 from toolkit.report.meshes import TriangleMesh, geom_rgba, mesh_of_geom, name_of, shown_geoms, static_bodies
 from toolkit.world.surface import Surface
 from toolkit.world.world import Goal
-
-Color = tuple[int, int, int]
-
-LIMB_COLORS: dict[Limb, Color] = {
-    Limb.LEFT_FOOT: (228, 62, 62),
-    Limb.RIGHT_FOOT: (72, 184, 72),
-    Limb.LEFT_PALM: (40, 196, 208),
-    Limb.RIGHT_PALM: (214, 74, 206),
-}
-FOOT_SURFACE: Color = (70, 150, 230)
-PALM_SURFACE: Color = (206, 158, 96)
-OTHER_SURFACE: Color = (130, 130, 130)
-GOAL: Color = (250, 204, 60)
-PREDICTED: Color = (164, 92, 232)
-OPTIMISED: Color = (48, 122, 246)
-EXECUTED: Color = (255, 136, 0)
 
 SCENE_SHADE = 0.8  # darkens the scene a little, so that what is drawn on a bright floor stands out
 

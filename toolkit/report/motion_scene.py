@@ -14,7 +14,8 @@ from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
-from toolkit.report.draw import EXECUTED, LIMB_COLORS, OPTIMISED, PREDICTED, draw_bodies, draw_patches, patch_corners
+from toolkit.report.colors import EXECUTED, LIMB_COLORS, OPTIMISED, PREDICTED
+from toolkit.report.draw import draw_bodies, draw_patches, patch_corners
 from toolkit.robot.model import RobotModel
 from toolkit.search.result import SearchResult
 from toolkit.simulation.execution import Execution

@@ -11,12 +11,11 @@ import rerun as rr
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.geometry.limb import Limb
-from toolkit.report.draw import EXECUTED, LIMB_COLORS, Color
+from toolkit.report.colors import AXES, EXECUTED, LIMB_COLORS, LIMIT, Color
 from toolkit.report.motion_scene import LEAST_FORCE, TIMELINE, at, limb_of
 from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
-AXES: tuple[Color, Color, Color] = ((228, 80, 80), (90, 190, 90), (90, 140, 240))
 RATE = 100.0
 """Hz to which series are thinned; each sample then holds the worst value of its interval."""
 
@@ -100,7 +99,7 @@ def plot_execution(stream: rr.RecordingStream, execution: Execution, trajectory:
         "torque / limit",
         EXECUTED,
     )
-    plot(stream, "series/torque_ratio/limit", times[[0, -1]], np.ones(2), "limit", (228, 62, 62), 1.0)
+    plot(stream, "series/torque_ratio/limit", times[[0, -1]], np.ones(2), "limit", LIMIT, 1.0)
     if execution.slip:
         edges, values = slip_steps(execution)
         style = {"interpolation_mode": rr.components.InterpolationMode.StepAfter}

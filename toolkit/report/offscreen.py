@@ -1,0 +1,160 @@
+"""Off-screen rendering of MuJoCo scenes on machines with or without a screen."""
+
+from __future__ import annotations
+
+import copy
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from toolkit.contacts.stance import Contact
+from toolkit.errors import InputError
+from toolkit.report.colors import LIMB_COLORS
+
+BACKENDS = ("egl", "osmesa")
+REMEDY = "apt-get install -y libegl1 libgl1-mesa-dri libosmesa6, or leave pictures and video out"
+
+
+def open_context(width: int, height: int, backends: Sequence[str] = BACKENDS) -> Any:
+    """An OpenGL context without a screen, made current: EGL, or else OSMesa.
+
+    The environment's MUJOCO_GL is tried first where it names one of them.
+
+    Args:
+        width: pixels.
+        height: pixels.
+        backends: names of MuJoCo's context modules, in order.
+
+    Raises:
+        InputError: none works; the message says what to install.
+    """
+    wanted = os.environ.get("MUJOCO_GL", "").lower()
+    reasons = []
+    for backend in sorted(backends, key=lambda name: name != wanted):
+        try:
+            context = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
+            context.make_current()
+            return context
+        except Exception as error:  # noqa: BLE001 - PyOpenGL fails in many ways, from ImportError to AttributeError
+            reasons.append(f"{backend}: {' '.join(str(error).split())[:120]}")
+            _forget(backend)
+    raise InputError(f"cannot render off screen ({'; '.join(reasons)}): {REMEDY}")
+
+
+def _forget(backend: str) -> None:
+    """Unload a backend that failed: PyOpenGL fixes its platform on import, and the next backend needs another."""
+    os.environ.pop("PYOPENGL_PLATFORM", None)
+    for name in list(sys.modules):
+        if name.split(".")[0] == "OpenGL" or name.startswith(f"mujoco.{backend}"):
+            del sys.modules[name]
+
+
+def require_rendering() -> None:
+    """Find out early whether pictures can be made here.
+
+    Raises:
+        InputError: they cannot; the message says what to install.
+    """
+    open_context(16, 16).free()
+
+
+class OffscreenRenderer:
+    """Renders configurations of one model; close it, or use it as a context manager."""
+
+    def __init__(self, model: mujoco.MjModel, width: int, height: int, *, shadows: bool = True):
+        """Open a renderer.
+
+        Args:
+            model: compiled scene; copied, not changed.
+            width: pixels.
+            height: pixels.
+            shadows: whether to draw shadows and reflections (about twice the time on a software renderer).
+
+        Raises:
+            InputError: this machine cannot render.
+        """
+        self._model = copy.copy(model)
+        self._model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
+        self._model.vis.global_.offheight = max(height, model.vis.global_.offheight)
+        self._data = mujoco.MjData(self._model)
+        self._gl = open_context(width, height)
+        self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        self._scene = mujoco.MjvScene(self._model, maxgeom=20000)
+        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
+            self._scene.flags[flag] = shadows
+        self._option = mujoco.MjvOption()
+        self._rectangle = mujoco.MjrRect(0, 0, width, height)
+        self._pixels = np.empty((height, width, 3), np.uint8)
+
+    def render(
+        self,
+        qpos: np.ndarray,
+        camera: mujoco.MjvCamera,
+        *,
+        contacts: Sequence[Contact] = (),
+        half_sizes: np.ndarray | None = None,
+        text: str = "",
+    ) -> np.ndarray:
+        """Picture of a configuration.
+
+        Args:
+            qpos: (nq,).
+            camera: the view.
+            contacts: patches drawn as thin plates coloured by limb.
+            half_sizes: (4, 2) m of the patches, by limb.
+            text: written into the lower left corner.
+
+        Returns:
+            (height, width, 3) uint8.
+        """
+        self._gl.make_current()
+        self._data.qpos[:] = qpos
+        mujoco.mj_forward(self._model, self._data)
+        everything = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(self._model, self._data, self._option, None, camera, everything, self._scene)
+        if half_sizes is not None:
+            for contact in contacts:
+                self._add_patch(contact, half_sizes[contact.limb])
+        mujoco.mjr_render(self._rectangle, self._scene, self._context)
+        if text:
+            corner = mujoco.mjtGridPos.mjGRID_BOTTOMLEFT.value
+            font = mujoco.mjtFont.mjFONT_NORMAL.value
+            mujoco.mjr_overlay(font, corner, self._rectangle, text, "", self._context)
+        mujoco.mjr_readPixels(self._pixels, None, self._rectangle, self._context)
+        return self._pixels[::-1].copy()
+
+    def _add_patch(self, contact: Contact, half_size: np.ndarray) -> None:
+        """Add one plate to the scene about to be rendered."""
+        if self._scene.ngeom >= self._scene.maxgeom:
+            return
+        rgba = np.array([*np.array(LIMB_COLORS[contact.limb]) / 255, 0.7], np.float32)
+        mujoco.mjv_initGeom(
+            self._scene.geoms[self._scene.ngeom],
+            mujoco.mjtGeom.mjGEOM_BOX.value,
+            np.array([*half_size, 0.003]),
+            contact.pose.position,
+            contact.pose.rotation.ravel(),
+            rgba,
+        )
+        self._scene.ngeom += 1
+
+    def close(self) -> None:
+        """Give the graphics memory back; the renderer cannot be used afterwards."""
+        self._gl.make_current()
+        self._context.free()
+        self._gl.free()
+
+    def __enter__(self) -> OffscreenRenderer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
