@@ -20,7 +20,7 @@ import mujoco
 import numba
 import numpy as np
 
-from toolkit.contacts.surface_table import SurfaceTable
+from toolkit.contacts.surface_table import SurfaceTable, surface_table
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.world.surface import Surface
@@ -91,10 +91,10 @@ class Projector:
         config: ProjectionConfig | None = None,
     ):
         self.config = config or ProjectionConfig()
-        self._half = robot.half_sizes + self.config.margin
-        self._half[2:] = robot.half_sizes[2:] + self.config.palm_margin
-        self.table = SurfaceTable.of(surfaces, reach=float(np.linalg.norm(self._half[:2], axis=1).max()))
-        self._shifts = shifts(self.config.shift, self.config.shift_step)
+        self.half_sizes = robot.half_sizes + self.config.margin
+        self.half_sizes[2:] = robot.half_sizes[2:] + self.config.palm_margin
+        self.table = surface_table(surfaces, reach=float(np.linalg.norm(self.half_sizes[:2], axis=1).max()))
+        self.offsets = shifts(self.config.shift, self.config.shift_step)
         self._model = model
         self._data = mujoco.MjData(model)
         mujoco.mj_forward(model, self._data)
@@ -116,30 +116,18 @@ class Projector:
         Returns:
             Soles, z along the surface's normal, x along yaw.
         """
-        offsets = self._shifts if shift else self._shifts[:1]
+        offsets = self.offsets if shift else self.offsets[:1]
         if outward < 0:
             offsets = offsets * [1.0, -1.0]
         n = len(pose)
         surface, position, rotation = np.empty(n, np.int64), np.zeros((n, 3)), np.zeros((n, 3, 3))
-        table = self.table
         _project_soles(
             np.ascontiguousarray(pose, dtype=float),
             float(low),
             float(high),
-            self._half[limb, 0],
-            self._half[limb, 1],
+            self.half_sizes[limb],
             np.ascontiguousarray(offsets),
-            table.origin,
-            table.rotation,
-            table.edges,
-            table.corner,
-            table.cell,
-            table.shape,
-            table.entry_start,
-            table.entry_surface,
-            table.entry_inside,
-            table.near_start,
-            table.near,
+            self.table,
             surface,
             position,
             rotation,
@@ -175,13 +163,9 @@ class Projector:
             rays,
             float(yaw),
             float(reach),
-            self._half[limb, 0],
-            self._half[limb, 1],
+            self.half_sizes[limb],
             chosen,
-            table.origin,
-            table.rotation,
-            table.edges,
-            table.edge_start,
+            table,
             surface,
             distance,
             position,
@@ -212,14 +196,49 @@ def _meets_rectangle(ax, ay, bx, by, hx, hy):
 
 
 @numba.njit(cache=True)
-def _fits(u, v, cx, sx, hx, hy, ref_u, ref_v, ref_inside, edges, near, first, last):
-    """Whether the rectangle at (u, v) with x axis (cx, sx) lies in a region, from the edges near it."""
-    inside = ref_inside
-    du, dv = u - ref_u, v - ref_v
-    for k in range(first, last):
-        e = near[k]
+def plane_height(table, q, x, y):
+    """Height of the plane of surface q at (x, y)."""
+    origin, normal = table.origin[q], table.rotation[q, :, 2]
+    return origin[2] - (normal[0] * (x - origin[0]) + normal[1] * (y - origin[1])) / normal[2]
+
+
+@numba.njit(cache=True)
+def sole_axis(table, q, c, s):
+    """x axis of a sole on surface q: the heading (c, s) dropped on the plane along the vertical."""
+    normal = table.rotation[q, :, 2]
+    ax, ay, az = c * normal[2], s * normal[2], -(c * normal[0] + s * normal[1])
+    length = np.sqrt(ax * ax + ay * ay + az * az)
+    return ax / length, ay / length, az / length
+
+
+@numba.njit(cache=True)
+def cell_of(table, x, y):
+    """Index of the cell of the table's grid at (x, y), -1 outside."""
+    i, j = int(np.floor((x - table.corner[0]) / table.cell)), int(np.floor((y - table.corner[1]) / table.cell))
+    return i * table.shape[1] + j if 0 <= i < table.shape[0] and 0 <= j < table.shape[1] else -1
+
+
+@numba.njit(cache=True)
+def sole_fits(table, cell, entry, x, y, c, s, half):
+    """Whether a sole with centre above (x, y) and heading (c, s) has room on the surface of an entry of that cell."""
+    q = table.entry_surface[entry]
+    r, origin, edges = table.rotation[q], table.origin[q], table.edges
+    ax, ay, az = sole_axis(table, q, c, s)
+    cx, sx = r[0, 0] * ax + r[1, 0] * ay + r[2, 0] * az, r[0, 1] * ax + r[1, 1] * ay + r[2, 1] * az
+    # The centre and the cell's reference point, both in the surface frame.
+    px, py, pz = x - origin[0], y - origin[1], plane_height(table, q, x, y) - origin[2]
+    i, j = cell // table.shape[1], cell % table.shape[1]
+    rx, ry = table.corner[0] + (i + 0.5) * table.cell, table.corner[1] + (j + 0.5) * table.cell
+    dx, dy, dz = px - rx + origin[0], py - ry + origin[1], pz - plane_height(table, q, rx, ry) + origin[2]
+    u, v = r[0, 0] * px + r[1, 0] * py + r[2, 0] * pz, r[0, 1] * px + r[1, 1] * py + r[2, 1] * pz
+    du, dv = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz, r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
+    inside = table.entry_inside[entry]
+    for k in range(table.near_start[entry], table.near_start[entry + 1]):
+        e = table.near[k]
         au, av, bu, bv = edges[e, 0] - u, edges[e, 1] - v, edges[e, 2] - u, edges[e, 3] - v
-        if _meets_rectangle(cx * au + sx * av, -sx * au + cx * av, cx * bu + sx * bv, -sx * bu + cx * bv, hx, hy):
+        if _meets_rectangle(
+            cx * au + sx * av, -sx * au + cx * av, cx * bu + sx * bv, -sx * bu + cx * bv, half[0], half[1]
+        ):
             return False
         # Does the edge cross the way from the reference to the centre? Sides of the line through both, half open.
         side_a, side_b = du * av - dv * au, du * bv - dv * bu
@@ -232,113 +251,71 @@ def _fits(u, v, cx, sx, hx, hy, ref_u, ref_v, ref_inside, edges, near, first, la
 
 
 @numba.njit(cache=True)
-def _project_soles(
-    pose,
-    low,
-    high,
-    hx,
-    hy,
-    offsets,
-    origin,
-    rotation,
-    edges,
-    corner,
-    cell,
-    shape,
-    entry_start,
-    entry_surface,
-    entry_inside,
-    near_start,
-    near,
-    surface,
-    position,
-    orientation,
-):
+def _set_frame(frame, ax, ay, az, nx, ny, nz):
+    """Write the axes of a contact frame from its x and z."""
+    frame[0, 0], frame[1, 0], frame[2, 0] = ax, ay, az
+    frame[0, 1], frame[1, 1], frame[2, 1] = ny * az - nz * ay, nz * ax - nx * az, nx * ay - ny * ax
+    frame[0, 2], frame[1, 2], frame[2, 2] = nx, ny, nz
+
+
+@numba.njit(cache=True)
+def _project_soles(pose, low, high, half, offsets, table, surface, position, orientation):
+    """Fill surface, position and orientation; see `Projector.project_soles`."""
     for row in range(len(pose)):
         c, s = np.cos(pose[row, 2]), np.sin(pose[row, 2])
         surface[row] = -1
         for k in range(len(offsets)):
             x = pose[row, 0] + c * offsets[k, 0] - s * offsets[k, 1]
             y = pose[row, 1] + s * offsets[k, 0] + c * offsets[k, 1]
-            i, j = int(np.floor((x - corner[0]) / cell)), int(np.floor((y - corner[1]) / cell))
-            if i < 0 or j < 0 or i >= shape[0] or j >= shape[1]:
+            cell = cell_of(table, x, y)
+            if cell < 0:
                 continue
             best = low
-            for entry in range(entry_start[i * shape[1] + j], entry_start[i * shape[1] + j + 1]):
-                q = entry_surface[entry]
-                r = rotation[q]
-                nx, ny, nz = r[0, 2], r[1, 2], r[2, 2]
-                z = origin[q, 2] - (nx * (x - origin[q, 0]) + ny * (y - origin[q, 1])) / nz
-                if z > high or z < best:
-                    continue
-                # x axis of the sole: the heading dropped on the plane.
-                ax, ay, az = c * nz, s * nz, -(c * nx + s * ny)
-                length = np.sqrt(ax * ax + ay * ay + az * az)
-                ax, ay, az = ax / length, ay / length, az / length
-                px, py, pz = x - origin[q, 0], y - origin[q, 1], z - origin[q, 2]
-                rx = corner[0] + (i + 0.5) * cell - origin[q, 0]
-                ry = corner[1] + (j + 0.5) * cell - origin[q, 1]
-                rz = -(nx * rx + ny * ry) / nz
-                if _fits(
-                    r[0, 0] * px + r[1, 0] * py + r[2, 0] * pz,
-                    r[0, 1] * px + r[1, 1] * py + r[2, 1] * pz,
-                    r[0, 0] * ax + r[1, 0] * ay + r[2, 0] * az,
-                    r[0, 1] * ax + r[1, 1] * ay + r[2, 1] * az,
-                    hx,
-                    hy,
-                    r[0, 0] * rx + r[1, 0] * ry + r[2, 0] * rz,
-                    r[0, 1] * rx + r[1, 1] * ry + r[2, 1] * rz,
-                    entry_inside[entry],
-                    edges,
-                    near,
-                    near_start[entry],
-                    near_start[entry + 1],
-                ):
+            for entry in range(table.entry_start[cell], table.entry_start[cell + 1]):
+                q = table.entry_surface[entry]
+                z = plane_height(table, q, x, y)
+                if best <= z <= high and sole_fits(table, cell, entry, x, y, c, s, half):
                     best = z
                     surface[row] = q
                     position[row, 0], position[row, 1], position[row, 2] = x, y, z
-                    o = orientation[row]
-                    o[0, 0], o[1, 0], o[2, 0] = ax, ay, az
-                    o[0, 1], o[1, 1], o[2, 1] = ny * az - nz * ay, nz * ax - nx * az, nx * ay - ny * ax
-                    o[0, 2], o[1, 2], o[2, 2] = nx, ny, nz
-            if surface[row] >= 0:
+            q = surface[row]
+            if q >= 0:
+                ax, ay, az = sole_axis(table, q, c, s)
+                nx, ny, nz = table.rotation[q, 0, 2], table.rotation[q, 1, 2], table.rotation[q, 2, 2]
+                _set_frame(orientation[row], ax, ay, az, nx, ny, nz)
                 break
 
 
 @numba.njit(cache=True)
-def _project_palms(
-    shoulder, rays, yaw, reach, hx, hy, chosen, origin, rotation, edges, edge_start, surface, distance, position, orient
-):
+def _project_palms(shoulder, rays, yaw, reach, half, chosen, table, surface, distance, position, orientation):
+    """Fill surface, distance, position and orientation; see `Projector.project_palms`."""
     c, s = np.cos(yaw), np.sin(yaw)
     for row in range(len(rays)):
         surface[row] = -1
         dx, dy, dz = rays[row, 0], rays[row, 1], rays[row, 2]
         for index in range(len(chosen)):
             q = chosen[index]
-            r = rotation[q]
+            r, origin, edges = table.rotation[q], table.origin[q], table.edges
             nx, ny, nz = r[0, 2], r[1, 2], r[2, 2]
             along = nx * dx + ny * dy + nz * dz
             if along > -1e-6:  # the surface faces away
                 continue
-            ox, oy, oz = shoulder[0] - origin[q, 0], shoulder[1] - origin[q, 1], shoulder[2] - origin[q, 2]
+            ox, oy, oz = shoulder[0] - origin[0], shoulder[1] - origin[1], shoulder[2] - origin[2]
             t = -(nx * ox + ny * oy + nz * oz) / along
             if t <= 0.0 or t > reach or t >= distance[row]:
                 continue
-            # R(z -> n) applied to the heading: v + w x v + w x (w x v) / (1 + n_z) with w = z x n.
-            wx, wy = -ny, nx
-            tz = wx * s - wy * c
-            ax = c + wy * tz / (1.0 + nz)
-            ay = s - wx * tz / (1.0 + nz)
-            az = tz
+            # The least rotation from z to n applied to the heading: v + w x v + w x (w x v) / (1 + n_z), w = z x n.
+            az = -ny * s - nx * c
+            ax, ay = c + nx * az / (1.0 + nz), s + ny * az / (1.0 + nz)
             px, py, pz = ox + t * dx, oy + t * dy, oz + t * dz
             u, v = r[0, 0] * px + r[1, 0] * py + r[2, 0] * pz, r[0, 1] * px + r[1, 1] * py + r[2, 1] * pz
             cx, sx = r[0, 0] * ax + r[1, 0] * ay + r[2, 0] * az, r[0, 1] * ax + r[1, 1] * ay + r[2, 1] * az
             inside = False
             free = True
-            for e in range(edge_start[q], edge_start[q + 1]):
+            for e in range(table.edge_start[q], table.edge_start[q + 1]):
                 au, av, bu, bv = edges[e, 0] - u, edges[e, 1] - v, edges[e, 2] - u, edges[e, 3] - v
                 if _meets_rectangle(
-                    cx * au + sx * av, -sx * au + cx * av, cx * bu + sx * bv, -sx * bu + cx * bv, hx, hy
+                    cx * au + sx * av, -sx * au + cx * av, cx * bu + sx * bv, -sx * bu + cx * bv, half[0], half[1]
                 ):
                     free = False
                     break
@@ -349,7 +326,4 @@ def _project_palms(
                 distance[row] = t
                 for axis in range(3):
                     position[row, axis] = shoulder[axis] + t * rays[row, axis]
-                o = orient[row]
-                o[0, 0], o[1, 0], o[2, 0] = ax, ay, az
-                o[0, 1], o[1, 1], o[2, 1] = ny * az - nz * ay, nz * ax - nx * az, nx * ay - ny * ax
-                o[0, 2], o[1, 2], o[2, 2] = nx, ny, nz
+                _set_frame(orientation[row], ax, ay, az, nx, ny, nz)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -15,8 +15,7 @@ _MAX_CELLS = 400_000
 _OFFSET = np.array([0.0417319, 0.0283727])
 
 
-@dataclass(frozen=True)
-class SurfaceTable:
+class SurfaceTable(NamedTuple):
     """Arrays over S surfaces with E boundary edges, and a grid over XY whose cells list what matters in them.
 
     Attributes:
@@ -53,50 +52,50 @@ class SurfaceTable:
     near_start: np.ndarray
     near: np.ndarray
 
-    @classmethod
-    def of(cls, surfaces: Sequence[Surface], reach: float, cell: float = 0.1) -> SurfaceTable:
-        """Table of surfaces.
 
-        Args:
-            surfaces: of a world; at least one.
-            reach: m; distance from a patch's centre to its corners.
-            cell: m; wanted cell size; larger where the world would need too many cells.
-        """
-        origin = np.array([surface.pose.position for surface in surfaces]).reshape(-1, 3)
-        rotation = np.array([surface.pose.rotation for surface in surfaces]).reshape(-1, 3, 3)
-        edges, start = [], [0]
-        for surface in surfaces:
-            for ring in surface.boundary:
-                edges.append(np.concatenate([ring, np.roll(ring, -1, axis=0)], axis=1))
-            start.append(start[-1] + sum(len(ring) for ring in surface.boundary))
-        edges, start = np.concatenate(edges), np.array(start)
-        owner = np.repeat(np.arange(len(surfaces)), np.diff(start))
-        points = origin[owner] + np.einsum("nij,nj->ni", rotation[owner][:, :, :2], edges[:, :2])
-        lower, upper = np.minimum.reduceat(points, start[:-1]), np.maximum.reduceat(points, start[:-1])
-        foot = np.array([surface.serves_foot for surface in surfaces])
+def surface_table(surfaces: Sequence[Surface], reach: float, cell: float = 0.1) -> SurfaceTable:
+    """Table of surfaces.
 
-        low, high = points[:, :2].min(0), points[:, :2].max(0)
-        cell = max(cell, float(np.sqrt((high - low + cell).prod() / _MAX_CELLS)))
-        corner = low - cell * (1.0 + _OFFSET)
-        shape = (np.ceil((high - corner) / cell) + 1).astype(np.int64)
-        index = _index(
-            origin, rotation, edges, start, np.flatnonzero(foot), lower[:, :2], upper[:, :2], corner, cell, shape, reach
-        )
-        return cls(
-            origin=origin,
-            rotation=rotation,
-            friction=np.array([surface.friction for surface in surfaces]),
-            foot=foot,
-            palm=np.array([surface.serves_palm for surface in surfaces]),
-            edges=edges,
-            edge_start=start,
-            centre=(lower + upper) / 2,
-            radius=np.linalg.norm(upper - lower, axis=1) / 2,
-            corner=corner,
-            cell=cell,
-            shape=shape,
-            **dict(zip(("entry_start", "entry_surface", "entry_inside", "near_start", "near"), index, strict=True)),
-        )
+    Args:
+        surfaces: of a world; at least one.
+        reach: m; distance from a patch's centre to its corners.
+        cell: m; wanted cell size; larger where the world would need too many cells.
+    """
+    origin = np.array([surface.pose.position for surface in surfaces]).reshape(-1, 3)
+    rotation = np.array([surface.pose.rotation for surface in surfaces]).reshape(-1, 3, 3)
+    edges, start = [], [0]
+    for surface in surfaces:
+        for ring in surface.boundary:
+            edges.append(np.concatenate([ring, np.roll(ring, -1, axis=0)], axis=1))
+        start.append(start[-1] + sum(len(ring) for ring in surface.boundary))
+    edges, start = np.concatenate(edges), np.array(start)
+    owner = np.repeat(np.arange(len(surfaces)), np.diff(start))
+    points = origin[owner] + np.einsum("nij,nj->ni", rotation[owner][:, :, :2], edges[:, :2])
+    lower, upper = np.minimum.reduceat(points, start[:-1]), np.maximum.reduceat(points, start[:-1])
+    foot = np.array([surface.serves_foot for surface in surfaces])
+
+    low, high = points[:, :2].min(0), points[:, :2].max(0)
+    cell = max(cell, float(np.sqrt((high - low + cell).prod() / _MAX_CELLS)))
+    corner = low - cell * (1.0 + _OFFSET)
+    shape = (np.ceil((high - corner) / cell) + 1).astype(np.int64)
+    index = _index(
+        origin, rotation, edges, start, np.flatnonzero(foot), lower[:, :2], upper[:, :2], corner, cell, shape, reach
+    )
+    return SurfaceTable(
+        origin=origin,
+        rotation=rotation,
+        friction=np.array([surface.friction for surface in surfaces]),
+        foot=foot,
+        palm=np.array([surface.serves_palm for surface in surfaces]),
+        edges=edges,
+        edge_start=start,
+        centre=(lower + upper) / 2,
+        radius=np.linalg.norm(upper - lower, axis=1) / 2,
+        corner=corner,
+        cell=cell,
+        shape=shape,
+        **dict(zip(("entry_start", "entry_surface", "entry_inside", "near_start", "near"), index, strict=True)),
+    )
 
 
 @numba.njit(cache=True)

@@ -1,0 +1,50 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
+from toolkit.geometry.limb import FEET
+from toolkit.geometry.pose import rotation_about_z, rotation_on_surface
+from toolkit.robot.loader import load_robot
+from toolkit.search.legs import LIMITS, legs_of, stances_violated, violated
+
+ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_same_verdict_as_the_closed_form(name):
+    robot = load_robot(name)
+    rng = np.random.default_rng(0)
+    n = 3000
+    margins = ReachMargins(length=0.01, ankle=0.05, hip=-0.02)
+    legs = legs_of(robot, margins)
+    seen = set()
+    for side, limb in enumerate(FEET):
+        com = np.array([0.0, 0.0, robot.com_height]) + rng.uniform(-0.25, 0.15, (n, 3))
+        yaw = rng.uniform(-3, 3, n)
+        normal = np.column_stack([rng.uniform(-0.4, 0.4, (n, 2)), np.ones(n)])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        rotation = rotation_on_surface(normal, yaw + rng.uniform(-0.8, 0.8, n))
+        offset = np.column_stack([rng.uniform(-0.4, 0.4, n), (1 - 2 * side) * rng.uniform(-0.1, 0.4, n), np.zeros(n)])
+        position = np.einsum("nij,nj->ni", rotation_about_z(yaw), offset) + [0, 0, 1] * rng.uniform(-0.1, 0.3, (n, 1))
+        leg = robot.legs[limb]
+        clearances = leg_clearances(leg, leg_posture(leg, com, yaw, position, rotation), margins)
+        stacked = np.stack([clearances[limit] for limit in LIMITS])
+        expected = np.where((stacked < 0).any(0), (stacked < 0).argmax(0), -1)
+        got = np.array([violated(legs, side, *com[i], yaw[i], position[i], rotation[i]) for i in range(n)])
+        np.testing.assert_array_equal(got, expected)
+        seen |= set(got.tolist())
+    assert {-1, 0, 1, 2} <= seen
+
+
+def test_a_lower_com_brings_long_strides_into_reach():
+    robot = load_robot(ROBOTS[0])
+    legs = legs_of(robot, ReachMargins(ankle=0.0))
+    reach = 0.45 * robot.legs[FEET[0]].max_length
+    y = robot.legs[FEET[0]].hip_in_com[1]
+    left, right = np.array([[reach, y, 0.0]]), np.array([[-reach, -y, 0.0]])
+    com, turn = np.array([[0.0, 0.0, robot.com_height]]), np.eye(3)[None]
+    high = stances_violated(legs, com, np.array([0.0]), np.zeros(1), left, turn, right, turn)
+    low = stances_violated(legs, com, np.array([0.0, 0.05, 0.1, 0.15, 0.2]), np.zeros(1), left, turn, right, turn)
+    assert LIMITS[high[0]] == "leg length" and low[0] == -1

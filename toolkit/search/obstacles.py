@@ -1,0 +1,90 @@
+"""Triangles of a world's colliding geometry, for the occupancy grid."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from toolkit.geometry.pose import Pose
+from toolkit.world.solids import height_field_triangles
+
+_SIDES = 16  # of a prism around a cylinder
+_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+_FACES = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
+    + [[1, 5, 7], [1, 7, 3]]
+)
+
+
+def world_triangles(model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Triangles of all colliding geoms that come near a box.
+
+    Rounded geoms stand as the boxes around them, cylinders as prisms around them.
+
+    Args:
+        model: the world compiled.
+        lower: (3,) m; corner of the box.
+        upper: (3,) m; the other corner.
+
+    Returns:
+        (t, 3, 3) float corners in the world frame.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    triangles = [np.zeros((0, 3, 3))]
+    for index in np.flatnonzero((model.geom_contype | model.geom_conaffinity) != 0).tolist():
+        pose = Pose(data.geom_xmat[index].reshape(3, 3), data.geom_xpos[index])
+        radius = model.geom_rbound[index]
+        if radius > 0 and ((pose.position + radius < lower) | (pose.position - radius > upper)).any():
+            continue
+        corners = _plane(pose, lower, upper) if radius == 0 else pose @ _local(model, index)
+        near = (corners.max(1) >= lower).all(1) & (corners.min(1) <= upper).all(1)
+        triangles.append(corners[near])
+    return np.concatenate(triangles)
+
+
+def _local(model: mujoco.MjModel, index: int) -> np.ndarray:
+    """(t, 3, 3) triangles of a bounded geom in its own frame."""
+    kind, size, types = model.geom_type[index], model.geom_size[index], mujoco.mjtGeom
+    if kind == types.mjGEOM_MESH:
+        mesh = int(model.geom_dataid[index])
+        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+        vertices = model.mesh_vert[first : first + count].astype(float)
+        return vertices[model.mesh_face[face : face + faces]]
+    if kind == types.mjGEOM_HFIELD:
+        points, faces = height_field_triangles(model, int(model.geom_dataid[index]))
+        return points[faces]
+    if kind == types.mjGEOM_CYLINDER:
+        angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
+        ring = size[0] / np.cos(np.pi / _SIDES) * np.column_stack([np.cos(angle), np.sin(angle)])
+        a, b = ring, np.roll(ring, -1, axis=0)
+        zero = np.zeros_like(a)
+        low, high = np.full((_SIDES, 1), -size[1]), np.full((_SIDES, 1), size[1])
+
+        def face(*corners):
+            return np.stack([np.column_stack(corner) for corner in corners], axis=1)
+
+        return np.concatenate(
+            [
+                face((a, low), (b, low), (b, high)),
+                face((a, low), (b, high), (a, high)),
+                face((zero, low), (a, low), (b, low)),
+                face((zero, high), (a, high), (b, high)),
+            ]
+        )
+    half = {
+        types.mjGEOM_BOX: size,
+        types.mjGEOM_ELLIPSOID: size,
+        types.mjGEOM_SPHERE: size[[0, 0, 0]],
+        types.mjGEOM_CAPSULE: [size[0], size[0], size[0] + size[1]],
+    }.get(mujoco.mjtGeom(int(kind)))
+    return np.zeros((0, 3, 3)) if half is None else (_CORNERS * half)[_FACES]
+
+
+def _plane(pose: Pose, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """(2, 3, 3) triangles of an infinite plane, as large as the box needs."""
+    centre = pose.inverse() @ ((lower + upper) / 2)
+    reach = float(np.linalg.norm(upper - lower)) * 2.0
+    square = centre * [1, 1, 0] + reach * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    return pose @ square[[[0, 1, 2], [0, 2, 3]]]
