@@ -58,14 +58,13 @@ def convex_partition(region: Polygon) -> list[np.ndarray]:
     return [_without_straight_corners(points[ring]) for ring in rings.values()]
 
 
-def convex_cover(region: Polygon, *, rounds: int = 16, limit: int = 64) -> list[np.ndarray]:
+def convex_cover(region: Polygon, *, limit: int = 64) -> list[np.ndarray]:
     """Convex polygons inside the region that cover it; they overlap where that makes them larger.
 
     Each piece of the partition pushes its inner edges outwards, one after the other, as far as it stays in the region.
 
     Args:
         region: polygon, holes allowed.
-        rounds: bisection steps for each edge.
         limit: with more pieces than this the partition is returned as it is.
 
     Returns:
@@ -76,7 +75,7 @@ def convex_cover(region: Polygon, *, rounds: int = 16, limit: int = 64) -> list[
         return partition
     shell = region.buffer(1e-7)  # a piece that touches the outline must count as inside
     shapely.prepare(shell)
-    grown = [_grown(Polygon(piece), shell, rounds) for piece in partition]
+    grown = [_grown(Polygon(piece), shell) for piece in partition]
     grown.sort(key=lambda piece: -piece.area)
     kept: list[Polygon] = []
     for piece in grown:
@@ -101,51 +100,52 @@ def _without_straight_corners(points: np.ndarray) -> np.ndarray:
     return points[turns] if turns.sum() >= 3 else points
 
 
-def _grown(piece: Polygon, shell: Polygon, rounds: int) -> Polygon:
-    """A convex piece with each edge pushed outwards as far as the piece stays inside `shell`."""
-    reach = float(np.hypot(*(np.array(shell.bounds[2:]) - shell.bounds[:2])))
-    for _ in range(len(piece.exterior.coords)):
+def _grown(piece: Polygon, shell: Polygon) -> Polygon:
+    """A convex piece with its inner edges, longest first, pushed outwards as far as it stays inside `shell`."""
+    for _ in range(2 * len(piece.exterior.coords)):
         ring = ring_points(piece)
-        best = piece
-        for index in range(len(ring)):
-            candidate = _push(ring, index, reach, shell, rounds)
-            if candidate is not None and candidate.area > best.area + 1e-6:
-                best = candidate
-        if best is piece:
-            break
-        piece = best
+        length = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+        for index in sorted(_inner_edges(ring, shell), key=lambda edge, by=length: -by[edge]):
+            larger = _pushed(ring, index, shell)
+            if larger.area > piece.area + 1e-6:
+                piece = larger
+                break
+        else:
+            return piece
     return piece
 
 
-def _push(ring: np.ndarray, index: int, reach: float, shell: Polygon, rounds: int) -> Polygon | None:
-    """The ring with edge `index` moved outwards as far as it stays inside; None where it cannot move at all."""
+def _inner_edges(ring: np.ndarray, shell: Polygon) -> list[int]:
+    """Edges (index of their first corner) with room beyond them at both ends and in the middle."""
+    along = np.roll(ring, -1, axis=0) - ring
+    length = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-12)
+    outward = np.column_stack([along[:, 1], -along[:, 0]]) / length[:, None]
+    room = np.ones(len(ring), bool)
+    for share in (0.05, 0.5, 0.95):
+        probe = ring + share * along + 1e-5 * outward
+        room &= shapely.contains_xy(shell, probe[:, 0], probe[:, 1])
+    return np.flatnonzero(room).tolist()
+
+
+def _pushed(ring: np.ndarray, index: int, shell: Polygon) -> Polygon:
+    """A convex ring with edge `index` moved outwards, parallel to itself, as far as the ring stays inside `shell`."""
     start, end = ring[index], ring[(index + 1) % len(ring)]
     along = (end - start) / np.linalg.norm(end - start)
     outward = np.array([along[1], -along[0]])
-    far = np.stack([start - reach * along, start + reach * along])
-    band = np.concatenate([far, far[::-1] + reach * outward])  # what lies beyond the edge
+    low, high = np.array(shell.bounds[:2]), np.array(shell.bounds[2:])
+    reach = float(np.hypot(*(high - low)))
+    band = np.concatenate([[start - reach * along, start + reach * along]] * 2)
+    band[2:] = band[3:1:-1] + reach * outward  # what lies beyond the edge
     for other in range(len(ring)):
         if other != index:
             band = _left_of(band, ring[other], ring[(other + 1) % len(ring)])
     if len(band) < 3:
-        return None
-    height = (band - start) @ outward
-
-    def moved(distance: float) -> Polygon:
-        # The part of the band up to `distance`, joined to the piece: convex, as both obey the same half planes.
-        top = start + distance * outward
-        kept = _left_of(band, top, top + along)
-        return Polygon(np.concatenate([ring, kept])).convex_hull if len(kept) < 3 else _hull(ring, kept)
-
-    low, high = 0.0, float(height.max())
-    if high <= 1e-6 or not shell.covers(moved(1e-5)):
-        return None
-    if shell.covers(moved(high)):
-        return moved(high)
-    for _ in range(rounds):
-        middle = (low + high) / 2
-        low, high = (middle, high) if shell.covers(moved(middle)) else (low, middle)
-    return moved(low) if low > 1e-6 else None
+        return Polygon(ring)
+    outside = shapely.get_coordinates(shapely.difference(Polygon(band), shell))
+    if len(outside):
+        limit = start + float(((outside - start) @ outward).min()) * outward
+        band = _left_of(band, limit, limit + along)
+    return _hull(ring, band)
 
 
 def _hull(first: np.ndarray, second: np.ndarray) -> Polygon:

@@ -31,7 +31,7 @@ class SurfaceConfig:
         flush_angle: rad; faces that are merged have normals within this.
         least_area: m^2; smaller regions are dropped.
         least_width: m; regions in which no circle of this diameter fits are dropped.
-        simplify: m; corners that deviate less from a straight outline are left out.
+        simplify: m; what covers a surface is widened by this, and its corners that stand out less are left out.
         plane_margin: m; infinite planes end this far beyond start and goal.
     """
 
@@ -43,7 +43,7 @@ class SurfaceConfig:
     flush_angle: float = np.radians(0.5)
     least_area: float = 3e-3
     least_width: float = 0.05
-    simplify: float = 2e-4
+    simplify: float = 1e-3
     plane_margin: float = 3.0
 
 
@@ -165,18 +165,18 @@ def _open_regions(face: Face, solids: Solids, config: SurfaceConfig) -> Iterator
     """Connected regions of a face that nothing covers, large enough for a contact; holes are kept."""
     if not _holds_contact(face.polygon, config):
         return
-    shadow = solids.shadow(face.frame, face.polygon.bounds, config.flush, config.clearance)
-    shapely.prepare(face.polygon)
-    shadow = shadow[shapely.intersects(face.polygon, shadow)] if len(shadow) else shadow
-    region = face.polygon
+    region = face.polygon.simplify(1e-6)
+    shadow = solids.shadow(face.frame, region.bounds, config.flush, config.clearance)
     if len(shadow):
-        region = shapely.difference(region, shapely.union_all(shadow))
-    for part in shapely.get_parts(region):
-        if not isinstance(part, Polygon) or not _holds_contact(part, config):
-            continue
-        # Slivers and hair-thin spikes of the difference go with an opening of a tenth of a millimetre.
-        simple = part.simplify(config.simplify)
-        for piece in shapely.get_parts(shapely.make_valid(simple)):
+        shapely.prepare(region)
+        shadow = shadow[shapely.intersects(region, shadow)]
+        shadow = shadow[shapely.area(shapely.intersection(region, shadow)) > 1e-7]
+    if len(shadow):
+        # Widened by what the outline may move when it is simplified: the result stays free.
+        cover = shapely.union_all(shadow).buffer(config.simplify, join_style="mitre")
+        region = shapely.difference(region, cover).simplify(config.simplify)
+    for part in shapely.get_parts(shapely.make_valid(region)):
+        for piece in shapely.get_parts(part):
             if isinstance(piece, Polygon) and _holds_contact(piece, config):
                 yield orient(shapely.remove_repeated_points(piece, 1e-6))
 

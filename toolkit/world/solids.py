@@ -155,7 +155,7 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
         points, faces, edges = _hull(_extruded(rectangle, -_DEEP, 0.0))
         return [(points, faces[(points[faces][..., 2] == 0.0).all(axis=1)], edges)]
     if kind == types.mjGEOM_BOX:
-        return [_hull(_extruded(size[:2] * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]), -size[2], size[2]))]
+        return [(_CUBE * size, _CUBE_FACES, _CUBE_EDGES)]
     if kind == types.mjGEOM_CYLINDER:
         angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
         circle = size[0] / np.cos(np.pi / _SIDES) * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -187,6 +187,11 @@ def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.asarray(hull.vertices), np.asarray(hull.faces), np.asarray(hull.edges_unique)
 
 
+_CUBE = np.array([[x, y, z] for z in (-1.0, 1.0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+_CUBE_EDGES = np.array([[i, (i + 1) % 4] for i in range(4)] * 2 + [[i, i + 4] for i in range(4)])
+_CUBE_EDGES[4:8] += 4
+_CUBE_QUADS = [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+_CUBE_FACES = np.array([[a, b, c] for a, b, c, _ in _CUBE_QUADS] + [[a, c, d] for a, _, c, d in _CUBE_QUADS])
 _PRISM_EDGES = np.array([[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]])
 _PRISM_TOP = np.array([[3, 4, 5]])
 
