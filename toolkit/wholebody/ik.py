@@ -57,7 +57,7 @@ class IKConfig:
     angular_momentum: float = 1.4
     velocity_fraction: float = 0.95
     range_margin: float = 0.02
-    min_knee: float = 0.2
+    min_knee: float = 0.12
 
 
 class WholeBodyIK:
