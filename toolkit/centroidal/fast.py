@@ -1,0 +1,149 @@
+"""The fast solver of centroidal problems: one contact transition in a millisecond, whole sequences in linear time.
+
+With the wrench at the centre of each patch as the unknown, the dynamics are linear and all constraints convex, so
+whether a motion exists is a convex question; only the objective is mildly nonconvex. See `toolkit.centroidal.kernels`.
+The first solution on a machine compiles the kernels (numba), which are then kept on disk.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numba import njit
+
+from toolkit.centroidal.kernels import interior_point, setup
+from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
+from toolkit.centroidal.residual import confirmed
+
+FIRST_KNOT_TOLERANCE = 1e-7
+"""m; how far the given first knot may violate reach or height."""
+STATUS = {
+    interior_point.SOLVED: "solved",
+    interior_point.INFEASIBLE: "infeasible: proved by multipliers",
+    interior_point.UNDECIDED: "undecided: iteration limit",
+    3: "infeasible: initial CoM out of reach",
+}
+
+
+@dataclass(frozen=True)
+class FastConfig:
+    """Settings of the fast solver.
+
+    Attributes:
+        tolerance: accepted suboptimality relative to the objective, to first order.
+        max_iterations: of the interior-point method.
+    """
+
+    tolerance: float = 1e-4
+    max_iterations: int = 80
+
+
+def solve(problem: CentroidalProblem, *, config: FastConfig | None = None) -> CentroidalMotion:
+    """Solve a problem of any length.
+
+    Returns:
+        The motion, checked by `toolkit.centroidal.residual`. Where `status` says infeasible, that has been proved.
+    """
+    start = perf_counter()
+    config = config or FastConfig()
+    p, w = problem, problem.weights
+    weights = np.array(
+        [
+            w.linear_momentum,
+            w.linear_momentum_rate,
+            w.angular_momentum,
+            w.angular_momentum_rate,
+            w.force,
+            w.torque,
+            w.lateral_force,
+            w.cop,
+        ]
+    )
+    landing = p.landing_limb >= 0
+    code, iterations, com, linear, angular, force, cop, torque = _kernel()(
+        config.tolerance,
+        config.max_iterations,
+        p.mass,
+        p.dt,
+        p.active,
+        p.position,
+        p.rotation,
+        p.friction,
+        p.half_size,
+        p.reduced_half_size,
+        p.max_normal_force,
+        p.yaw,
+        p.com,
+        p.com_velocity,
+        p.angular_momentum,
+        p.root_in_com,
+        p.tip_in_contact,
+        p.max_reach,
+        p.min_height,
+        p.final_center,
+        p.final_half_size,
+        p.final_at_rest,
+        weights,
+        p.margins.friction,
+        p.margins.yaw,
+        p.landing_limb,
+        p.landing_position if landing else np.zeros(3),
+        p.landing_rotation if landing else np.eye(3),
+    )
+    motion = CentroidalMotion(
+        problem=p,
+        feasible=False,
+        status=STATUS[code],
+        com=com,
+        linear_momentum=linear,
+        angular_momentum=angular,
+        force=force,
+        cop=cop,
+        yaw_torque=torque,
+        objective=np.inf,
+        seconds=perf_counter() - start,
+        iterations=iterations,
+    )
+    if code in (interior_point.SOLVED, interior_point.UNDECIDED):
+        motion = confirmed(motion)
+        object.__setattr__(motion, "seconds", perf_counter() - start)
+    return motion
+
+
+def solve_many(problems: Iterable[CentroidalProblem], *, config: FastConfig | None = None) -> list[CentroidalMotion]:
+    """Solve problems one after the other; call it in several threads or processes to use several cores."""
+    return [solve(problem, config=config) for problem in problems]
+
+
+@cache
+def _kernel() -> Callable:
+    """The compiled solver, from disk where its sources have not changed.
+
+    numba's disk cache watches the file of the compiled function only. A hash of all kernels' sources is captured by
+    the closure, and therefore part of the key.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(Path(setup.__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    sources = int.from_bytes(digest.digest()[:6], "little")
+
+    @njit(cache=True, nogil=True)
+    def run(tolerance, max_iterations, mass, dt, active, position, *arguments):
+        if sources < 0:  # never: makes the hash part of the closure
+            raise ValueError
+        data, violation = setup.pack(mass, dt, active, position, *arguments)
+        contacts, n = data.mu.shape[0], dt.shape[0]
+        u, x, w = np.zeros((contacts, 6)), np.zeros((n + 1, 9)), np.zeros((n, 6))
+        code, iterations = 3, 0
+        if violation <= FIRST_KNOT_TOLERANCE:
+            code, iterations = interior_point.solve(data, tolerance, max_iterations, u, x, w)
+        com = arguments[6]
+        return (code, iterations, *setup.unpack(data, active, mass, com, u, x))
+
+    return run

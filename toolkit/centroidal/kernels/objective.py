@@ -1,0 +1,137 @@
+"""The objective as weighted least squares: residuals, gradient and Gauss-Newton Hessian.
+
+The contacts' terms depend on one wrench each; the momenta's on a knot's state or on a step's (x, w). With the CoM
+averaged over a step, rbar = r + h/2 v + h^2/6 g, the rate of the angular momentum about the CoM is M - rbar x F.
+"""
+
+import numpy as np
+
+from toolkit.centroidal.kernels import compiled
+
+
+@compiled
+def rollout(data, u, x, w):
+    """Fill the states x (N + 1, 9) and the total wrenches w (N, 6) of contact wrenches u (C, 6)."""
+    x[0] = data.x0
+    for t in range(data.h.shape[0]):
+        h = data.h[t]
+        w[t] = 0.0
+        for j in range(data.first[t], data.first[t + 1]):
+            for a in range(6):
+                for b in range(6):
+                    w[t, a] += data.wrench[j, a, b] * u[j, b]
+        gravity = -1.0
+        for a in range(3):
+            acceleration = w[t, a] + (gravity if a == 2 else 0.0)
+            x[t + 1, a] = x[t, a] + h * x[t, 3 + a] + 0.5 * h * h * acceleration
+            x[t + 1, 3 + a] = x[t, 3 + a] + h * acceleration
+            x[t + 1, 6 + a] = x[t, 6 + a] + h * w[t, 3 + a]
+        # (h r + h^2/2 v + h^3/6 F) x g, with g = (0, 0, -1)
+        x[t + 1, 6] -= h * x[t, 1] + h * h / 2 * x[t, 4] + h**3 / 6 * w[t, 1]
+        x[t + 1, 7] += h * x[t, 0] + h * h / 2 * x[t, 3] + h**3 / 6 * w[t, 0]
+
+
+@compiled
+def contact_terms(data, t, j, u, gradient, hessian):
+    """Gradient (6,) and Gauss-Newton Hessian (6, 6) of the terms of contact j in step t; returns their value."""
+    omega, weights = data.omega[t], data.weights
+    weight_f, weight_lateral, weight_torque = omega * weights[4], omega * weights[6], omega * weights[5]
+    weight_x, weight_y = omega * data.cop_weight[j, 0], omega * data.cop_weight[j, 1]
+    inverse = 1.0 / u[2]
+    cop_x, cop_y = -u[4] * inverse, u[3] * inverse
+    twist = u[5] + (u[4] * u[1] + u[3] * u[0]) * inverse
+    # Row of the twist: d tau_n / d (fx, fy, fz, tx, ty, tz).
+    row = np.empty(6)
+    row[0], row[1], row[2] = u[3] * inverse, u[4] * inverse, -(twist - u[5]) * inverse
+    row[3], row[4], row[5] = u[0] * inverse, u[1] * inverse, 1.0
+    for a in range(6):
+        gradient[a] = weight_torque * twist * row[a]
+        for b in range(6):
+            hessian[a, b] = weight_torque * row[a] * row[b]
+    lateral = weight_f + weight_lateral
+    gradient[0] += lateral * u[0]
+    gradient[1] += lateral * u[1]
+    gradient[2] += weight_f * u[2] - (weight_x * cop_x * cop_x + weight_y * cop_y * cop_y) * inverse
+    gradient[4] -= weight_x * cop_x * inverse
+    gradient[3] += weight_y * cop_y * inverse
+    hessian[0, 0] += lateral
+    hessian[1, 1] += lateral
+    square = inverse * inverse
+    hessian[2, 2] += weight_f + (weight_x * cop_x * cop_x + weight_y * cop_y * cop_y) * square
+    hessian[4, 4] += weight_x * square
+    hessian[3, 3] += weight_y * square
+    hessian[2, 4] += weight_x * cop_x * square
+    hessian[4, 2] += weight_x * cop_x * square
+    hessian[2, 3] -= weight_y * cop_y * square
+    hessian[3, 2] -= weight_y * cop_y * square
+    value = lateral * (u[0] * u[0] + u[1] * u[1]) + weight_f * u[2] * u[2] + weight_torque * twist * twist
+    return 0.5 * (value + weight_x * cop_x * cop_x + weight_y * cop_y * cop_y)
+
+
+@compiled
+def knot_terms(omega, weights, x, gradient, hessian):
+    """Add to gradient (9,) and Hessian (9, 9) the terms |l|^2 and |k|^2 of a knot x, k = L - r x v; returns them."""
+    wl, wk = omega * weights[0], omega * weights[2]
+    k = np.empty(3)
+    jacobian = np.zeros((3, 9))
+    k[0] = x[6] - (x[1] * x[5] - x[2] * x[4])
+    k[1] = x[7] - (x[2] * x[3] - x[0] * x[5])
+    k[2] = x[8] - (x[0] * x[4] - x[1] * x[3])
+    # dk = dL + v x dr - r x dv
+    for c in range(2):
+        base, sign = (0, 1.0) if c == 0 else (3, -1.0)
+        other = 3 - base
+        jacobian[0, base + 1], jacobian[0, base + 2] = -sign * x[other + 2], sign * x[other + 1]
+        jacobian[1, base], jacobian[1, base + 2] = sign * x[other + 2], -sign * x[other]
+        jacobian[2, base], jacobian[2, base + 1] = -sign * x[other + 1], sign * x[other]
+    value = 0.0
+    for c in range(3):
+        jacobian[c, 6 + c] = 1.0
+        gradient[3 + c] += wl * x[3 + c]
+        hessian[3 + c, 3 + c] += wl
+        value += wl * x[3 + c] * x[3 + c] + wk * k[c] * k[c]
+        for a in range(9):
+            scaled = wk * jacobian[c, a]
+            gradient[a] += scaled * k[c]
+            for b in range(9):
+                hessian[a, b] += scaled * jacobian[c, b]
+    return 0.5 * value
+
+
+@compiled
+def step_terms(h, omega, weights, x, w, gradient, hessian):
+    """Gradient (15,) and Hessian (15, 15) in (x, w) of the terms |l'|^2 and |k'|^2 of a step; returns their value."""
+    wl, wk = omega * weights[1], omega * weights[3]
+    mean = np.empty(3)
+    for a in range(3):
+        mean[a] = x[a] + 0.5 * h * x[3 + a]
+    mean[2] -= h * h / 6
+    rate = np.empty(3)
+    rate[0] = w[3] - (mean[1] * w[2] - mean[2] * w[1])
+    rate[1] = w[4] - (mean[2] * w[0] - mean[0] * w[2])
+    rate[2] = w[5] - (mean[0] * w[1] - mean[1] * w[0])
+    # d rate = dM - mean x dF + F x (dr + h/2 dv)
+    jacobian = np.zeros((3, 15))
+    jacobian[0, 1], jacobian[0, 2] = -w[2], w[1]
+    jacobian[1, 0], jacobian[1, 2] = w[2], -w[0]
+    jacobian[2, 0], jacobian[2, 1] = -w[1], w[0]
+    jacobian[0, 10], jacobian[0, 11] = mean[2], -mean[1]
+    jacobian[1, 9], jacobian[1, 11] = -mean[2], mean[0]
+    jacobian[2, 9], jacobian[2, 10] = mean[1], -mean[0]
+    gradient[:] = 0.0
+    hessian[:] = 0.0
+    value = 0.0
+    for c in range(3):
+        jacobian[c, 12 + c] = 1.0
+        for a in range(3):
+            jacobian[c, 3 + a] = 0.5 * h * jacobian[c, a]
+        linear = w[c] - (1.0 if c == 2 else 0.0)
+        value += wl * linear * linear + wk * rate[c] * rate[c]
+        for a in range(15):
+            scaled = wk * jacobian[c, a]
+            gradient[a] += scaled * rate[c]
+            for b in range(15):
+                hessian[a, b] += scaled * jacobian[c, b]
+        gradient[9 + c] += wl * linear
+        hessian[9 + c, 9 + c] += wl
+    return 0.5 * value

@@ -1,0 +1,151 @@
+"""Random contact transitions of every category, for tests and benchmarks of the solvers.
+
+Contacts are tilted within 20 degrees, palms rest on walls beside the robot, CoM and velocity vary around plausible
+values, widely enough that both labels of feasibility occur. Training data come from the planner instead.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.centroidal.build import initial_com
+from toolkit.contacts.category import Category, category_of
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.pose import Pose, rotation_about_z, rotation_on_surface
+from toolkit.robot.model import RobotModel
+from toolkit.world.timing import Timing
+
+INITIAL_PALMS = {
+    Category.MOVE_FOOT: 0,
+    Category.ADD_PALM: 0,
+    Category.MOVE_INNER_FOOT_WITH_PALM: 1,
+    Category.MOVE_OUTER_FOOT_WITH_PALM: 1,
+    Category.BREAK_ONLY_PALM: 1,
+    Category.MOVE_ONLY_PALM: 1,
+    Category.ADD_OTHER_PALM: 1,
+    Category.MOVE_FOOT_WITH_PALMS: 2,
+    Category.BREAK_ONE_PALM: 2,
+    Category.MOVE_ONE_PALM: 2,
+}
+
+
+@dataclass(frozen=True)
+class SamplingConfig:
+    """Ranges of the samples.
+
+    Attributes:
+        tilt: rad; largest angle of a surface from horizontal (feet) or from a side wall (palms).
+        friction: lower and upper coefficient.
+        shift, swing: s; ranges of the timing.
+        com_spread: (3,) m; standard deviation of the CoM around home height above the mean feet.
+        speed_spread: m/s; standard deviation of each horizontal component (vertical: a third).
+    """
+
+    tilt: float = math.radians(20)
+    friction: tuple[float, float] = (0.5, 0.5)
+    shift: tuple[float, float] = (1.0, 1.0)
+    swing: tuple[float, float] = (1.0, 1.0)
+    com_spread: tuple[float, float, float] = (0.06, 0.05, 0.03)
+    speed_spread: float = 0.25
+
+
+@dataclass(frozen=True)
+class TransitionSample:
+    """A transition from a state.
+
+    Attributes:
+        stance: before the transition.
+        com: (3,) m.
+        com_velocity: (3,) m/s.
+        transition: what happens.
+    """
+
+    stance: Stance
+    com: np.ndarray
+    com_velocity: np.ndarray
+    transition: ContactTransition
+
+
+def sample_transition(
+    robot: RobotModel, category: Category, rng: np.random.Generator, config: SamplingConfig | None = None
+) -> TransitionSample:
+    """A random transition of a category, anywhere in the world and with any heading.
+
+    Args:
+        robot: its patches, reach and home height set the scale.
+        category: the category that the transition has.
+        rng: randomness.
+        config: ranges.
+    """
+    config = config or SamplingConfig()
+    friction = rng.uniform(*config.friction)
+    timing = Timing(rng.uniform(*config.shift), rng.uniform(*config.swing))
+    world_from_feet = Pose.from_yaw(rng.uniform([-5, -5, -1], [5, 5, 2]), rng.uniform(-math.pi, math.pi))
+    spacing = 2 * abs(robot.legs[Limb.LEFT_FOOT].hip_in_com[1])
+    forward = rng.uniform(-0.2, 0.2)
+    contacts = []
+    for foot in FEET:
+        side = 1 if foot.is_left else -1
+        place = np.array([side * forward / 2, side * rng.uniform(0.5, 0.9) * spacing, rng.uniform(-0.05, 0.05)])
+        contacts.append(_foot(foot, world_from_feet, place, rng.uniform(-0.35, 0.35), friction, rng, config))
+    stance = Stance(tuple(contacts))
+    palms = [Limb.LEFT_PALM, Limb.RIGHT_PALM] if rng.random() < 0.5 else [Limb.RIGHT_PALM, Limb.LEFT_PALM]
+    for palm in palms[: INITIAL_PALMS[category]]:
+        stance = stance.replace(_palm(robot, palm, stance.mean_feet, friction, rng, config))
+
+    transition = _transition(robot, stance, category, palms, timing, friction, rng, config)
+    if category_of(stance, transition) != category:
+        raise AssertionError(f"sampled {category_of(stance, transition)!r} instead of {category!r}")
+    heading = stance.mean_feet.rotation
+    com = initial_com(robot, stance) + heading @ (rng.normal(size=3) * config.com_spread)
+    velocity = heading @ (rng.normal(size=3) * np.array([1.0, 1.0, 1 / 3]) * config.speed_spread)
+    return TransitionSample(stance, com, velocity * rng.uniform(0, 1.5), transition)
+
+
+def _transition(robot, stance, category, palms, timing, friction, rng, config) -> ContactTransition:
+    """What moves, by category."""
+    if category in (Category.BREAK_ONLY_PALM, Category.BREAK_ONE_PALM):
+        return ContactTransition(palms[0], None, timing)
+    if category in (Category.ADD_PALM, Category.MOVE_ONLY_PALM, Category.ADD_OTHER_PALM, Category.MOVE_ONE_PALM):
+        palm = palms[1] if category == Category.ADD_OTHER_PALM else palms[0]
+        return ContactTransition(palm, _palm(robot, palm, stance.mean_feet, friction, rng, config), timing)
+    inner = Limb.LEFT_FOOT if palms[0].is_left else Limb.RIGHT_FOOT
+    foot = {
+        Category.MOVE_INNER_FOOT_WITH_PALM: inner,
+        Category.MOVE_OUTER_FOOT_WITH_PALM: inner.mirrored,
+    }.get(category, FEET[int(rng.integers(2))])
+    standing = stance[foot.mirrored].pose
+    world_from_standing = Pose.from_yaw(standing.position, standing.yaw)
+    side = 1 if foot.is_left else -1
+    place = np.array([rng.uniform(-0.3, 0.5), side * rng.uniform(0.15, 0.4), rng.uniform(-0.12, 0.12)])
+    contact = _foot(foot, world_from_standing, place, side * rng.uniform(-0.3, 0.5), friction, rng, config)
+    return ContactTransition(foot, contact, timing)
+
+
+def _foot(limb, world_from_frame, place, yaw, friction, rng, config) -> Contact:
+    """A foot at a place and yaw in an upright frame, on a tilted surface."""
+    tilt, azimuth = config.tilt * math.sqrt(rng.random()), rng.uniform(0, 2 * math.pi)
+    normal = np.array([math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)])
+    rotation = rotation_on_surface(normal, world_from_frame.yaw + yaw)
+    return Contact(limb, Pose(rotation, world_from_frame @ place), friction)
+
+
+def _palm(robot, limb, world_from_feet, friction, rng, config) -> Contact:
+    """A palm on a wall beside the robot, around the reach of the arm."""
+    arm, side = robot.arms[limb], 1 if limb.is_left else -1
+    ahead, up = math.radians(rng.uniform(-10, 60)), math.radians(rng.uniform(-20, 20))
+    ray = np.array([math.sin(ahead) * math.cos(up), side * math.cos(ahead) * math.cos(up), math.sin(up)])
+    shoulder = arm.shoulder_in_com + np.array([0.0, 0.0, robot.com_height])
+    place = shoulder + rng.uniform(0.5 * arm.max_reach, 1.02 * arm.max_reach) * ray
+    # Normal: towards the robot, turned about the vertical and tilted.
+    turn, tilt = rng.uniform(-config.tilt, config.tilt, 2)
+    normal = rotation_about_z(turn) @ np.array([0.0, -side * math.cos(tilt), math.sin(tilt)])
+    up_in_wall = np.array([0.0, 0.0, 1.0]) - normal[2] * normal
+    up_in_wall /= np.linalg.norm(up_in_wall)
+    rotation = np.column_stack([up_in_wall, np.cross(normal, up_in_wall), normal])
+    return Contact(limb, Pose(world_from_feet.rotation @ rotation, world_from_feet @ place), friction)
