@@ -14,7 +14,7 @@ from toolkit.contacts.stance import Contact
 from toolkit.report.meshes import static_bodies
 from toolkit.report.offscreen import OffscreenRenderer
 
-DISTANCE = 3.0  # m from the robot to the camera
+DISTANCE = 2.7  # m from the robot to the camera
 VIEWS = [
     (side * angle, elevation) for elevation in (-14.0, -35.0, -60.0) for angle in (65, 110, 150, 25) for side in (-1, 1)
 ]
@@ -106,7 +106,7 @@ class follow:
             times: (C,) s.
             smoothing: s over which the robot's position is averaged.
         """
-        self._target = _smoothed(qpos[:, _base(scene)], times, smoothing) - [0.0, 0.0, 0.1]
+        self._target = _smoothed(qpos[:, _base(scene)], times, smoothing) - [0.0, 0.0, 0.15]
         way = self._target[-1, :2] - self._target[0, :2]
         if np.linalg.norm(way) < 0.3:
             w, x, y, z = qpos[0, _base(scene).stop : _base(scene).stop + 4]
