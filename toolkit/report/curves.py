@@ -1,0 +1,65 @@
+"""Learning curves as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from toolkit.contacts.category import Category
+from toolkit.report.colors import EXECUTED, OPTIMISED, unit
+
+
+class CurveLike(Protocol):
+    """Losses per epoch, and the epoch that was kept; see `toolkit.prediction.fit.Curve` (which needs torch)."""
+
+    @property
+    def training(self) -> np.ndarray:
+        """(epochs,) losses on the training set."""
+        ...
+
+    @property
+    def validation(self) -> np.ndarray:
+        """(epochs,) losses on the validation set."""
+        ...
+
+    @property
+    def best(self) -> int:
+        """The epoch that was kept."""
+        ...
+
+
+def draw_curves(curves: Mapping[Category, Mapping[str, CurveLike]], path: Path) -> None:
+    """Write a picture of learning curves: a row per category, a column per network.
+
+    Args:
+        curves: category -> name of the network -> its curve.
+        path: file; the ending gives the format (png, pdf, svg).
+    """
+    columns = sorted({name for networks in curves.values() for name in networks})
+    rows = max(len(curves), 1)
+    figure = Figure(figsize=(4.5 * max(len(columns), 1), 2.0 * rows + 0.4), layout="constrained")
+    panels = figure.subplots(rows, max(len(columns), 1), squeeze=False)
+    for row, (category, networks) in enumerate(curves.items()):
+        for column, name in enumerate(columns):
+            axes = panels[row, column]
+            axes.set_title(f"{int(category)} {category.name.lower().replace('_', ' ')}: {name}", fontsize=8)
+            if name in networks:
+                _draw(axes, networks[name])
+    for axes in panels[-1]:
+        axes.set_xlabel("epoch")
+    FigureCanvasAgg(figure).print_figure(str(path), dpi=100)
+
+
+def _draw(axes, curve: CurveLike) -> None:
+    """One panel."""
+    axes.semilogy(curve.training, color=unit(OPTIMISED), label="training")
+    axes.semilogy(curve.validation, color=unit(EXECUTED), label="validation")
+    axes.axvline(curve.best, color="0.5", lw=0.8, ls="--", label="kept")
+    axes.grid(alpha=0.3)
+    axes.tick_params(labelsize=7)
+    axes.legend(fontsize=7)
