@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
@@ -82,11 +83,9 @@ def exclude_pairs(assembly: Assembly, pairs: Sequence[tuple[str, str]]) -> Assem
     """The same robot without contacts between pairs of its bodies."""
     if not pairs:
         return assembly
-    spec = mujoco.MjSpec.from_string(assembly.mjcf, assets=assembly.assets)
-    for first, second in pairs:
-        spec.add_exclude(bodyname1=first, bodyname2=second)
-    spec.compile()
-    mjcf = spec.to_xml()
+    lines = [f"<exclude body1={quoteattr(first)} body2={quoteattr(second)}/>" for first, second in pairs]
+    end = assembly.mjcf.rindex("</mujoco>")  # sections of one kind add up
+    mjcf = "\n    ".join([f"{assembly.mjcf[:end]}\n  <contact>", *lines]) + "\n  </contact>\n</mujoco>\n"
     return replace(assembly, mjcf=mjcf, mujoco_model=mujoco.MjModel.from_xml_string(mjcf, assembly.assets))
 
 

@@ -80,6 +80,8 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
 def arm_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> ArmGeometry:
     """An arm's reach around its shoulder, by bending the elbow alone.
 
+    The shoulder is where the second and third axes meet: the first may stand closer to the spine, as a clavicle does.
+
     Args:
         model: the robot alone; sites named after the limbs.
         data: forward kinematics and CoM of the home posture done.
@@ -97,7 +99,7 @@ def arm_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> ArmG
         raise RobotError(
             f"{limb.label}: {len(joints)} joints between the trunk and the palm; an arm needs four or more"
         )
-    shoulder, palm = _axes_crossing(data, joints[:3]), data.site_xpos[site]
+    shoulder, palm = _axes_crossing(data, joints[1:3]), data.site_xpos[site]
 
     def distances(joint: int) -> np.ndarray:
         home = data.qpos[model.jnt_qposadr[joint]]
@@ -153,19 +155,35 @@ def _chain(model: mujoco.MjModel, body: int) -> list[int]:
 
 
 def _arm_joints(model: mujoco.MjModel, limb: Limb) -> list[int]:
-    """Joints from the trunk to a palm; the trunk is the first body above that carries another limb."""
-    others = [
-        model.site(i).bodyid[0]
-        for i in range(model.nsite)
-        if model.site(i).name in {other.label for other in Limb if other != limb}
-    ]
-    carriers = set()
-    for other in others:
-        while other:
-            carriers.add(int(other))
-            other = model.body_parentid[other]
-    chain = _chain(model, model.site_bodyid[model.site(limb.label).id])
-    return [joint for joint in chain if int(model.jnt_bodyid[joint]) not in carriers]
+    """Joints from the trunk to a palm.
+
+    The trunk is the first body above the palm that carries another limb, or that carries other joints (a head, an arm
+    without palm) once the chain has the four joints of an arm.
+    """
+    trunk = {0}
+    for other in (item for item in Limb if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, item.label) >= 0):
+        body = model.site_bodyid[model.site(other.label).id]
+        while other != limb and body:
+            trunk.add(int(body))
+            body = model.body_parentid[body]
+    moving = {int(body) for body in model.jnt_bodyid}
+    joints: list[int] = []
+    body = int(model.site_bodyid[model.site(limb.label).id])
+    while body not in trunk:
+        first, count = model.body_jntadr[body], model.body_jntnum[body]
+        joints = [*range(first, first + count), *joints]
+        parent = int(model.body_parentid[body])
+        siblings = [b for b in range(1, model.nbody) if model.body_parentid[b] == parent and b != body]
+        if len(joints) >= 4 and any(_carries(model, sibling, moving) for sibling in siblings):
+            break
+        body = parent
+    return joints
+
+
+def _carries(model: mujoco.MjModel, body: int, moving: set[int]) -> bool:
+    """Whether a body or one below it has a joint."""
+    children = [b for b in range(body + 1, model.nbody) if model.body_parentid[b] == body]
+    return body in moving or any(_carries(model, child, moving) for child in children)
 
 
 def _leg_roles(model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], limb: Limb) -> dict[str, int]:

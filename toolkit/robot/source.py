@@ -21,7 +21,7 @@ class ModelSource:
 
     Attributes:
         path: the model file.
-        spec: its content; compiles, with absolute mesh and texture paths.
+        spec: its content, with absolute mesh and texture paths.
         velocity: joint -> rad/s, as far as the file says (URDF only: MuJoCo drops them).
     """
 
@@ -74,7 +74,7 @@ def read_model(path: Path) -> ModelSource:
         The model.
 
     Raises:
-        RobotError: not valid XML, neither MJCF nor URDF, a missing mesh, or MuJoCo cannot compile it.
+        RobotError: not valid XML, neither MJCF nor URDF, a missing mesh, or MuJoCo cannot parse it.
     """
     try:
         root = ElementTree.parse(path).getroot()
@@ -92,7 +92,6 @@ def read_model(path: Path) -> ModelSource:
             spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
             spec.compiler.fusestatic = False
         _absolute_files(spec, path.parent)
-        spec.compile()
     except ValueError as error:
         raise RobotError(f"{path}: MuJoCo cannot load it: {' '.join(str(error).split())}") from None
     return ModelSource(path, spec, velocity)
