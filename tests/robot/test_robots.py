@@ -1,0 +1,206 @@
+"""Every robot in robots/ against what it declares, and against what every stage relies on."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from fnmatch import fnmatchcase
+
+import mujoco
+import numpy as np
+import pytest
+
+from toolkit.geometry.limb import Limb
+from toolkit.robot.description import FILE_NAME, RobotDescription, read_description
+from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.model import RobotModel
+from toolkit.robot.picture import standing_scene
+
+
+@pytest.fixture(scope="module", params=find_robots())
+def robot(request: pytest.FixtureRequest) -> RobotModel:
+    return load_robot(request.param)
+
+
+@pytest.fixture(scope="module")
+def declared(robot: RobotModel) -> dict:
+    return description(robot).declared
+
+
+def description(robot: RobotModel) -> RobotDescription:
+    return read_description(robot.folder / FILE_NAME)
+
+
+def home_data(robot: RobotModel) -> mujoco.MjData:
+    data = mujoco.MjData(robot.mujoco_model)
+    data.qpos[:] = robot.home
+    mujoco.mj_forward(robot.mujoco_model, data)
+    return data
+
+
+def within(value: float, bounds: list[float]) -> bool:
+    return bounds[0] - 1e-9 <= value <= bounds[1] + 1e-9  # sums of masses carry rounding
+
+
+def test_some_robot_is_there() -> None:
+    assert find_robots()
+
+
+def test_declared_numbers(robot: RobotModel, declared: dict) -> None:
+    known = {"joints", "mass", "leg_mass", "thigh", "shin", "armature", "symmetric", "joint_limits"}
+    assert set(declared) <= known
+    model = robot.mujoco_model
+    if "joints" in declared:
+        assert len(robot.joint_names) == declared["joints"]
+    if "mass" in declared:
+        assert within(robot.mass, declared["mass"])
+    for leg in robot.legs.values():
+        for name in {"thigh", "shin"} & set(declared):
+            assert within(getattr(leg, name), declared[name])
+    if "armature" in declared:
+        assert all(within(value, declared["armature"]) for value in robot.armature)
+    if "leg_mass" in declared:
+        for foot in robot.legs:
+            body = model.body(robot.limbs[foot].body).id
+            while model.body_parentid[body] != 1:
+                body = model.body_parentid[body]
+            assert within(model.body_subtreemass[body], declared["leg_mass"])
+
+
+def test_declared_joint_limits(robot: RobotModel, declared: dict) -> None:
+    for pattern, (torque, slowest, fastest, lower, upper) in declared.get("joint_limits", {}).items():
+        matched = [i for i, name in enumerate(robot.joint_names) if fnmatchcase(name, pattern)]
+        assert matched, pattern
+        for i in matched:
+            assert robot.torque_limit[i] == torque
+            assert slowest <= robot.velocity_limit[i] <= fastest
+            assert (robot.lower[i], robot.upper[i]) == (lower, upper)
+
+
+def test_interface_of_the_model(robot: RobotModel) -> None:
+    model, n = robot.mujoco_model, len(robot.joint_names)
+    assert (model.nq, model.nv, model.nu) == (7 + n, 6 + n, n)
+    assert model.joint(0).name == "root_joint"
+    assert model.neq == model.ntendon == model.nkey == 0
+    np.testing.assert_array_equal(model.actuator_trnid[:, 0], np.arange(1, n + 1))
+    np.testing.assert_array_equal(model.actuator_gear[:, 0], 1.0)
+    np.testing.assert_array_equal(model.actuator_ctrlrange, np.c_[-robot.torque_limit, robot.torque_limit])
+    np.testing.assert_array_equal(model.actuator_forcerange, model.actuator_ctrlrange)
+    assert not model.actuator_biastype.any() and not model.actuator_dyntype.any()
+    assert not model.body_gravcomp.any()
+    assert not model.geom_priority.any(), "the world's friction must count"
+    assert {Limb.LEFT_FOOT, Limb.RIGHT_FOOT} <= set(robot.limbs)
+    for limb, item in robot.limbs.items():
+        assert item.site == limb.label
+        assert model.body(model.site(item.site).bodyid[0]).name == item.body
+    again = mujoco.MjModel.from_xml_string(robot.mjcf, robot.assets)
+    np.testing.assert_array_equal(again.body_mass, model.body_mass)
+
+
+def test_home_stands_on_its_soles(robot: RobotModel) -> None:
+    data, model = home_data(robot), robot.mujoco_model
+    feet = [data.site(robot.limbs[foot].site) for foot in robot.legs]
+    np.testing.assert_allclose([foot.xpos[2] for foot in feet], 0, atol=3e-3)
+    np.testing.assert_allclose([foot.xmat[8] for foot in feet], 1, atol=1e-3)
+    np.testing.assert_allclose(np.mean([foot.xpos for foot in feet], 0), 0, atol=1e-9)
+    assert feet[0].xpos[1] > feet[1].xpos[1]
+    assert data.subtree_com[1, 2] == pytest.approx(robot.com_height, abs=1e-12)
+    assert data.ncon == 0, "self-contact in the home posture"
+    assert (robot.home[7:] >= robot.lower).all() and (robot.home[7:] <= robot.upper).all()
+    half = robot.half_sizes[0, 0]
+    assert abs(data.subtree_com[1, 0]) < half / 2
+    assert model.body_subtreemass[1] == pytest.approx(robot.mass)
+
+
+def test_nothing_is_lower_than_the_soles(robot: RobotModel) -> None:
+    model = standing_scene(robot)
+    data = mujoco.MjData(model)
+    data.qpos[:] = robot.home
+    mujoco.mj_forward(model, data)
+    touching = {model.body(model.geom_bodyid[max(pair)]).name for pair in data.contact.geom}
+    assert touching <= {robot.limbs[foot].body for foot in robot.legs}
+    assert (data.contact.dist > -3e-3).all()
+
+
+def test_patches_lie_on_shapes(robot: RobotModel) -> None:
+    """The corners of every patch touch a collision shape of its body, and none of them sticks out beyond."""
+    data, model = home_data(robot), robot.mujoco_model
+    for limb, item in robot.limbs.items():
+        site, body = data.site(item.site), model.body(item.body).id
+        rotation = site.xmat.reshape(3, 3)
+        for x, y in ((0.9, 0.9), (0.9, -0.9), (-0.9, 0.9), (-0.9, -0.9)):
+            corner = site.xpos + rotation @ np.array([x, y, 0] * np.append(item.half_size, 0))
+            outside = corner - 0.05 * rotation[:, 2]  # a ray from the touched surface into the limb
+            hit = np.zeros(1, np.int32)
+            distance = mujoco.mj_ray(model, data, outside, rotation[:, 2], None, 1, -1, hit)
+            assert hit[0] >= 0 and model.geom_bodyid[hit[0]] == body, limb.label
+            assert distance == pytest.approx(0.05, abs=3e-3), limb.label
+
+
+def test_left_mirrors_right(robot: RobotModel, declared: dict) -> None:
+    if not declared.get("symmetric"):
+        pytest.skip("does not declare symmetry")
+    data, model = home_data(robot), robot.mujoco_model
+    assert abs(data.subtree_com[1, 1]) < 1e-9
+    mirror = np.array([1, -1, 1])
+    sides = [b for b in range(1, model.nbody) if "left" in model.body(b).name]
+    assert sides
+    for body in sides:
+        other = model.body(model.body(body).name.replace("left", "right")).id
+        assert model.body_mass[body] == model.body_mass[other]
+        np.testing.assert_allclose(data.xpos[body] * mirror, data.xpos[other], atol=1e-9)
+        np.testing.assert_allclose(data.xipos[body] * mirror, data.xipos[other], atol=1e-9)
+        np.testing.assert_allclose(np.sort(model.body_inertia[body]), np.sort(model.body_inertia[other]), atol=1e-9)
+    for limb in robot.limbs:
+        left, right = robot.limbs[limb], robot.limbs[limb.mirrored]
+        np.testing.assert_array_equal(left.half_size, right.half_size)
+    left, right = robot.legs[Limb.LEFT_FOOT], robot.legs[Limb.RIGHT_FOOT]
+    np.testing.assert_allclose(left.hip_in_com * mirror, right.hip_in_com, atol=1e-9)
+    for role, (low, high) in left.ranges.items():
+        expected = (-high, -low) if role.endswith(("yaw", "roll")) else (low, high)
+        np.testing.assert_allclose(right.ranges[role], expected, atol=1e-9)
+
+
+def test_leg_geometry_predicts_the_ankle(robot: RobotModel) -> None:
+    """Two links from the hip centre and the knee's angle give the distance of the joint centres in MuJoCo."""
+    data, model = home_data(robot), robot.mujoco_model
+    for foot, leg in robot.legs.items():
+        base = data.xmat[1].reshape(3, 3)
+        hip = data.subtree_com[1] + base @ leg.hip_in_com
+        site = data.site(robot.limbs[foot].site)
+        ankle = site.xpos + site.xmat.reshape(3, 3) @ leg.ankle_in_sole
+        distance = np.linalg.norm(hip - ankle)
+        assert leg.min_length < distance < leg.max_length
+        assert leg.max_length < leg.thigh + leg.shin
+        assert 0.5 < leg.thigh / leg.shin < 2
+        assert leg.ranges["knee"][1] > 1.0
+        assert min(leg.torques.values()) > 0
+    assert model.nbody > 1
+
+
+@pytest.mark.parametrize("seconds", [1.0, pytest.param(5.0, marks=pytest.mark.slow)])
+def test_stands_under_joint_control(robot: RobotModel, seconds: float) -> None:
+    """Joint PD with half the weight on each sole as feed-forward keeps every robot up."""
+    model = standing_scene(robot, friction=0.5)
+    data = mujoco.MjData(model)
+    data.qpos[:] = robot.home
+    mujoco.mj_forward(model, data)
+    feed, jacobian = data.qfrc_bias.copy(), np.zeros((3, model.nv))
+    for foot in robot.legs:
+        mujoco.mj_jacSite(model, data, jacobian, None, model.site(robot.limbs[foot].site).id)
+        feed -= jacobian.T @ np.array([0, 0, robot.mass * 9.81 / 2])
+    while data.time < seconds:
+        error = robot.home[7:] - data.qpos[7:]
+        data.ctrl[:] = feed[6:] + robot.kp * error - robot.kd * data.qvel[6:]
+        mujoco.mj_step(model, data)
+    tilt = np.arccos(np.clip(data.xmat[1, 8], -1, 1)) - np.arccos(np.clip(home_data(robot).xmat[1, 8], -1, 1))
+    assert abs(tilt) < 0.03
+    assert abs(data.qpos[2] - robot.home[2]) < 0.01
+    assert np.abs(data.actuator_force / robot.torque_limit).max() < 0.8
+
+
+def test_model_is_cheap_to_import() -> None:
+    """The shared data object must not drag in Pinocchio, placo or the loader."""
+    code = "import sys, toolkit.robot.model; print(*(m for m in ('placo', 'pinocchio', 'casadi') if m in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
