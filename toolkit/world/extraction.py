@@ -29,8 +29,8 @@ class SurfaceConfig:
         flush: m; geometry up to this height above a surface does not cover it, and faces of equal friction whose
             planes differ by less and that are no further apart are one surface.
         flush_angle: rad; faces that are merged have normals within this.
-        least_area: m^2; smaller regions are dropped.
-        least_width: m; regions in which no circle of this diameter fits are dropped.
+        foot_area, palm_area: m^2; smaller regions are dropped.
+        foot_width, palm_width: m; regions in which no circle of this diameter fits are dropped.
         simplify: m; what covers a surface is widened by this, and its corners that stand out less are left out.
         plane_margin: m; infinite planes end this far beyond start and goal.
     """
@@ -41,8 +41,10 @@ class SurfaceConfig:
     clearance: float = 0.15
     flush: float = 1e-3
     flush_angle: float = np.radians(0.5)
-    least_area: float = 3e-3
-    least_width: float = 0.05
+    foot_area: float = 0.01
+    palm_area: float = 3e-3
+    foot_width: float = 0.06
+    palm_width: float = 0.05
     simplify: float = 1e-3
     plane_margin: float = 3.0
 
@@ -163,7 +165,7 @@ def _sealed(shapes: list[Polygon], gap: float) -> Polygon:
 
 def _open_regions(face: Face, solids: Solids, config: SurfaceConfig) -> Iterator[Polygon]:
     """Connected regions of a face that nothing covers, large enough for a contact; holes are kept."""
-    if not _holds_contact(face.polygon, config):
+    if not _holds_contact(face.polygon, face.frame.normal, config):
         return
     region = face.polygon.simplify(1e-6)
     shadow = solids.shadow(face.frame, region.bounds, config.flush, config.clearance)
@@ -177,13 +179,16 @@ def _open_regions(face: Face, solids: Solids, config: SurfaceConfig) -> Iterator
         region = shapely.difference(region, cover).simplify(config.simplify)
     for part in shapely.get_parts(shapely.make_valid(region)):
         for piece in shapely.get_parts(part):
-            if isinstance(piece, Polygon) and _holds_contact(piece, config):
+            if isinstance(piece, Polygon) and _holds_contact(piece, face.frame.normal, config):
                 yield orient(shapely.remove_repeated_points(piece, 1e-6))
 
 
-def _holds_contact(region: Polygon, config: SurfaceConfig) -> bool:
-    """Whether a region is large and wide enough."""
-    if region.area < config.least_area:
+def _holds_contact(region: Polygon, normal: np.ndarray, config: SurfaceConfig) -> bool:
+    """Whether a region is large and wide enough for what it serves."""
+    foot, palm = _serves(normal, config)
+    area = min(config.foot_area if foot else np.inf, config.palm_area if palm else np.inf)
+    width = min(config.foot_width if foot else np.inf, config.palm_width if palm else np.inf)
+    if region.area < area:
         return False
-    # Mitred: an inset rectangle of exactly the least width must not be lost to rounding.
-    return not region.buffer(-(config.least_width / 2 - 1e-6), join_style="mitre").is_empty
+    # A little less than the width, and mitred: a rectangle of exactly that width must not be lost to rounding.
+    return not region.buffer(1e-6 - width / 2, join_style="mitre").is_empty

@@ -46,7 +46,7 @@ def load_world(path: Path | str, *, mjcf: str | None = None, config: SurfaceConf
     if not any(surface.serves_foot for surface in surfaces):
         raise WorldError(
             f"{path}: no usable surface for feet; add a static colliding geom with a free flat top of at least "
-            f"{config.least_area:g} m^2, tilted less than {np.degrees(config.foot_angle):g} degrees"
+            f"{config.foot_area:g} m^2, tilted less than {np.degrees(config.foot_angle):g} degrees"
         )
     _check_ground(path, start, surfaces)
     return World(path.stem, path, model, surfaces, start, goal, timing, square=square, mjcf=mjcf)

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import shapely
 import trimesh
+from scipy.spatial import ConvexHull
 
 from toolkit.geometry.pose import Pose
 
@@ -161,11 +162,11 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
         circle = size[0] / np.cos(np.pi / _SIDES) * np.column_stack([np.cos(angle), np.sin(angle)])
         return [_hull(_extruded(circle, -size[1], size[1]))]
     if kind == types.mjGEOM_SPHERE:
-        return [_hull(trimesh.creation.icosphere(subdivisions=3, radius=size[0]).vertices)]
+        return [_hull(_ball() * size[0])]
     if kind == types.mjGEOM_ELLIPSOID:
-        return [_hull(trimesh.creation.icosphere(subdivisions=3).vertices * size)]
+        return [_hull(_ball() * size)]
     if kind == types.mjGEOM_CAPSULE:
-        ball = np.asarray(trimesh.creation.icosphere(subdivisions=3, radius=size[0]).vertices)
+        ball = _ball() * size[0]
         return [_hull(np.concatenate([ball + [0, 0, size[1]], ball - [0, 0, size[1]]]))]
     if kind == types.mjGEOM_MESH:
         mesh = int(model.geom_dataid[index])
@@ -176,15 +177,28 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
     return []
 
 
+def _ball() -> np.ndarray:
+    """(642, 3) points, evenly spread, of the unit sphere."""
+    return np.asarray(trimesh.creation.icosphere(subdivisions=3).vertices)
+
+
 def _extruded(ring: np.ndarray, low: float, high: float) -> np.ndarray:
     """(2 k, 3) vertices of a prism over a ring (k, 2)."""
     return np.concatenate([np.column_stack([ring, np.full(len(ring), z)]) for z in (low, high)])
 
 
 def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices, triangles and edges of a convex hull."""
-    hull = trimesh.convex.convex_hull(np.asarray(points, float))
-    return np.asarray(hull.vertices), np.asarray(hull.faces), np.asarray(hull.edges_unique)
+    """Vertices, triangles (counterclockwise from outside) and edges of a convex hull."""
+    hull = ConvexHull(points)
+    points, index = points[hull.vertices], np.full(len(points), -1)
+    index[hull.vertices] = np.arange(len(hull.vertices))
+    faces = index[hull.simplices]
+    corners = points[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inwards = (normal * hull.equations[:, :3]).sum(axis=1) < 0
+    faces[inwards] = faces[inwards, ::-1]
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    return points, faces, np.unique(edges, axis=0)
 
 
 _CUBE = np.array([[x, y, z] for z in (-1.0, 1.0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])

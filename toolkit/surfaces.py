@@ -1,0 +1,67 @@
+"""Command line: show the contact surfaces of a world."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+from toolkit import cli
+
+DESCRIPTION = """\
+Show the contact surfaces that are extracted from a world: a table, and a recording for the rerun viewer.
+"""
+
+EPILOG = """\
+examples:
+  python -m toolkit.surfaces worlds/stairs.xml
+  python -m toolkit.surfaces my_world.xml --out look     # then: rerun look/surfaces.rrd
+"""
+
+RECORDING = "surfaces.rrd"
+
+
+def arguments() -> argparse.ArgumentParser:
+    """The options of this command."""
+    parser = cli.parser("surfaces", DESCRIPTION, EPILOG)
+    parser.add_argument("world", type=Path, help="MJCF scene with sites named start and goal")
+    parser.add_argument("--out", type=Path, metavar="DIR", help=f"folder for {RECORDING} (default: table only)")
+    return parser
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; returns the exit code.
+
+    Raises:
+        WorldError: the world cannot be used.
+        InputError: the recording cannot be written.
+    """
+    args = arguments().parse_args(argv)
+    from toolkit.errors import InputError
+    from toolkit.report.console import make_console
+    from toolkit.report.surfaces import surface_table, write_surface_recording
+    from toolkit.world.loader import load_world
+
+    world = load_world(args.world)
+    console = make_console()
+    console.print(surface_table(world))
+    if args.out is None:
+        return 0
+    draft = args.out / f".{RECORDING}.tmp"
+    made = [folder for folder in (args.out, *args.out.parents) if not folder.exists()]
+    try:
+        args.out.mkdir(parents=True, exist_ok=True)
+        write_surface_recording(draft, world)
+        os.replace(draft, args.out / RECORDING)
+    except OSError as error:
+        draft.unlink(missing_ok=True)
+        for folder in made:
+            if folder.exists():
+                folder.rmdir()
+        raise InputError(f"{args.out}: cannot be written ({error.strerror or error}); choose another --out") from error
+    console.print(f"written to {args.out / RECORDING}", soft_wrap=True, markup=False)
+    return 0
+
+
+if __name__ == "__main__":
+    cli.run(main)

@@ -1,0 +1,91 @@
+"""Command line: write a random world."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import os
+import sys
+from pathlib import Path
+
+from toolkit import cli
+
+DESCRIPTION = """\
+Write a world of tilted tiles, stairs, a gap, a slope or one mesh as an MJCF file.
+
+The same kind, seed and options give the same file.
+"""
+
+EPILOG = """\
+examples:
+  python -m toolkit.terrain rubble_corridor --seed 7 --out corridor.xml
+  python -m toolkit.terrain slope --length 2 --angle 25 --out slope.xml
+  python -m toolkit.terrain stairs --help
+"""
+
+
+def _finite(text: str) -> float:
+    """An argparse type: a finite number."""
+    value = float(text)
+    if not abs(value) < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+    return value
+
+
+def arguments() -> argparse.ArgumentParser:
+    """The options of this command: those of each generator are its keyword arguments."""
+    from toolkit.world.generators import KINDS
+
+    parser = cli.parser("terrain", DESCRIPTION, EPILOG)
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND", help=", ".join(KINDS))
+    for kind, generator in KINDS.items():
+        text = inspect.getdoc(generator) or ""
+        options = kinds.add_parser(kind, description=text.splitlines()[0])
+        options.add_argument("--seed", type=int, default=0, help="of everything random (default: 0)")
+        options.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: standard output)")
+        described = dict(line.strip().split(": ", 1) for line in text.splitlines() if ": " in line)
+        for name, parameter in inspect.signature(generator, eval_str=True).parameters.items():
+            if parameter.kind is not inspect.Parameter.KEYWORD_ONLY:
+                continue
+            options.add_argument(
+                f"--{name.replace('_', '-')}",
+                type=cli.positive(int) if parameter.annotation is int else _finite,
+                default=parameter.default,
+                help=f"{described[name].rstrip('.')} (default: {parameter.default:g})",
+            )
+    return parser
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Write the world; returns the exit code.
+
+    Raises:
+        InputError: the options make no world, or the file cannot be written.
+    """
+    options = vars(arguments().parse_args(argv))
+    import numpy as np
+
+    from toolkit.errors import InputError
+    from toolkit.world.generators import KINDS
+    from toolkit.world.loader import load_world
+
+    kind, seed, out = options.pop("kind"), options.pop("seed"), options.pop("out")
+    if seed < 0:
+        raise InputError(f"--seed {seed}: give a whole number from 0 on")
+    text = KINDS[kind](np.random.default_rng(seed), **options)
+    load_world(out or Path(f"{kind}.xml"), mjcf=text)  # what is written can be used
+    if out is None:
+        sys.stdout.write(text)
+        return 0
+    draft = out.with_name(f".{out.name}.tmp")
+    try:
+        draft.write_text(text)
+        os.replace(draft, out)
+    except OSError as error:
+        draft.unlink(missing_ok=True)
+        raise InputError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
+    return 0
+
+
+if __name__ == "__main__":
+    cli.run(main)

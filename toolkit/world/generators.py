@@ -1,0 +1,373 @@
+"""Seeded generators of terrain: each returns a world as MJCF text.
+
+The four of the paper keep its figures: tiles of 0.4 m whose roll and pitch are drawn independently, so that a tile's
+whole tilt can exceed both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from toolkit.world.authoring import THICKNESS, WorldText
+from toolkit.world.mesh_terrain import mesh_terrain
+
+
+def rubble_field(
+    rng: np.random.Generator,
+    *,
+    rows: int = 4,
+    columns: int = 3,
+    tile: float = 0.4,
+    tilt: float = 20.0,
+    rise: float = 0.05,
+    friction: float = 0.5,
+    shift: float = 0.6,
+    swing: float = 0.8,
+) -> str:
+    """Tilted tiles between two platforms; the goal is 3.42 m away with the default four rows.
+
+    Args:
+        rng: source of the tilts and heights.
+        rows: tiles along x.
+        columns: tiles along y.
+        tile: m; edge of a tile.
+        tilt: deg; roll and pitch lie within this, independently.
+        rise: m; heights lie within this.
+        friction: sliding coefficient.
+        shift: s.
+        swing: s.
+
+    Returns:
+        MJCF text with rows * columns + 2 surfaces for feet.
+    """
+    begin = 0.85
+    end = begin + rows * tile
+    world = WorldText(
+        "rubble_field",
+        f"{rows} x {columns} tiles of {tile:g} m, roll and pitch within {tilt:g} degrees, between two platforms",
+        friction,
+        (shift, swing),
+        (0.0, 0.0, 0.0),
+        (end + 0.97, 0.0, 0.0),
+    )
+    world.platform("platform_start", (-0.6, begin), columns * tile)
+    _tiles(world, rng, begin, rows, columns, (tile, tile), tilt, rise)
+    world.platform("platform_goal", (end, end + 1.5), columns * tile)
+    return world.render()
+
+
+def rubble_corridor(
+    rng: np.random.Generator,
+    *,
+    rows: int = 5,
+    columns: int = 3,
+    tilt: float = 20.0,
+    rise: float = 0.05,
+    wall: float = 0.7,
+    wall_tilt: float = 20.0,
+    friction: float = 0.5,
+    shift: float = 0.6,
+    swing: float = 0.8,
+) -> str:
+    """Tilted tiles of 0.4 x 0.3 m between walls of tilted panels of 0.4 m, one every 0.5 m along and up to z = 1.5.
+
+    Args:
+        rng: source of the tilts and heights.
+        rows: tiles along x.
+        columns: tiles along y.
+        tilt: deg; roll and pitch of a tile lie within this.
+        rise: m; heights of tiles lie within this.
+        wall: m; |y| of the panels' centres.
+        wall_tilt: deg; a panel is turned about x and about z within this.
+        friction: sliding coefficient.
+        shift: s.
+        swing: s.
+
+    Returns:
+        MJCF text.
+    """
+    begin, (length, width) = 0.6, (0.4, 0.3)
+    end = begin + rows * length
+    world = WorldText(
+        "rubble_corridor",
+        f"{rows} x {columns} tiles of {length:g} x {width:g} m between walls of tilted panels",
+        friction,
+        (shift, swing),
+        (0.0, 0.0, 0.0),
+        (end + 0.6, 0.0, 0.0),
+    )
+    world.platform("platform_start", (-0.6, begin), columns * width)
+    _tiles(world, rng, begin, rows, columns, (length, width), tilt, rise)
+    world.platform("platform_goal", (end, end + 1.2), columns * width)
+    for side, name in ((1.0, "left"), (-1.0, "right")):
+        for column, x in enumerate(np.arange(begin - 0.5, end + 0.5 + 1e-9, 0.5)):
+            for row, z in enumerate((0.3, 0.8, 1.3)):
+                angles = rng.uniform(-wall_tilt, wall_tilt, 2)
+                inwards = Rotation.from_euler("x", side * 90.0, degrees=True)
+                turn = Rotation.from_euler("xz", angles, degrees=True) * inwards
+                world.tile(
+                    f"panel_{name}_{column}_{row}", (0.4, 0.4), (x, side * wall, z), material="panel", rotation=turn
+                )
+    return world.render()
+
+
+def stepping_stones(
+    rng: np.random.Generator,
+    *,
+    rows: int = 5,
+    columns: int = 3,
+    stone: float = 0.36,
+    gap: float = 0.06,
+    tilt: float = 12.0,
+    rise: float = 0.03,
+    friction: float = 0.7,
+    shift: float = 0.6,
+    swing: float = 0.8,
+) -> str:
+    """Stones with gaps between them, each tilted about a random level axis.
+
+    Args:
+        rng: source of the tilts and heights.
+        rows: stones along x.
+        columns: stones along y.
+        stone: m; edge of a stone.
+        gap: m; between stones.
+        tilt: deg; a stone's whole tilt lies within this.
+        rise: m; heights lie within this.
+        friction: sliding coefficient.
+        shift: s.
+        swing: s.
+
+    Returns:
+        MJCF text.
+    """
+    begin, pitch = 0.4, stone + gap
+    end = begin + gap + rows * pitch
+    world = WorldText(
+        "stepping_stones",
+        f"{rows} x {columns} stones of {stone:g} m, tilted up to {tilt:g} degrees, {gap:g} m apart",
+        friction,
+        (shift, swing),
+        (0.0, 0.0, 0.0),
+        (end + 0.4, 0.0, 0.0),
+    )
+    width = columns * pitch - gap
+    world.platform("platform_start", (-0.6, begin), width)
+    for row in range(rows):
+        for column in range(columns):
+            bearing, angle = rng.uniform(0, 2 * np.pi), np.radians(rng.uniform(0.0, tilt))
+            centre = (
+                begin + gap + stone / 2 + row * pitch,
+                (column - (columns - 1) / 2) * pitch,
+                rng.uniform(-rise, rise),
+            )
+            turn = Rotation.from_rotvec(angle * np.array([np.cos(bearing), np.sin(bearing), 0.0]))
+            world.tile(f"stone_{row}_{column}", (stone, stone), centre, rotation=turn)
+    world.platform("platform_goal", (end, end + 1.0), width)
+    return world.render()
+
+
+def stairs(
+    rng: np.random.Generator,
+    *,
+    steps: int = 4,
+    step_height: float = 0.12,
+    tread: float = 0.32,
+    width: float = 1.2,
+    friction: float = 0.7,
+    shift: float = 0.4,
+    swing: float = 0.6,
+) -> str:
+    """A flight of stairs upwards to a landing.
+
+    Args:
+        rng: not used; stairs are regular.
+        steps: number of steps, the landing included.
+        step_height: m; negative for stairs downwards.
+        tread: m; depth of a step.
+        width: m.
+        friction: sliding coefficient.
+        shift: s.
+        swing: s.
+
+    Returns:
+        MJCF text.
+    """
+    del rng
+    begin = 0.45
+    end = begin + (steps - 1) * tread
+    top = steps * step_height
+    world = WorldText(
+        "stairs",
+        f"{steps} steps of {step_height:g} m, treads of {tread:g} m",
+        friction,
+        (shift, swing),
+        (0.0, 0.0, 0.0),
+        (end + 0.65, 0.0, top),
+        abyss=min(0.0, top) - 0.1,
+    )
+    base = min(0.0, top) - 0.1
+    edges = [-0.8, *(begin + tread * np.arange(steps)), end + 1.4]
+    for index, (left, right) in enumerate(zip(edges, edges[1:], strict=False)):
+        height = index * step_height
+        name = "floor" if index == 0 else f"step_{index}" if index < steps else "landing"
+        world.box(name, (right - left, width, height - base), ((left + right) / 2, 0.0, (height + base) / 2))
+    return world.render()
+
+
+def gap(
+    rng: np.random.Generator,
+    *,
+    width: float = 0.5,
+    friction: float = 0.5,
+    shift: float = 0.6,
+    swing: float = 0.8,
+) -> str:
+    """Two platforms with a gap between them.
+
+    Args:
+        rng: not used.
+        width: m; of the gap.
+        friction: sliding coefficient.
+        shift: s.
+        swing: s.
+
+    Returns:
+        MJCF text.
+    """
+    del rng
+    edge = 0.6
+    world = WorldText(
+        "wide_gap",
+        f"two platforms, {width:g} m apart",
+        friction,
+        (shift, swing),
+        (0.0, 0.0, 0.0),
+        (edge + width + 0.7, 0.0, 0.0),
+    )
+    world.platform("platform_start", (-0.6, edge), 1.2)
+    world.platform("platform_goal", (edge + width, edge + width + 1.3), 1.2)
+    return world.render()
+
+
+def slope(
+    rng: np.random.Generator,
+    *,
+    length: float = 3.0,
+    angle: float = 30.0,
+    width: float = 1.0,
+    friction: float = 0.5,
+    shift: float = 0.05,
+    swing: float = 0.35,
+) -> str:
+    """A slope downwards, level above and below.
+
+    Args:
+        rng: not used.
+        length: m; along the slope.
+        angle: deg; negative for a slope upwards.
+        width: m.
+        friction: sliding coefficient.
+        shift: s.
+        swing: s.
+
+    Returns:
+        MJCF text.
+    """
+    del rng
+    edge, tilt = 0.4, np.radians(angle)
+    top, run = length * np.sin(tilt), length * np.cos(tilt)
+    world = WorldText(
+        "steep_slope",
+        f"a slope of {angle:g} degrees, {length:g} m long, level above and below",
+        friction,
+        (shift, swing),
+        (0.0, 0.0, top),
+        (edge + run + 1.0, 0.0, 0.0),
+        abyss=min(0.0, top) - THICKNESS - 0.01,
+    )
+    world.platform("platform_start", (-0.8, edge), width, top)
+    turn = Rotation.from_euler("y", angle, degrees=True)
+    world.tile("slope", (length, width), (edge + run / 2, 0.0, top / 2), material="slope", rotation=turn)
+    world.platform("platform_goal", (edge + run, edge + run + 2.0), width)
+    return world.render()
+
+
+def training(
+    rng: np.random.Generator,
+    *,
+    tile: float = 0.4,
+    tilt: float = 20.0,
+    rise: float = 0.05,
+    friction: float = 0.5,
+    shift: float = 1.0,
+    swing: float = 1.0,
+) -> str:
+    """Terrain to collect transitions on: 3 x 3 tilted tiles, the start on the middle one, and a wall beside the robot.
+
+    Args:
+        rng: source of everything random.
+        tile: m; edge of a tile.
+        tilt: deg; roll and pitch of tiles, and the tilts of the wall about its own axes, lie within this.
+        rise: m; heights lie within this.
+        friction: sliding coefficient.
+        shift: s.
+        swing: s.
+
+    Returns:
+        MJCF text. The wall's foot is 0.4 to 0.9 m from the start, on either side, up to 45 degrees forwards or back.
+    """
+    world = WorldText(
+        "training",
+        "3 x 3 tilted tiles and a wall",
+        friction,
+        (shift, swing),
+        (0.0, 0.0, 0.05),
+        (tile, 0.0, 0.05),
+    )
+    for row in range(3):
+        for column in range(3):
+            middle = row == column == 1
+            turn = Rotation.from_euler("xy", rng.uniform(-tilt, tilt, 2), degrees=True)
+            top = ((row - 1) * tile, (column - 1) * tile, 0.0 if middle else rng.uniform(-rise, rise))
+            world.tile(f"tile_{row}_{column}", (tile, tile), top, rotation=turn)
+    side = rng.choice([-1.0, 1.0])
+    bearing = side * np.radians(90.0 + rng.uniform(-45.0, 45.0))
+    distance, lean = rng.uniform(0.4, 0.9), rng.uniform(-tilt, tilt)
+    # z of the panel looks back at the robot; it then leans about its level axis.
+    upright = Rotation.from_euler("zy", [bearing, -np.pi / 2])
+    turn = Rotation.from_euler("zyz", [bearing, np.radians(lean), -bearing]) * upright
+    centre = distance * np.array([np.cos(bearing), np.sin(bearing), 0.0]) + [0.0, 0.0, 1.0]
+    world.tile("wall", (2.0, 2.0), centre, material="panel", rotation=turn)
+    return world.render()
+
+
+KINDS: dict[str, Callable[..., str]] = {
+    generator.__name__: generator
+    for generator in (rubble_field, rubble_corridor, stepping_stones, stairs, gap, slope, mesh_terrain, training)
+}
+
+
+def _tiles(
+    world: WorldText,
+    rng: np.random.Generator,
+    begin: float,
+    rows: int,
+    columns: int,
+    size: tuple[float, float],
+    tilt: float,
+    rise: float,
+) -> None:
+    """Add rows x columns tilted tiles from x = `begin` on, centred on y = 0."""
+    for row in range(rows):
+        for column in range(columns):
+            turn = Rotation.from_euler("xy", rng.uniform(-tilt, tilt, 2), degrees=True)
+            top = (
+                begin + (row + 0.5) * size[0],
+                (column - (columns - 1) / 2) * size[1],
+                rng.uniform(-rise, rise),
+            )
+            world.tile(f"tile_{row}_{column}", size, top, rotation=turn)
