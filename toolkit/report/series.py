@@ -20,7 +20,9 @@ RATE = 100.0
 """Hz to which series are thinned; each sample then holds the worst value of its interval."""
 
 
-def thinned(times: np.ndarray, values: np.ndarray, rate: float = RATE, worst: str = "mean") -> tuple[np.ndarray, ...]:
+def thinned(
+    times: np.ndarray, values: np.ndarray, rate: float = RATE, worst: str = "mean"
+) -> tuple[np.ndarray, np.ndarray]:
     """Cut samples into intervals of 1 / rate and keep one value of each.
 
     Args:
@@ -118,7 +120,7 @@ def limb_errors(execution: Execution, trajectory: WholeBodyTrajectory) -> dict[L
     errors = {}
     for limb in Limb:
         planned, measured = trajectory.limb_pose[:, limb, :3], execution.limb_pose[:, limb, :3]
-        if np.isfinite(planned).all() and np.isfinite(measured).any():
+        if np.isfinite(planned).any() and np.isfinite(measured).any():
             axes = [np.interp(execution.tick_times, trajectory.times, planned[:, axis]) for axis in range(3)]
             errors[limb] = np.linalg.norm(measured - np.column_stack(axes), axis=1)
     return errors

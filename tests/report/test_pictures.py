@@ -1,0 +1,114 @@
+"""Pictures show something, and a machine that cannot render says what to install."""
+
+import subprocess
+from dataclasses import replace
+
+import imageio.v3 as iio
+import imageio_ffmpeg
+import mujoco
+import numpy as np
+import pytest
+
+from toolkit.errors import InputError
+from toolkit.geometry.limb import Limb
+from toolkit.report.offscreen import OffscreenRenderer, open_context, require_rendering
+from toolkit.report.pictures import follow, strip, video
+from toolkit.report.plots import draw_plots
+from toolkit.report.top_view import draw_top_view
+
+
+@pytest.fixture(scope="module")
+def rendering():
+    try:
+        require_rendering()
+    except InputError as error:
+        pytest.skip(str(error))
+
+
+def is_drawn(picture):
+    colors = picture[..., :3].astype(int) @ [1, 256, 65536]
+    return picture.std() > 5 and len(np.unique(colors)) > 20
+
+
+def drawing(run):
+    return dict(contacts=run.sequence.start.contacts, half_sizes=run.robot.half_sizes)
+
+
+def test_the_strip_shows_the_robot_moving(run, tmp_path, rendering):
+    execution = run.execution
+    path = tmp_path / "strip.png"
+    strip(execution.scene, execution.qpos, execution.tick_times, path, 3, size=(120, 160), **drawing(run))
+    picture = iio.imread(path)
+    assert picture.shape == (160, 360, 3)
+    first, middle, last = np.split(picture, 3, axis=1)
+    assert all(is_drawn(part) for part in (first, middle, last)) and not np.array_equal(first, last)
+
+
+def test_contact_patches_are_drawn_in_the_limb_s_colour(run, rendering):
+    execution = run.execution
+    camera = follow(execution.scene, execution.qpos, execution.tick_times)[0]
+    away = execution.qpos[0] + np.eye(1, execution.scene.nq)[0] * 50  # the robot out of the picture
+    with OffscreenRenderer(execution.scene, 160, 120) as renderer:
+        plain = renderer.render(away, camera)
+        marked = renderer.render(away, camera, **drawing(run))
+    changed = np.abs(marked.astype(int) - plain).sum(-1) > 30
+    red, green, _ = marked[changed].astype(int).T
+    assert (red > green + 30).any() and (green > red + 30).any()
+
+
+def test_the_video_plays(run, tmp_path, rendering):
+    execution = run.execution
+    path = tmp_path / "video.mp4"
+    times = execution.tick_times[execution.tick_times < 0.5]
+    video(execution.scene, execution.qpos[: len(times)], times, path, fps=10, size=(64, 48))
+    decode = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    run_of_it = subprocess.run(decode, capture_output=True, check=True)
+    pictures = np.frombuffer(run_of_it.stdout, np.uint8).reshape(-1, 48, 64, 3)
+    assert b"10 fps" in run_of_it.stderr and len(pictures) == 5
+    assert all(is_drawn(picture) for picture in pictures)
+
+
+def test_the_model_is_not_changed_by_rendering_it_large(run, rendering):
+    before = run.execution.scene.vis.global_.offwidth
+    with OffscreenRenderer(run.execution.scene, 1300, 16) as renderer:
+        renderer.render(run.execution.qpos[0], mujoco.MjvCamera())
+    assert run.execution.scene.vis.global_.offwidth == before
+
+
+def test_osmesa_takes_over_where_egl_fails(rendering):
+    open_context(16, 16, backends=("no_such_backend", "egl")).free()
+
+
+def test_a_machine_that_cannot_render_says_what_to_install():
+    with pytest.raises(InputError, match="apt-get install -y libegl1 .* or leave pictures and video out"):
+        open_context(16, 16, backends=("no_such_backend",))
+
+
+def test_the_camera_avoids_a_wall(run):
+    scene_of = "<mujoco><worldbody>{}<body><freejoint/><geom size='0.1'/></body></worldbody></mujoco>"
+    wall = "<geom type='box' size='3 0.05 3' pos='0 {} 1'/>"
+    qpos = np.zeros((20, 7))
+    qpos[:, 0], qpos[:, 3] = np.linspace(-1, 1, 20), 1.0
+    times = np.linspace(0, 2, 20)
+    sides = []
+    for y in (1.0, -1.0):
+        scene = mujoco.MjModel.from_xml_string(scene_of.format(wall.format(y)))
+        view = follow(scene, qpos, times)
+        sides.append(np.sin(np.radians(view.azimuth + 180)))  # y of the camera from the robot
+    assert sides[0] < 0 < sides[1]
+
+
+def test_the_plan_from_above_is_drawn_with_whatever_there_is(run, tmp_path):
+    for solution, motion in ((None, None), (run.search.solutions[0], None), (run.search.solutions[0], run.motion)):
+        draw_top_view(tmp_path / "plan.png", run.world, run.robot, solution, motion, run.execution.com)
+        assert is_drawn(iio.imread(tmp_path / "plan.png"))
+    draw_top_view(tmp_path / "bare.png", replace(run.world, surfaces=()), run.robot, None)
+    assert is_drawn(iio.imread(tmp_path / "bare.png"))
+
+
+def test_the_curves_are_drawn(run, tmp_path):
+    draw_plots(tmp_path / "plots.png", run.execution)
+    assert is_drawn(iio.imread(tmp_path / "plots.png"))
+    empty = {name: getattr(run.execution, name)[:0] for name in ("tick_times", "com", "com_planned", "torque_ratio")}
+    draw_plots(tmp_path / "empty.png", replace(run.execution, **empty, slip=()))
+    assert Limb.LEFT_FOOT in run.sequence.start
