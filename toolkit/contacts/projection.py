@@ -64,6 +64,10 @@ class Projected:
         """(n,) bool."""
         return self.surface >= 0
 
+    def select(self, rows: np.ndarray) -> Projected:
+        """Some of the candidates, by index or by mask."""
+        return Projected(self.surface[rows], self.position[rows], self.rotation[rows])
+
 
 def shifts(reach: float, step: float) -> np.ndarray:
     """(n, 2) offsets along x and y in a disc, nearest first, along x before y, forwards before backwards."""

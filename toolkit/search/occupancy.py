@@ -149,7 +149,9 @@ def body_free(corner, cell, below, box, x, y, z, yaw):
 def _free(corner, cell, below, box, position, yaw):
     result = np.empty(len(position), np.bool_)
     for row in range(len(position)):
-        result[row] = body_free(corner, cell, below, box, position[row, 0], position[row, 1], position[row, 2], yaw[row])
+        result[row] = body_free(
+            corner, cell, below, box, position[row, 0], position[row, 1], position[row, 2], yaw[row]
+        )
     return result
 
 

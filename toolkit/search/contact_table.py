@@ -1,0 +1,87 @@
+"""Every contact a search has met, once, as rows of arrays; states then name contacts by number."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.contacts.projection import Projected
+from toolkit.contacts.stance import Contact
+from toolkit.geometry.limb import Limb
+from toolkit.geometry.pose import Pose, yaw_of
+
+_KEPT = 20_000  # Contact objects kept for reuse
+
+
+class ContactTable:
+    """Contacts by number. Two contacts within the same rounding (1 mm, 0.1 deg) are the same.
+
+    Args:
+        friction: (S,) coefficient of each surface of the world.
+
+    Attributes:
+        position: (capacity, 3) m.
+        rotation: (capacity, 3, 3).
+        yaw: (capacity,) rad; heading of the x axis.
+        surface: (capacity,) int.
+        limb: (capacity,) int.
+    """
+
+    def __init__(self, friction: np.ndarray):
+        self._friction = friction
+        self._number: dict[bytes, int] = {}
+        self._objects: dict[int, Contact] = {}
+        self.position = np.zeros((256, 3))
+        self.rotation = np.zeros((256, 3, 3))
+        self.yaw = np.zeros(256)
+        self.surface = np.zeros(256, np.int32)
+        self.limb = np.zeros(256, np.int8)
+
+    def __len__(self) -> int:
+        return len(self._number)
+
+    def add(self, limb: Limb, patches: Projected) -> np.ndarray:
+        """Numbers (n,) of contacts of one limb; new ones are entered."""
+        n = len(patches.surface)
+        yaw = np.asarray(yaw_of(patches.rotation), float).reshape(n)
+        rounded = np.empty((n, 6), np.int32)
+        rounded[:, 0], rounded[:, 1] = limb, patches.surface
+        rounded[:, 2:5] = np.round(patches.position * 1000)
+        rounded[:, 5] = np.round(yaw * (1800 / np.pi)) % 3600
+        data, size = rounded.tobytes(), rounded.itemsize * 6
+        while len(self._number) + n > len(self.yaw):
+            self._grow()
+        numbers = np.empty(n, np.int64)
+        for row in range(n):
+            key = data[row * size : (row + 1) * size]
+            number = self._number.get(key)
+            if number is None:
+                number = self._number[key] = len(self._number)
+                self.position[number], self.rotation[number] = patches.position[row], patches.rotation[row]
+                self.yaw[number], self.surface[number], self.limb[number] = yaw[row], patches.surface[row], limb
+            numbers[row] = number
+        return numbers
+
+    def add_contact(self, contact: Contact) -> int:
+        """Number of one contact."""
+        pose = contact.pose
+        patch = Projected(np.array([contact.surface]), pose.position[None], pose.rotation[None])
+        return int(self.add(contact.limb, patch)[0])
+
+    def contact(self, number: int) -> Contact:
+        """The contact with a number."""
+        found = self._objects.get(number)
+        if found is None:
+            if len(self._objects) >= _KEPT:
+                self._objects.clear()
+            surface = int(self.surface[number])
+            pose = Pose(self.rotation[number].copy(), self.position[number].copy())
+            found = Contact(Limb(int(self.limb[number])), pose, float(self._friction[surface]), surface)
+            self._objects[number] = found
+        return found
+
+    def _grow(self) -> None:
+        for name in ("position", "rotation", "yaw", "surface", "limb"):
+            old = getattr(self, name)
+            new = np.zeros((2 * len(old), *old.shape[1:]), old.dtype)
+            new[: len(old)] = old
+            setattr(self, name, new)

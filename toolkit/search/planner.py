@@ -1,0 +1,270 @@
+"""ContactPlanner: from a start to a goal by an anytime search over contact transitions of feet and palms."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from toolkit.contacts.projection import ProjectionConfig, Projector
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.stance import Stance
+from toolkit.contacts.transition_model import TransitionModel, steps_38, steps_60, wide_steps
+from toolkit.errors import InputError, PlanningError
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.prediction.evaluator import TransitionEvaluator
+from toolkit.robot.model import RobotModel
+from toolkit.search import screen
+from toolkit.search.ana_star import AnaStar, AnaStarConfig, Edge, Path, Progress
+from toolkit.search.contact_table import ContactTable
+from toolkit.search.heuristic import Distance, EuclideanDistance, GridConfig
+from toolkit.search.moves import MoveConfig, MoveGenerator
+from toolkit.search.problem import ContactProblem, CostConfig
+from toolkit.search.result import SearchResult, Solution
+from toolkit.search.start import place_feet
+from toolkit.search.state import COM, CONTACTS, VELOCITY, unpack
+from toolkit.search.terrain_distance import TerrainDistance
+from toolkit.world.timing import Timing
+from toolkit.world.world import World
+
+
+@dataclass(frozen=True)
+class PlannerConfig:
+    """Settings of the planner.
+
+    Attributes:
+        steps: 60 or 38; rows of the foot transition model.
+        wide_steps: "on", "off", or "auto": where normal steps do not lead to the goal, or where some ground holds no
+            resting foot and has to be crossed fast.
+        palms: whether palms may be used.
+        heuristic: "grid" or "euclidean".
+        timings: of a transition, to choose from; empty: the world's.
+        cost: edge costs.
+        moves: kinematic limits.
+        projection: how patches find their place.
+        grid: of the heuristic.
+        search: of ANA*. Time decides when a search stops, so the same seed gives the same plan only as long as the
+            machine gets through the same expansions; `search.max_expansions` makes it exact.
+    """
+
+    steps: int = 60
+    wide_steps: str = "auto"
+    palms: bool = True
+    heuristic: str = "grid"
+    timings: tuple[Timing, ...] = ()
+    cost: CostConfig = field(default_factory=CostConfig)
+    moves: MoveConfig = field(default_factory=MoveConfig)
+    projection: ProjectionConfig = field(default_factory=ProjectionConfig)
+    grid: GridConfig = field(default_factory=GridConfig)
+    search: AnaStarConfig = field(default_factory=lambda: AnaStarConfig(max_expansions=20_000))
+
+    def __post_init__(self):
+        for name, allowed in (("steps", (60, 38)), ("wide_steps", ("auto", "on", "off"))):
+            if getattr(self, name) not in allowed:
+                raise InputError(f"planner setting {name} is {getattr(self, name)!r}; it must be one of {allowed}")
+        if self.heuristic not in ("grid", "euclidean"):
+            raise InputError(f"planner setting heuristic is {self.heuristic!r}; it must be 'grid' or 'euclidean'")
+
+
+class ContactPlanner:
+    """Plans contact sequences for one robot in one world.
+
+    Args:
+        robot: the robot.
+        world: the world.
+        evaluator: judges the dynamics of transitions.
+        config: settings.
+        goal_evaluator: judges the transition that reaches the goal, as one after which the robot rests; None: it is
+            judged like any other.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        world: World,
+        evaluator: TransitionEvaluator,
+        config: PlannerConfig | None = None,
+        goal_evaluator: TransitionEvaluator | None = None,
+    ):
+        self.robot, self.world, self.config = robot, world, config or PlannerConfig()
+        self._evaluator, self._goal_evaluator = evaluator, goal_evaluator
+        self._projector = Projector(robot, world.surfaces, world.mujoco_model, self.config.projection)
+        self._terrain = TerrainDistance(robot, world, self._projector, self.config.grid)
+        self._timings = self.config.timings or (world.timing,)
+
+    def start_stance(self) -> Stance:
+        """Both feet on the ground below the start, at their distance in the home posture.
+
+        Raises:
+            PlanningError: they find no room, or the robot cannot stand there.
+        """
+        moves, table = self._generator(wide=False)
+        reasons: dict[str, int] = {}
+        for stance in place_feet(self.robot, self.world, self._projector):
+            left, right = (stance[limb] for limb in FEET)
+            code = int(
+                moves.screen(
+                    Limb.LEFT_FOOT,
+                    np.array([left.surface]),
+                    left.pose.position[None],
+                    left.pose.rotation[None],
+                    np.array([left.pose.yaw]),
+                    table.add_contact(right),
+                )[0]
+            )
+            if code == 0:
+                return stance
+            reasons[screen.REASONS[code]] = reasons.get(screen.REASONS[code], 0) + 1
+        most = max(reasons, key=lambda reason: reasons[reason])
+        raise PlanningError(
+            f"{self.world.path}: the robot cannot stand at the start ({most}); move the site 'start' to more even or "
+            "more open ground"
+        )
+
+    def search(
+        self,
+        rng: np.random.Generator,
+        time_limit: float,
+        observer: Callable[[Progress], None] | None = None,
+    ) -> SearchResult:
+        """Search for contact sequences until the time is up or nothing can improve.
+
+        Args:
+            rng: for random expansions.
+            time_limit: s, the heuristic not counted.
+            observer: told of progress and of every solution.
+
+        Returns:
+            Every solution found, and why there is none where there is none.
+
+        Raises:
+            PlanningError: the robot cannot stand at the start, or nothing leads to the goal.
+        """
+        start = self.start_stance()
+        began = time.perf_counter()
+        distance, wide = self._distance(start)
+        heuristic_seconds = time.perf_counter() - began
+        moves, table = self._generator(wide)
+        com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
+        problem = ContactProblem(
+            self.robot,
+            moves,
+            table,
+            self._evaluator,
+            distance,
+            start,
+            com,
+            self.world.goal,
+            self._model(wide).longest_step + self.config.projection.shift,
+            self._timings,
+            self.config.palms,
+            self.config.cost,
+        )
+        judge = None if self._goal_evaluator is None else _goal_judge(problem, self._goal_evaluator, self.config.cost)
+        result = AnaStar(problem, rng, self.config.search, judge).run(time_limit, observer)
+        expanded = problem.feet(unpack(result.expanded)[:, CONTACTS]) if result.expanded else (np.zeros((0, 3)), [])
+        return SearchResult(
+            solutions=tuple(_solution(problem, path) for path in result.paths),
+            seconds=result.seconds,
+            heuristic_seconds=heuristic_seconds,
+            expansions=result.expansions,
+            exhausted=result.stopped_by == "exhausted",
+            expanded=np.column_stack([expanded[0][:, :2], expanded[1]]),
+            reason="" if result.paths else _reason(result.stopped_by, result.seconds, result.expansions, problem),
+        )
+
+    def _model(self, wide: bool) -> TransitionModel:
+        steps = steps_60() if self.config.steps == 60 else steps_38()
+        return TransitionModel.of(self.robot, np.concatenate([steps, wide_steps()]) if wide else steps)
+
+    def _generator(self, wide: bool) -> tuple[MoveGenerator, ContactTable]:
+        table = ContactTable(self._projector.table.friction)
+        terrain = self._terrain
+        moves = MoveGenerator(
+            self.robot,
+            self._projector,
+            table,
+            self._model(wide),
+            terrain.occupancy,
+            terrain.box,
+            self.config.moves,
+        )
+        return moves, table
+
+    def _distance(self, start: Stance) -> tuple[Distance, bool]:
+        """Distance to the goal, and whether wide steps are to be used.
+
+        Raises:
+            PlanningError: nothing leads to the goal.
+        """
+        wide = self.config.wide_steps
+        strides = {False: self._model(False).longest_step, True: self._model(True).longest_step}
+        if self.config.heuristic == "euclidean":
+            return EuclideanDistance(self.world.goal), wide != "off"
+        choices = {"on": [True], "off": [False], "auto": [False, True]}[wide]
+        if wide == "auto" and self._terrain.has_slippery_ground():
+            choices = [True]
+        for choice in choices:
+            distance = self._terrain.distance(start.mean_feet, strides[choice])
+            if distance is not None:
+                return distance, choice
+        raise PlanningError(self._terrain.obstacle(start.mean_feet, strides[choices[-1]]))
+
+
+def _goal_judge(problem: ContactProblem, evaluator: TransitionEvaluator, cost: CostConfig):
+    """Judge of the last transition for ANA*: it must end at rest; its objective is replaced."""
+
+    def judge(state: bytes, edge: Edge) -> Edge | None:
+        row = unpack([state])[0]
+        transition = problem.transition(edge.state, edge.payload)
+        batch = evaluator.evaluate(problem.stance(state), row[COM] / 1000.0, row[VELOCITY] / 1000.0, [transition])
+        if not batch.feasible[0]:
+            problem.rejected[screen.DYNAMICS] += 1
+            return None
+        objective = float(batch.objective[0])
+        return Edge(
+            edge.state,
+            edge.cost + cost.dynamics * (objective - edge.payload[0]),
+            (objective, edge.payload[1]),
+        )
+
+    return judge
+
+
+def _solution(problem: ContactProblem, path: Path) -> Solution:
+    """A path as a contact sequence with its predicted motion."""
+    rows = unpack(path.states)
+    steps = list(zip(path.states[1:], path.payloads, strict=True))
+    return Solution(
+        sequence=ContactSequence(
+            problem.stance(path.states[0]), tuple(problem.transition(state, payload) for state, payload in steps)
+        ),
+        cost=path.cost,
+        bound=path.bound,
+        seconds=path.seconds,
+        com=rows[:, COM] / 1000.0,
+        com_velocity=rows[:, VELOCITY] / 1000.0,
+        objective=np.array([payload[0] for payload in path.payloads]),
+    )
+
+
+def _reason(stopped_by: str, seconds: float, expansions: int, problem: ContactProblem) -> str:
+    """One line on why there is no solution and what rejected most candidates."""
+    how = {
+        "exhausted": f"every stance that can be reached was looked at ({expansions})",
+        "time": f"the time limit of {seconds:.3g} s was reached after {expansions} expansions; a longer one may help",
+        "expansions": f"the limit of {expansions} expansions was reached; a higher one may help",
+        "memory": f"the limit on memory was reached after {expansions} expansions",
+    }[stopped_by]
+    total = int(problem.rejected.sum())
+    if total == 0:
+        return f"no contact sequence found: {how}"
+    order = np.argsort(-problem.rejected, kind="stable")[:4]
+    shares = ", ".join(
+        f"{screen.REASONS[code]} {100 * problem.rejected[code] / total:.0f} %"
+        for code in order
+        if problem.rejected[code] > 0
+    )
+    return f"no contact sequence found: {how}; candidates were rejected for: {shares}"

@@ -1,0 +1,100 @@
+"""Grid distances over a world's terrain, and what stands in the way where there are none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.contacts.projection import Projector
+from toolkit.geometry.pose import Pose
+from toolkit.robot.model import RobotModel
+from toolkit.search.heuristic import GridConfig, GridDistance
+from toolkit.search.occupancy import BodyBox, Occupancy
+from toolkit.world.world import World
+
+_DETOURS = (2.0, 8.0)  # m around start and goal that the grid covers: the larger one where the smaller has no way
+
+
+class TerrainDistance:
+    """Builds grid distances for one robot in one world.
+
+    Args:
+        robot: the robot.
+        world: the world.
+        projector: of the robot on the world's surfaces.
+        config: of the grid.
+
+    Attributes:
+        box: the body.
+        occupancy: what the body can hit, around start and goal.
+    """
+
+    def __init__(self, robot: RobotModel, world: World, projector: Projector, config: GridConfig):
+        self._world, self._projector, self._config = world, projector, config
+        self.box = BodyBox.of(robot)
+        table = projector.table
+        first, last = table.edge_start[:-1], table.edge_start[1:]
+        owner = np.repeat(np.arange(len(first)), last - first)
+        points = table.origin[owner] + np.einsum("nij,nj->ni", table.rotation[owner][:, :, :2], table.edges[:, :2])
+        self._ground = points[table.foot[owner]]
+        self._bounds = [self._around(detour) for detour in _DETOURS]
+        self.occupancy = self._occupy(self._bounds[0])
+        self._detour = 0
+
+    def _around(self, detour: float) -> tuple[float, float, float, float]:
+        """Bounds in XY around start and goal, no larger than the ground."""
+        ends = np.stack([self._world.start.position[:2], self._world.goal.position[:2]])
+        low = np.maximum(ends.min(0) - detour, np.minimum(self._ground[:, :2].min(0), ends.min(0)) - 0.3)
+        high = np.minimum(ends.max(0) + detour, np.maximum(self._ground[:, :2].max(0), ends.max(0)) + 0.3)
+        return (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+
+    def _occupy(self, bounds: tuple[float, float, float, float]) -> Occupancy:
+        low, high = np.array(bounds[:2]) - 0.5, np.array(bounds[2:]) + 0.5
+        inside = (self._ground[:, :2] >= low).all(1) & (self._ground[:, :2] <= high).all(1)
+        heights = self._ground[inside, 2] if inside.any() else np.array([self._world.start.position[2]])
+        lower = np.array([*low, heights.min() + self.box.bottom - 0.3])
+        upper = np.array([*high, heights.max() + self.box.top + 0.3])
+        return Occupancy.of(self._world.mujoco_model, lower, upper)
+
+    def distance(self, start: Pose, stride: float) -> GridDistance | None:
+        """Distance to the goal with steps of at most `stride` m; None where no way leads there from `start`."""
+        for detour in range(self._detour, len(_DETOURS)):
+            if detour > 0 and self._bounds[detour] == self._bounds[detour - 1]:
+                continue
+            if detour > self._detour:
+                self.occupancy, self._detour = self._occupy(self._bounds[detour]), detour
+            grid = self._grid(self.occupancy, stride)
+            if np.isfinite(self._at(grid, start)):
+                return grid
+        return None
+
+    def _grid(self, occupancy: Occupancy, stride: float) -> GridDistance:
+        bounds = self._bounds[self._detour]
+        return GridDistance(self._projector, occupancy, self.box, self._world.goal, bounds, stride, self._config)
+
+    @staticmethod
+    def _at(grid: GridDistance, start: Pose) -> float:
+        return float(grid(start.position[None], np.array([start.yaw]))[0])
+
+    def obstacle(self, start: Pose, stride: float) -> str:
+        """One line on why nothing leads to the goal."""
+        world = self._world
+        x, y = world.goal.position[:2]
+        head = f"{world.path}: nothing leads to the goal at ({x:.3g}, {y:.3g})"
+        grid = self._grid(self.occupancy, stride)
+        if not grid.supported:
+            return f"{head}: no surface within its radius holds a sole; move the goal onto walkable ground"
+        open_air = Occupancy(self.occupancy.corner, self.occupancy.cell, np.zeros_like(self.occupancy.below))
+        if np.isfinite(self._at(self._grid(open_air, stride), start)):
+            room = f"{2 * self.box.half_width:.2g} m wide and {self.box.top:.2g} m high"
+            return f"{head}: walls or a ceiling leave no room for the body ({room}) on any way; make more room"
+        return (
+            f"{head}: the ground is interrupted by a gap wider than the longest step ({stride:.2g} m) or a rise higher "
+            f"than {self._config.climb:.2g} m; bring the surfaces closer together"
+        )
+
+    def has_slippery_ground(self) -> bool:
+        """Whether a foot surface on the way is steeper than its friction angle, so that no foot rests there."""
+        table, bounds = self._projector.table, self._bounds[0]
+        tilt = np.tan(np.arccos(np.clip(table.rotation[:, 2, 2], 1e-6, 1.0)))
+        near = (table.centre[:, :2] >= bounds[:2]).all(1) & (table.centre[:, :2] <= bounds[2:]).all(1)
+        return bool((table.foot & near & (tilt > table.friction)).any())
