@@ -46,12 +46,12 @@ def draw_scene(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "w
     for geom in shown_geoms(model, geoms):
         mesh = mesh_of_geom(model, geom, plane_extent=extent)
         pose = Pose(data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom])
-        entity = [*path.split("/"), name_of(model, mujoco.mjtObj.mjOBJ_GEOM, geom)]
+        entity = rr.new_entity_path([*path.split("/"), name_of(model, mujoco.mjtObj.mjOBJ_GEOM, geom)])
         shade = geom_rgba(model, geom) * [SCENE_SHADE, SCENE_SHADE, SCENE_SHADE, 1.0]
         stream.log(entity, mesh_archetype(_moved(mesh, pose), shade), static=True)
 
 
-def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "world/robot") -> dict[int, list[str]]:
+def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "world/robot") -> dict[int, str]:
     """Draw the shape of every body that can move, one mesh each, in the body's frame.
 
     Returns:
@@ -72,7 +72,7 @@ def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "
             [np.tile(geom_rgba(model, g), (len(m.vertices), 1)) for g, m in zip(parts, meshes, strict=True)]
         )
         offsets = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
-        entities[int(body)] = [*path.split("/"), name_of(model, mujoco.mjtObj.mjOBJ_BODY, body)]
+        entities[int(body)] = rr.new_entity_path([*path.split("/"), name_of(model, mujoco.mjtObj.mjOBJ_BODY, body)])
         shape = rr.Mesh3D(
             vertex_positions=np.concatenate([mesh.vertices for mesh in meshes]).astype(np.float32),
             triangle_indices=np.concatenate([m.triangles + o for m, o in zip(meshes, offsets, strict=True)]),
@@ -83,7 +83,9 @@ def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "
     return entities
 
 
-def draw_surfaces(stream: rr.RecordingStream, surfaces: Iterable[Surface], path: str = "world/surfaces") -> None:
+def draw_surfaces(
+    stream: rr.RecordingStream, surfaces: Iterable[Surface], path: str = "world/surfaces", *, alpha: int = 50
+) -> None:
     """Draw extracted surfaces: outlines with their index, and a translucent fill; blue for feet, amber for palms."""
     groups: dict[str, list[Surface]] = {"foot": [], "palm": [], "other": []}
     for surface in surfaces:
@@ -100,7 +102,7 @@ def draw_surfaces(stream: rr.RecordingStream, surfaces: Iterable[Surface], path:
         stream.log(f"{path}/{name}/outline", outline, static=True)
         fill = _fill([_on_surface(surface, piece) for surface in group for piece in surface.pieces])
         if len(fill.triangles):
-            rgba = np.array([*color, 50]) / 255
+            rgba = np.array([*color, alpha]) / 255
             stream.log(f"{path}/{name}/fill", mesh_archetype(fill, rgba), static=True)
 
 

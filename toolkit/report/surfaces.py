@@ -58,7 +58,7 @@ def write_surface_recording(path: Path, world: World) -> None:
         panels = (rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"))
         stream.send_blueprint(rrb.Blueprint(scene, *panels, rrb.TimePanel(state="hidden"), auto_views=False))
         draw_scene(stream, world.mujoco_model)
-        draw_surfaces(stream, world.surfaces)
+        draw_surfaces(stream, world.surfaces, alpha=140)
         draw_goal(stream, world.goal)
         for name, color in (("foot", FOOT_SURFACE), ("palm", PALM_SURFACE)):
             group = [s for s in world.surfaces if (s.serves_foot if name == "foot" else not s.serves_foot)]

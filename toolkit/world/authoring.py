@@ -37,7 +37,7 @@ height="256"/>
     <default class="visual"><geom contype="0" conaffinity="0" group="2"/></default>
   </default>
   <worldbody>
-    <light pos="0 0 6" dir="0.3 0.2 -1" directional="true" diffuse="0.55 0.55 0.55"/>
+    <light pos="{light}" dir="0.3 0.2 -1" directional="true" diffuse="0.55 0.55 0.55"/>
 """
 
 _TAIL = """    <site name="start" pos="{start}" euler="0 0 {heading}" size="0.02" rgba="0.2 0.7 0.3 1"/>
@@ -111,10 +111,12 @@ class WorldText:
     def render(self) -> str:
         """The MJCF text."""
         start, goal = np.array(self.start), np.array(self.goal)
+        middle = (start + goal) / 2
         head = _HEAD.format(
             model=self.model,
             comment=self.comment,
-            centre=numbers((start + goal) / 2 + [0, 0, 0.6]),
+            centre=numbers(middle + [0, 0, 0.6]),
+            light=numbers(middle - 4.0 * np.array([0.3, 0.2, -1.0])),
             extent=numbers([0.6 * np.linalg.norm(goal - start) + 1.0]),
             assets="".join(self._assets),
             timing=numbers(self.timing),
