@@ -11,7 +11,7 @@ import pytest
 
 from toolkit.errors import InputError
 from toolkit.geometry.limb import Limb
-from toolkit.report.offscreen import OffscreenRenderer, open_context, require_rendering
+from toolkit.report.offscreen import OffscreenRenderer, Patches, open_context, require_rendering
 from toolkit.report.pictures import follow, strip, video
 from toolkit.report.plots import draw_plots
 from toolkit.report.top_view import draw_top_view
@@ -30,14 +30,14 @@ def is_drawn(picture):
     return picture.std() > 5 and len(np.unique(colors)) > 20
 
 
-def drawing(run):
-    return dict(contacts=run.sequence.start.contacts, half_sizes=run.robot.half_sizes)
+def patches(run):
+    return Patches(run.sequence.start.contacts, run.robot.half_sizes)
 
 
 def test_the_strip_shows_the_robot_moving(run, tmp_path, rendering):
     execution = run.execution
     path = tmp_path / "strip.png"
-    strip(execution.scene, execution.qpos, execution.tick_times, path, 3, size=(120, 160), **drawing(run))
+    strip(execution.scene, execution.qpos, execution.tick_times, path, 3, size=(120, 160), patches=patches(run))
     picture = iio.imread(path)
     assert picture.shape == (160, 360, 3)
     first, middle, last = np.split(picture, 3, axis=1)
@@ -50,7 +50,7 @@ def test_contact_patches_are_drawn_in_the_limb_s_colour(run, rendering):
     away = execution.qpos[0] + np.eye(1, execution.scene.nq)[0] * 50  # the robot out of the picture
     with OffscreenRenderer(execution.scene, 160, 120) as renderer:
         plain = renderer.render(away, camera)
-        marked = renderer.render(away, camera, **drawing(run))
+        marked = renderer.render(away, camera, patches=patches(run))
     changed = np.abs(marked.astype(int) - plain).sum(-1) > 30
     red, green, _ = marked[changed].astype(int).T
     assert (red > green + 30).any() and (green > red + 30).any()

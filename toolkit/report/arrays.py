@@ -15,8 +15,8 @@ import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.errors import InputError
+from toolkit.report.checks import check_entries, read_checks
 from toolkit.report.files import plain
-from toolkit.report.run_report import check_entries, read_checks
 from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 

@@ -50,11 +50,10 @@ def draw_motion(stream: rr.RecordingStream, model: mujoco.MjModel, times: np.nda
         position[row], quaternion_wxyz[row] = data.xpos, data.xquat
     quaternion_xyzw = np.roll(quaternion_wxyz, -1, axis=-1).astype(np.float32)
     for body, entity in entities.items():
-        path = rr.new_entity_path(entity)
         poses = rr.Transform3D.columns(translation=position[:, body], quaternion=quaternion_xyzw[:, body])
-        stream.send_columns(path, at(times), poses)
+        stream.send_columns(entity, at(times), poses)
         first = rr.Transform3D.columns(translation=position[:1, body], quaternion=quaternion_xyzw[:1, body])
-        stream.send_columns(path, [rr.TimeColumn(SEARCH_TIMELINE, duration=[0.0])], first)
+        stream.send_columns(entity, [rr.TimeColumn(SEARCH_TIMELINE, duration=[0.0])], first)
 
 
 def standing(robot: RobotModel, feet: Pose) -> np.ndarray:
@@ -105,7 +104,7 @@ def draw_centres(
         stream.log("world/com/predicted/stances", stances, static=True)
     if motion is not None and motion.feasible:
         times = np.arange(0.0, motion.problem.times[-1] + 1 / rate, 1 / rate)
-        draw_com(stream, "optimised", OPTIMISED, np.array([motion.sample(time)[0] for time in times]), times)
+        draw_com(stream, "optimised", OPTIMISED, np.array([motion.sample(float(time))[0] for time in times]), times)
     if execution is not None and len(execution.tick_times):
         rows = frames(execution.tick_times, rate)
         draw_com(stream, "executed", EXECUTED, execution.com[rows], execution.tick_times[rows])

@@ -7,6 +7,7 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
@@ -64,6 +65,19 @@ def require_rendering() -> None:
     open_context(16, 16).free()
 
 
+@dataclass(frozen=True)
+class Patches:
+    """Contact patches to draw as thin plates coloured by limb.
+
+    Attributes:
+        contacts: any number.
+        half_sizes: (4, 2) m, by limb.
+    """
+
+    contacts: Sequence[Contact]
+    half_sizes: np.ndarray
+
+
 class OffscreenRenderer:
     """Renders configurations of one model; close it, or use it as a context manager."""
 
@@ -98,8 +112,7 @@ class OffscreenRenderer:
         qpos: np.ndarray,
         camera: mujoco.MjvCamera,
         *,
-        contacts: Sequence[Contact] = (),
-        half_sizes: np.ndarray | None = None,
+        patches: Patches | None = None,
         text: str = "",
     ) -> np.ndarray:
         """Picture of a configuration.
@@ -107,8 +120,7 @@ class OffscreenRenderer:
         Args:
             qpos: (nq,).
             camera: the view.
-            contacts: patches drawn as thin plates coloured by limb.
-            half_sizes: (4, 2) m of the patches, by limb.
+            patches: drawn into the scene.
             text: written into the lower left corner.
 
         Returns:
@@ -119,9 +131,9 @@ class OffscreenRenderer:
         mujoco.mj_forward(self._model, self._data)
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(self._model, self._data, self._option, None, camera, everything, self._scene)
-        if half_sizes is not None:
-            for contact in contacts:
-                self._add_patch(contact, half_sizes[contact.limb])
+        if patches is not None:
+            for contact in patches.contacts:
+                self._add_patch(contact, patches.half_sizes[contact.limb])
         mujoco.mjr_render(self._rectangle, self._scene, self._context)
         if text:
             corner = mujoco.mjtGridPos.mjGRID_BOTTOMLEFT.value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -10,9 +10,8 @@ import imageio_ffmpeg
 import mujoco
 import numpy as np
 
-from toolkit.contacts.stance import Contact
 from toolkit.report.meshes import static_bodies
-from toolkit.report.offscreen import OffscreenRenderer
+from toolkit.report.offscreen import OffscreenRenderer, Patches
 
 DISTANCE = 2.7  # m from the robot to the camera
 VIEWS = [
@@ -29,8 +28,7 @@ def strip(
     count: int = 8,
     *,
     size: tuple[int, int] = (320, 420),
-    contacts: Sequence[Contact] = (),
-    half_sizes: np.ndarray | None = None,
+    patches: Patches | None = None,
 ) -> None:
     """Write a row of pictures at evenly spaced times, the camera following the robot.
 
@@ -41,8 +39,7 @@ def strip(
         path: PNG file.
         count: number of pictures.
         size: (width, height) of one, pixels.
-        contacts: patches to draw.
-        half_sizes: (4, 2) m of the patches, by limb.
+        patches: contact patches to draw.
 
     Raises:
         InputError: this machine cannot render; the message says what to install.
@@ -50,8 +47,7 @@ def strip(
     rows = np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))
     cameras = follow(scene, qpos, times)
     with OffscreenRenderer(scene, *size) as renderer:
-        drawn = {"contacts": contacts, "half_sizes": half_sizes}
-        pictures = [renderer.render(qpos[i], cameras[i], text=f"{times[i]:.1f} s", **drawn) for i in rows]
+        pictures = [renderer.render(qpos[i], cameras[i], patches=patches, text=f"{times[i]:.1f} s") for i in rows]
     iio.imwrite(path, np.concatenate(pictures, axis=1))
 
 
@@ -63,8 +59,7 @@ def video(
     *,
     fps: int = 25,
     size: tuple[int, int] = (848, 480),
-    contacts: Sequence[Contact] = (),
-    half_sizes: np.ndarray | None = None,
+    patches: Patches | None = None,
 ) -> None:
     """Write an H.264 video in real time, the camera following the robot.
 
@@ -75,8 +70,7 @@ def video(
         path: MP4 file.
         fps: pictures per second.
         size: (width, height) in pixels, multiples of 16.
-        contacts: patches to draw.
-        half_sizes: (4, 2) m of the patches, by limb.
+        patches: contact patches to draw.
 
     Raises:
         InputError: this machine cannot render; the message says what to install.
@@ -88,8 +82,7 @@ def video(
         sink.send(None)
         try:
             for i in rows:
-                drawn = {"contacts": contacts, "half_sizes": half_sizes}
-                sink.send(renderer.render(qpos[i], cameras[i], text=f"{times[i]:.1f} s", **drawn))
+                sink.send(renderer.render(qpos[i], cameras[i], patches=patches, text=f"{times[i]:.1f} s"))
         finally:
             sink.close()
 

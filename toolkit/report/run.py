@@ -182,6 +182,7 @@ def _initial_rest(trial: TrialLike) -> float:
 
 def _write_pictures(folder: Path, result: ResultLike, args: Namespace) -> None:
     """The pictures that were asked for: the plan from above, the curves, the strip, the video."""
+    from toolkit.report.offscreen import Patches
     from toolkit.report.pictures import strip, video
     from toolkit.report.plots import draw_plots
     from toolkit.report.top_view import draw_top_view
@@ -198,8 +199,8 @@ def _write_pictures(folder: Path, result: ResultLike, args: Namespace) -> None:
         return
     contacts = list(trial.solution.sequence.start.contacts)
     contacts += [t.contact for t in trial.solution.sequence.transitions if t.contact is not None]
-    drawn = dict(contacts=contacts, half_sizes=result.robot.half_sizes)
+    patches = Patches(contacts, result.robot.half_sizes)
     if getattr(args, "pictures", False):
-        strip(execution.scene, execution.qpos, execution.tick_times, folder / "strip.png", **drawn)
+        strip(execution.scene, execution.qpos, execution.tick_times, folder / "strip.png", patches=patches)
     if getattr(args, "video", False):
-        video(execution.scene, execution.qpos, execution.tick_times, folder / "video.mp4", **drawn)
+        video(execution.scene, execution.qpos, execution.tick_times, folder / "video.mp4", patches=patches)

@@ -12,9 +12,10 @@ from typing import Any
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.centroidal.residual import check, cop_margin, friction_margin
 from toolkit.errors import InputError
+from toolkit.report.checks import check_entries, read_checks
 from toolkit.report.files import read_json, write_json
 from toolkit.search.result import SearchResult, Solution
-from toolkit.simulation.check import Check, Result
+from toolkit.simulation.check import Check
 from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.surface import Surface
@@ -193,29 +194,6 @@ def read_report(path: Path) -> RunReport:
         )
     except (KeyError, TypeError) as error:
         raise InputError(f"{path}: is not a run report, {error} is missing or wrong") from error
-
-
-def check_entries(checks: Sequence[Check]) -> list[dict[str, Any]]:
-    """Checks as JSON holds them, with their result."""
-    return [
-        {"name": c.name, "value": c.value, "limit": c.limit, "unit": c.unit, "result": c.result.value} for c in checks
-    ]
-
-
-def read_checks(entries: Sequence[dict[str, Any]]) -> tuple[Check, ...]:
-    """Checks of `check_entries` after JSON, where null stands for what was not finite; their results stay the same.
-
-    Raises:
-        KeyError: a key is missing.
-        TypeError: an entry is no dictionary.
-    """
-    checks = []
-    for entry in entries:
-        unmeasured = entry["result"] == Result.NOT_CHECKED
-        value = float("inf") if entry["value"] is None and not unmeasured else entry["value"]
-        limit = float("inf") if entry["limit"] is None else entry["limit"]
-        checks.append(Check(entry["name"], limit, entry["unit"], value))
-    return tuple(checks)
 
 
 def _figures(names: tuple[str, ...], stage: Any) -> dict[str, Any]:

@@ -104,8 +104,8 @@ def plot_execution(stream: rr.RecordingStream, execution: Execution, trajectory:
     plot(stream, "series/torque_ratio/limit", times[[0, -1]], np.ones(2), "limit", LIMIT, 1.0)
     if execution.slip:
         edges, values = slip_steps(execution)
-        style = {"interpolation_mode": rr.components.InterpolationMode.StepAfter}
-        plot(stream, "series/slip", edges, 1e3 * values, "slip of the stance", EXECUTED, **style)
+        step = rr.components.InterpolationMode.StepAfter
+        plot(stream, "series/slip", edges, 1e3 * values, "slip of the stance", EXECUTED, interpolation_mode=step)
 
 
 def plot_motion(stream: rr.RecordingStream, motion: CentroidalMotion) -> None:

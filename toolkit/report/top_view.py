@@ -68,7 +68,8 @@ def draw_top_view(
     nose = 0.15 * world.start.rotation[:2, 0]
     axes.annotate("", (x + nose[0], y + nose[1]), (x, y), arrowprops={"arrowstyle": "->", "color": unit(START)})
     goal = world.goal
-    axes.add_patch(Circle(goal.position[:2], goal.radius, facecolor="none", edgecolor=unit(GOAL), lw=2.5, zorder=3))
+    centre = (float(goal.position[0]), float(goal.position[1]))
+    axes.add_patch(Circle(centre, goal.radius, facecolor="none", edgecolor=unit(GOAL), lw=2.5, zorder=3))
     for contact, number in contacts:
         _draw_contact(axes, contact, robot.half_sizes[contact.limb], number)
     for name, (points, color, style) in paths.items():
@@ -105,7 +106,7 @@ def _centres(
         paths["predicted"] = (solution.com, PREDICTED, "o--")
     if motion is not None and motion.feasible:
         times = np.linspace(0, motion.problem.times[-1], 20 * motion.problem.steps + 1)
-        paths["optimised"] = (np.array([motion.sample(time)[0] for time in times]), OPTIMISED, "-")
+        paths["optimised"] = (np.array([motion.sample(float(time))[0] for time in times]), OPTIMISED, "-")
     if executed is not None:
         paths["executed"] = (executed, EXECUTED, "-")
     return paths
