@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import mujoco
 import numpy as np
 import pinocchio
@@ -9,7 +11,7 @@ import pinocchio
 from toolkit.errors import RobotError
 from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
-from toolkit.robot.placo import pinocchio_map, placo_wrapper
+from toolkit.robot.placo import PinocchioMap, placo_wrapper
 
 TOLERANCE = 1e-9
 
@@ -17,76 +19,97 @@ TOLERANCE = 1e-9
 def check_agreement(robot: RobotModel, samples: int = 3, seed: int = 0) -> None:
     """Compare MuJoCo with the Pinocchio model inside placo.
 
-    Compared are the mass and the joint limits, and in random states poses of bodies and sites, the CoM, the
-    mass matrix and the bias forces. Largest differences measured are about 1e-12.
-
     Args:
         robot: loaded robot.
         samples: number of random states.
         seed: of the states.
 
     Raises:
-        RobotError: a difference beyond 1e-9 (relative to 1 plus the magnitude).
+        RobotError: another set of joints or another armature, or a difference beyond 1e-9.
     """
-    wrapper = placo_wrapper(robot)
-    model, data = wrapper.model, wrapper.model.createData()
-    order = pinocchio_map(robot, model)
-    if model.nv != 6 + len(robot.joint_names):
-        raise RobotError(f"robot '{robot.name}': Pinocchio has {model.nv - 6} joints, MuJoCo {len(robot.joint_names)}")
-    _compare(robot, "mass", pinocchio.computeTotalMass(model), robot.mass)
-    _compare(robot, "lower limits", model.lowerPositionLimit[order.q_index], robot.lower)
-    _compare(robot, "upper limits", model.upperPositionLimit[order.q_index], robot.upper)
+    other = placo_wrapper(robot).model
+    if other.nv != robot.mujoco_model.nv:
+        raise RobotError(f"robot '{robot.name}': Pinocchio has {other.nv} velocities, MuJoCo {robot.mujoco_model.nv}")
+    differences = compare_dynamics(robot.mujoco_model, other, samples=samples, rng=np.random.default_rng(seed))
+    for what, difference in differences.items():
+        if not difference <= TOLERANCE:
+            raise RobotError(
+                f"robot '{robot.name}': MuJoCo and Pinocchio differ in {what} by {difference:.2e} (at most "
+                f"{TOLERANCE:g}); the model uses something that the URDF conversion does not know"
+            )
 
-    rng = np.random.default_rng(seed)
-    state = mujoco.MjData(robot.mujoco_model)
+
+def compare_dynamics(
+    model: mujoco.MjModel,
+    other: pinocchio.Model,
+    *,
+    samples: int,
+    rng: np.random.Generator,
+) -> dict[str, float]:
+    """Largest differences between a MuJoCo model and the Pinocchio model of its URDF.
+
+    Compared are the mass and the joint limits, and in random states the poses of bodies and sites, the CoM, the mass
+    matrix, and the forces that gravity and velocities cause.
+
+    Args:
+        model: one floating tree.
+        other: its URDF in Pinocchio, with the armature.
+        samples: number of random states: base anywhere, joints inside their ranges, velocities up to 1.
+        rng: source of the states.
+
+    Returns:
+        What -> largest absolute difference, divided by one plus the magnitude; inf where a value is not finite.
+    """
+    order = PinocchioMap.of([model.joint(j).name for j in range(1, model.njnt)], other)
+    worst: dict[str, float] = {}
+
+    def compare(what: str, value: np.ndarray | float, expected: np.ndarray | float) -> None:
+        difference = np.max(np.abs(np.asarray(value) - expected) / (1 + np.abs(expected)))
+        worst[what] = max(worst.get(what, 0.0), float(difference) if np.isfinite(difference) else np.inf)
+
+    limited = model.jnt_limited[1:].astype(bool)
+    compare("mass", pinocchio.computeTotalMass(other), model.body_mass.sum())
+    compare("lower limits", other.lowerPositionLimit[order.q_index[limited]], model.jnt_range[1:][limited, 0])
+    compare("upper limits", other.upperPositionLimit[order.q_index[limited]], model.jnt_range[1:][limited, 1])
+    state, data = mujoco.MjData(model), other.createData()
     for _ in range(samples):
-        qpos, qvel = random_state(robot, rng)
-        state.qpos[:], state.qvel[:] = qpos, qvel
-        mujoco.mj_forward(robot.mujoco_model, state)
+        state.qpos[:], state.qvel[:] = _random_state(model, rng)
+        mujoco.mj_forward(model, state)
+        qpos, qvel = state.qpos.copy(), state.qvel.copy()
         q, v = order.q_from_qpos(qpos), order.v_from_qvel(qpos, qvel)
-        pinocchio.framesForwardKinematics(model, data, q)
-        for name, pose in _frames(robot.mujoco_model, state):
-            frame = data.oMf[model.getFrameId(name)]
-            _compare(robot, f"position of '{name}'", frame.translation, pose.position)
-            _compare(robot, f"rotation of '{name}'", frame.rotation, pose.rotation)
-        _compare(robot, "centre of mass", pinocchio.centerOfMass(model, data, q), state.subtree_com[1])
-        mass = pinocchio.crba(model, data, q)
+        pinocchio.framesForwardKinematics(other, data, q)
+        for name, pose in _frames(model, state):
+            frame = data.oMf[other.getFrameId(name)]
+            compare(f"position of '{name}'", frame.translation, pose.position)
+            compare(f"rotation of '{name}'", frame.rotation, pose.rotation)
+        compare("centre of mass", pinocchio.centerOfMass(other, data, q), state.subtree_com[1])
+        mass = pinocchio.crba(other, data, q)
         mass = np.triu(mass) + np.triu(mass, 1).T
-        _compare(robot, "mass matrix", order.matrix_to_mujoco(qpos, mass), _mass_matrix(robot.mujoco_model, state))
-        # Inverse dynamics of the same motion: qacc = 0 leaves MuJoCo's bias, in the space of qvel.
-        bias = pinocchio.rnea(model, data, q, v, order.a_from_qacc(qpos, qvel, np.zeros_like(qvel)))
-        _compare(robot, "bias forces", order.qvel_from_v(qpos, bias), state.qfrc_bias)
+        compare("mass matrix", order.matrix_to_mujoco(qpos, mass), _mass_matrix(model, state))
+        # The force that keeps qacc at zero is MuJoCo's bias; forces change frames as velocities do.
+        bias = pinocchio.rnea(other, data, q, v, order.a_from_qacc(qpos, qvel, np.zeros_like(qvel)))
+        compare("bias forces", order.qvel_from_v(qpos, bias), state.qfrc_bias)
+    return worst
 
 
-def random_state(robot: RobotModel, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """A random base pose, joints inside their ranges, and velocities: qpos (7 + n,), qvel (6 + n,)."""
+def _random_state(model: mujoco.MjModel, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     quaternion = rng.standard_normal(4)
-    joints = rng.uniform(robot.lower, robot.upper)
+    ranges = np.where(model.jnt_limited[1:, None], model.jnt_range[1:], np.array([-1.0, 1.0]))
+    joints = rng.uniform(ranges[:, 0], ranges[:, 1])
     qpos = np.concatenate([rng.uniform(-1, 1, 3), quaternion / np.linalg.norm(quaternion), joints])
-    return qpos, rng.uniform(-1, 1, 6 + len(joints))
+    return qpos, rng.uniform(-1, 1, model.nv)
 
 
-def _frames(model: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[str, Pose]]:
-    bodies = [(model.body(b).name, Pose(data.xmat[b].reshape(3, 3), data.xpos[b])) for b in range(1, model.nbody)]
-    sites = [(model.site(s).name, Pose(data.site_xmat[s].reshape(3, 3), data.site_xpos[s])) for s in range(model.nsite)]
-    return bodies + sites
+def _frames(model: mujoco.MjModel, data: mujoco.MjData) -> Iterator[tuple[str, Pose]]:
+    for body in range(1, model.nbody):
+        yield model.body(body).name, Pose(data.xmat[body].reshape(3, 3), data.xpos[body])
+    for site in range(model.nsite):
+        yield model.site(site).name, Pose(data.site_xmat[site].reshape(3, 3), data.site_xpos[site])
 
 
 def _mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """Mass matrix (nv, nv) by products with unit vectors: mj_mulM keeps its signature between releases."""
     matrix = np.zeros((model.nv, model.nv))
-    for column in range(model.nv):  # mj_mulM keeps its signature between releases, mj_fullM does not
-        unit = np.zeros(model.nv)
-        unit[column] = 1.0
+    for column, unit in enumerate(np.eye(model.nv)):
         mujoco.mj_mulM(model, data, matrix[column], unit)
     return matrix
-
-
-def _compare(
-    robot: RobotModel, what: str, pinocchio_value: np.ndarray | float, mujoco_value: np.ndarray | float
-) -> None:
-    difference = np.abs(np.asarray(pinocchio_value) - np.asarray(mujoco_value)) / (1 + np.abs(mujoco_value))
-    if not difference.max() <= TOLERANCE:
-        raise RobotError(
-            f"robot '{robot.name}': MuJoCo and Pinocchio differ in {what} by {difference.max():.2e} (at most "
-            f"{TOLERANCE:g}); the model uses something that the URDF conversion does not know"
-        )

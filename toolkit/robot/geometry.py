@@ -14,7 +14,7 @@ from toolkit.robot.model import ArmGeometry, LegGeometry
 STRAIGHT_LEG_MARGIN = 0.015  # of the length from hip to ankle
 STRAIGHT_ARM_MARGIN = 0.05  # of the length from shoulder to palm
 _ROLES = ("roll", "pitch", "yaw")
-_ALIGNED = 0.8  # least |cosine| between a joint axis in the home posture and the base axis that names its role
+_ALIGNED = 0.72  # least |cosine| between a joint axis in the home posture and the base axis that names its role
 
 
 def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegGeometry:
@@ -191,6 +191,8 @@ def _leg_roles(model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], li
     names = [model.joint(joint).name for joint in joints]
     cosines = np.abs(data.xaxis[joints] @ base)
     found = [_ROLES[k] if row[k] >= _ALIGNED else "oblique" for row, k in zip(cosines, cosines.argmax(1), strict=True)]
+    slides = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
+    found = ["slide" if slide else role for slide, role in zip(slides, found, strict=True)]
     if (
         len(joints) != 6
         or sorted(found[:3]) != sorted(_ROLES)

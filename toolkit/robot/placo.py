@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,12 @@ class PinocchioMap:
 
     q_index: np.ndarray
     v_index: np.ndarray
+
+    @classmethod
+    def of(cls, joint_names: Sequence[str], model: pinocchio.Model) -> PinocchioMap:
+        """Map between joints in MuJoCo's order and the vectors of a Pinocchio model."""
+        joints = [model.joints[model.getJointId(name)] for name in joint_names]
+        return cls(np.array([joint.idx_q for joint in joints], int), np.array([joint.idx_v for joint in joints], int))
 
     def q_from_qpos(self, qpos: np.ndarray) -> np.ndarray:
         """Pinocchio configuration (..., 7 + n) of MuJoCo's qpos (..., 7 + n)."""
@@ -117,8 +124,7 @@ def pinocchio_model(robot: RobotModel) -> pinocchio.Model:
 
 def pinocchio_map(robot: RobotModel, model: pinocchio.Model) -> PinocchioMap:
     """Index maps between `robot.joint_names` and a Pinocchio model's vectors."""
-    joints = [model.joints[model.getJointId(name)] for name in robot.joint_names]
-    return PinocchioMap(np.array([joint.idx_q for joint in joints]), np.array([joint.idx_v for joint in joints]))
+    return PinocchioMap.of(robot.joint_names, model)
 
 
 def _armature(robot: RobotModel, order: PinocchioMap) -> np.ndarray:

@@ -91,6 +91,8 @@ def read_model(path: Path) -> ModelSource:
             _prepare_urdf(path, root)
             spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
             spec.compiler.fusestatic = False
+            for geom in spec.geoms:
+                geom.density = 0.0  # a link without <inertial> has no mass, whatever its shapes
         _absolute_files(spec, path.parent)
     except ValueError as error:
         raise RobotError(f"{path}: MuJoCo cannot load it: {' '.join(str(error).split())}") from None
