@@ -65,11 +65,27 @@ def robot_folder(name: str, robots_dir: Path | None = None) -> Path:
     raise RobotError(f"robot '{name}' is not in {folder}; {suggestion(name, find_robots(robots_dir))}")
 
 
-def load_robot(name: str, robots_dir: Path | None = None) -> RobotModel:
+def default_robot(robots_dir: Path | None = None) -> str:
+    """Name of the robot that is meant where none is: the one in the file `default`, else the only one there is.
+
+    Raises:
+        RobotError: there are none or several, and no such file.
+    """
+    folder = robots_folder(robots_dir)
+    if (folder / "default").is_file():
+        return (folder / "default").read_text().strip()
+    names = find_robots(robots_dir)
+    if len(names) != 1:
+        found = ", ".join(names) or "none"
+        raise RobotError(f"{folder}: which robot is meant? Found {found}; name one with --robot")
+    return names[0]
+
+
+def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
     """Load a robot and prove that MuJoCo, Pinocchio and placo agree about it.
 
     Args:
-        name: of a folder in the robots folder, or a path to a folder with a robot.toml.
+        name: of a folder in the robots folder, or a path to a folder with a robot.toml; None for `default_robot`.
         robots_dir: where to look; see `robots_folder`.
 
     Returns:
@@ -78,7 +94,7 @@ def load_robot(name: str, robots_dir: Path | None = None) -> RobotModel:
     Raises:
         RobotError: no such robot, or a broken, incomplete or inconsistent description; the message says where.
     """
-    folder = robot_folder(name, robots_dir)
+    folder = robot_folder(default_robot(robots_dir) if name is None else name, robots_dir)
     description = read_description(folder / FILE_NAME)
     assembly = assemble(description, read_model(find_model_file(description)))
     where = description.path
