@@ -9,7 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from toolkit.errors import ToolkitError
+from toolkit.world.timing import Timing
 
+AUTO_TIMINGS = (Timing(1.0, 1.0), Timing(0.4, 0.6), Timing(0.05, 0.35))
 EXIT_CODES = "exit codes: 0 success, 1 a plan or check failed (the reason is printed), 2 bad input"
 
 
@@ -32,6 +34,53 @@ def add_robot_options(target: argparse.ArgumentParser) -> None:
     """Add `--robot` and `--robots`."""
     target.add_argument("--robot", help="folder name under robots/, or a path (default: the one in robots/default)")
     target.add_argument("--robots", type=Path, metavar="DIR", help="folder with the robots (default: robots/)")
+
+
+def add_planning_options(target: argparse.ArgumentParser) -> None:
+    """Add what every command that plans understands."""
+    target.add_argument("--seed", type=int, default=0, help="of every random draw (default: %(default)s)")
+    target.add_argument(
+        "--planner",
+        choices=("auto", "learned", "optimiser", "kinematic", "quasi-static"),
+        default="auto",
+        help="who judges the dynamics of a transition in the search: trained networks, the centroidal optimiser itself, "
+        "nobody, or the static balance of every stance; auto: networks where the robot has them, else nobody",
+    )
+    target.add_argument(
+        "--timing",
+        metavar="SHIFT,SWING",
+        type=timing,
+        help="seconds of shifting the CoM and of moving the limb, e.g. 0.4,0.6 (default: the world's), or auto: the "
+        "planner chooses for each transition",
+    )
+    target.add_argument(
+        "--time-limit", type=positive(float), default=30.0, metavar="S", help="of the search (default: %(default)s)"
+    )
+    target.add_argument(
+        "--expansions",
+        type=positive(int),
+        default=1000,
+        metavar="N",
+        help="states that the search expands at most, whatever the time; reproducible (default: %(default)s)",
+    )
+    target.add_argument("--no-palms", action="store_true", help="plan with the feet alone")
+    target.add_argument("--steps", type=int, choices=(38, 60), default=60, help="foot transition model (default: 60)")
+    target.add_argument(
+        "--heuristic", choices=("grid", "euclidean"), default="grid", help="of the search (default: %(default)s)"
+    )
+
+
+def timing(text: str) -> tuple[Timing, ...]:
+    """An argparse type: `shift,swing` in seconds, or `auto` (an empty choice is the world's own)."""
+    if text == "auto":
+        return AUTO_TIMINGS
+    try:
+        shift, swing = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not SHIFT,SWING in seconds, nor auto") from None
+    if not (0 < shift < float("inf") and 0 < swing < float("inf")):
+        raise argparse.ArgumentTypeError(f"{text}: both times must be above zero")
+    return (Timing(shift, swing),)
 
 
 def positive(kind: Callable[[str], float]) -> Callable[[str], float]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +18,8 @@ from toolkit.centroidal.build import initial_com
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.centroidal.sequence import SequenceConfig, optimise
 from toolkit.contacts.schedule import ContactSchedule
+from toolkit.prediction.kinematic import KinematicEvaluator
+from toolkit.prediction.networks import NetworkEvaluator, load_networks
 from toolkit.robot.model import RobotModel
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult, Solution
@@ -28,6 +29,38 @@ from toolkit.simulation.run import ExecutionConfig, execute
 from toolkit.wholebody.plan import WholeBodyConfig, whole_body
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.world import World
+
+PLANNERS = ("auto", "learned", "optimiser", "kinematic", "quasi-static")
+
+
+def make_planner(robot: RobotModel, world: World, kind: str, config: PlannerConfig) -> ContactPlanner:
+    """The contact planner whose transitions are judged by `kind`.
+
+    Args:
+        robot: the robot.
+        world: the world.
+        kind: one of `PLANNERS`; "auto" takes the networks where the robot has them, else leaves the dynamics out.
+        config: settings.
+
+    Raises:
+        NetworkError: "learned" was asked for and the networks are missing or do not fit.
+    """
+    if kind == "quasi-static":
+        from toolkit.search.quasi_static import quasi_static_planner
+
+        return quasi_static_planner(robot, world, config)
+    if kind == "auto":
+        kind = "learned" if (robot.folder / "networks").is_dir() else "kinematic"
+    if kind == "kinematic":
+        return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
+    # Imported here: the fast solver takes seconds to compile where its cache is cold, and only these kinds need it.
+    from toolkit.prediction.optimiser import OptimiserEvaluator
+
+    optimiser = OptimiserEvaluator(robot)
+    at_rest = OptimiserEvaluator(robot, final_at_rest=True)
+    if kind == "learned":
+        return ContactPlanner(robot, world, NetworkEvaluator(load_networks(robot), optimiser), config, at_rest)
+    return ContactPlanner(robot, world, optimiser, config, at_rest)
 
 
 class Observer(Protocol):
@@ -69,7 +102,7 @@ class PipelineConfig:
             same seed gives the same plan on any machine fast enough.
         candidates: most contact sequences to test before giving up.
         initial_rest, final_rest: s at rest before the first transition and after the last one.
-        planner, sequence, wholebody, execution: settings of the stages.
+        sequence, wholebody, execution: settings of the stages.
     """
 
     seed: int = 0
@@ -77,7 +110,6 @@ class PipelineConfig:
     candidates: int = 6
     initial_rest: float = 0.4
     final_rest: float = 1.0
-    planner: PlannerConfig = field(default_factory=PlannerConfig)
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
     wholebody: WholeBodyConfig = field(default_factory=WholeBodyConfig)
     execution: ExecutionConfig = field(default_factory=ExecutionConfig)
@@ -229,8 +261,3 @@ def run(
             break
     reason = search.reason if best is None else best.reason
     return PipelineResult(robot, world, search, best, tested, reason)
-
-
-def default_output(world: Path, robot: str) -> Path:
-    """Folder of a run that was not given one."""
-    return Path("runs") / f"{world.stem}-{robot}-{time.strftime('%Y%m%d-%H%M%S')}"

@@ -1,0 +1,74 @@
+"""Command line: a world in, a verdict out."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from toolkit import cli
+
+DESCRIPTION = """\
+Plan a way through a world, run it in simulation, and say whether the robot got there.
+
+The stages: contact surfaces are extracted from the MJCF scene; an anytime search proposes contact sequences of feet
+and palms; the centroidal optimiser, inverse kinematics and the simulation test them, newest first; the first that
+passes every check is the plan.
+"""
+
+EPILOG = """\
+examples:
+  python -m toolkit.validate worlds/stairs.xml --seed 3
+  python -m toolkit.validate my_world.xml --robot robots/my_robot --out results/first --pictures
+
+written into the output folder: report.json, plan.json, motion.npz, execution.npz, scene.mjb, recording.rrd
+"""
+
+
+def arguments() -> argparse.ArgumentParser:
+    """The options of this command."""
+    parser = cli.parser("validate", DESCRIPTION, EPILOG)
+    parser.add_argument("world", type=Path, help="MJCF scene with sites named start and goal")
+    cli.add_robot_options(parser)
+    cli.add_planning_options(parser)
+    parser.add_argument("--out", type=Path, help="output folder (default: runs/<world>-<robot>-<time>)")
+    parser.add_argument("--candidates", type=cli.positive(int), default=6, help="sequences to test (default: 6)")
+    parser.add_argument("--pictures", action="store_true", help="also render a strip of pictures and plots")
+    parser.add_argument("--video", action="store_true", help="also render a video")
+    parser.add_argument("--no-recording", action="store_true", help="leave the rerun recording out")
+    return parser
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    args = arguments().parse_args(argv)
+    # Heavy imports come after the options, so that --help and mistakes in them answer at once.
+    from toolkit import pipeline
+    from toolkit.report.console import StageConsole
+    from toolkit.report.files import RunFolder
+    from toolkit.report.run import write_run
+    from toolkit.robot.loader import load_robot
+    from toolkit.search.options import planner_config
+    from toolkit.world.loader import load_world
+
+    began = time.perf_counter()
+    display = StageConsole()
+    world = load_world(args.world)
+    surface_seconds = time.perf_counter() - began
+    robot = load_robot(args.robot, args.robots)
+    folder = RunFolder(args.out, world.name, robot.name)
+    display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
+    config = replace(
+        pipeline.PipelineConfig(), seed=args.seed, time_limit=args.time_limit, candidates=args.candidates
+    )
+    planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
+    result = pipeline.run(robot, world, planner, config, display)
+    with folder:
+        write_run(folder.path, result, args, surface_seconds)
+    display.verdict(result.checks, result.passed, result.reason, folder.target, time.perf_counter() - began)
+    return 0 if result.passed else 1
+
+
+if __name__ == "__main__":
+    cli.run(main)
