@@ -20,7 +20,7 @@ import mujoco
 import numba
 import numpy as np
 
-from toolkit.contacts.surface_table import SurfaceTable, surface_table
+from toolkit.contacts.surface_table import surface_table
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.world.surface import Surface
@@ -208,7 +208,7 @@ def plane_height(table, q, x, y):
 
 @numba.njit(cache=True)
 def sole_axis(table, q, c, s):
-    """x axis of a sole on surface q: the heading (c, s) dropped on the plane along the vertical."""
+    """The x axis of a sole on surface q: the heading (c, s) dropped on the plane along the vertical."""
     normal = table.rotation[q, :, 2]
     ax, ay, az = c * normal[2], s * normal[2], -(c * normal[0] + s * normal[1])
     length = np.sqrt(ax * ax + ay * ay + az * az)

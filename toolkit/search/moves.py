@@ -18,7 +18,7 @@ from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
 from toolkit.search.contact_table import ContactTable
-from toolkit.search.legs import legs_of
+from toolkit.search.legs import legs_of, stances_violated
 from toolkit.search.occupancy import BodyBox, Occupancy
 
 _KEPT = 20_000  # entries of each memory
@@ -74,6 +74,10 @@ class MoveGenerator:
         occupancy: of the world.
         box: the body.
         config: limits.
+
+    Attributes:
+        legs: both legs with the margins of the search.
+        has_palm_surfaces: whether the world offers any.
     """
 
     def __init__(
@@ -91,6 +95,7 @@ class MoveGenerator:
         leg = robot.legs[Limb.LEFT_FOOT]
         self._climb = config.climb * (leg.thigh + leg.shin)
         self.legs = legs_of(robot, config.margins)
+        self.has_palm_surfaces = bool(projector.table.palm.any())
         self._box = np.array([box.half_depth, box.half_width, box.bottom, box.top])
         self._half = robot.half_sizes[Limb.LEFT_FOOT] + config.apart / 2
         self._drops = np.linspace(0.0, config.drop, 7) * robot.com_height
@@ -179,6 +184,18 @@ class MoveGenerator:
                 self._palms.clear()
             self._palms[key] = self._make_palms(limb, left, right)
         return self._palms[key]
+
+    def warm_up(self, standing: int) -> None:
+        """Run every compiled function once, so that compiling or loading them takes no time from a search."""
+        self.steps(Limb.LEFT_FOOT, standing)
+        one = np.array([standing])
+        self.swings(Limb.LEFT_FOOT, one, standing, standing, 1.0)
+        table = self._table
+        place, turn = table.position[one], table.rotation[one]
+        stances_violated(self.legs, place, self._drops, table.yaw[one], place, turn, place, turn)
+        if self.has_palm_surfaces and self._robot.arms:
+            limb = next(iter(self._robot.arms))
+            self._projector.project_palms(limb, place[0], np.array([[0.0, 1.0, 0.0]]), 0.0, 1e6)
 
     def _make_palms(self, limb: Limb, left: int, right: int) -> Moves:
         table, config, arm = self._table, self._config, self._robot.arms[limb]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from toolkit.contacts.projection import ProjectionConfig, Projector
+from toolkit.contacts.projection import Projected, ProjectionConfig, Projector
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Stance
 from toolkit.contacts.transition_model import TransitionModel, steps_38, steps_60, wide_steps
@@ -93,6 +93,14 @@ class ContactPlanner:
         self._projector = Projector(robot, world.surfaces, world.mujoco_model, self.config.projection)
         self._terrain = TerrainDistance(robot, world, self._projector, self.config.grid)
         self._timings = self.config.timings or (world.timing,)
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        moves, table = self._generator(wide=False)
+        ground = self._projector.table
+        surface = np.flatnonzero(ground.foot)[:1]
+        sole = Projected(surface, ground.origin[surface], ground.rotation[surface])
+        moves.warm_up(int(table.add(Limb.RIGHT_FOOT, sole)[0]))
 
     def start_stance(self) -> Stance:
         """Both feet on the ground below the start, at their distance in the home posture.
@@ -258,13 +266,12 @@ def _reason(stopped_by: str, seconds: float, expansions: int, problem: ContactPr
         "expansions": f"the limit of {expansions} expansions was reached; a higher one may help",
         "memory": f"the limit on memory was reached after {expansions} expansions",
     }[stopped_by]
-    total = int(problem.rejected.sum())
+    rejected = np.where(np.isin(np.arange(len(screen.REASONS)), screen.PALM_REASONS), 0, problem.rejected)
+    total = int(rejected.sum())
     if total == 0:
         return f"no contact sequence found: {how}"
-    order = np.argsort(-problem.rejected, kind="stable")[:4]
+    order = np.argsort(-rejected, kind="stable")[:4]
     shares = ", ".join(
-        f"{screen.REASONS[code]} {100 * problem.rejected[code] / total:.0f} %"
-        for code in order
-        if problem.rejected[code] > 0
+        f"{screen.REASONS[code]} {100 * rejected[code] / total:.0f} %" for code in order if rejected[code] > 0
     )
     return f"no contact sequence found: {how}; candidates were rejected for: {shares}"

@@ -23,6 +23,8 @@ from toolkit.search.state import COM, CONTACTS, LAST, VELOCITY, pack, unpack
 from toolkit.world.timing import Timing
 from toolkit.world.world import Goal
 
+_LIMBS = tuple(Limb)
+
 
 @dataclass(frozen=True)
 class CostConfig:
@@ -112,7 +114,7 @@ class ContactProblem:
         self._robot, self._moves, self._table = robot, moves, table
         self._evaluator, self._distance, self._goal = evaluator, distance, goal
         self._timings, self._config = timings, config
-        self._palms = [limb for limb in PALMS if palms and limb in robot.arms]
+        self._palms = [limb for limb in PALMS if palms and limb in robot.arms and moves.has_palm_surfaces]
         self._longest = longest
         numbers = np.full((1, 4), -1)
         for contact in start.contacts:
@@ -179,7 +181,7 @@ class ContactProblem:
             return []
         stance = self._stance(row)
         transitions = [
-            ContactTransition(Limb(limb), self._table.contact(number) if number >= 0 else None, self._timings[choice])
+            ContactTransition(_LIMBS[limb], self._table.contact(number) if number >= 0 else None, self._timings[choice])
             for limb, number, choice in zip(
                 candidates.limb.tolist(), candidates.number.tolist(), timing.tolist(), strict=True
             )

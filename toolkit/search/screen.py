@@ -30,6 +30,7 @@ REASONS = (
     "arm out of reach of its palm",
 )
 NO_SURFACE, CLOSE, HIGH, BODY, LEG = 1, 2, 3, 4, 5
+PALM_REASONS = (14, 15, 16, 17)  # palms are an option: where they find no wall is no reason why there is no plan
 CROSSES, FAST, STILL, NO_WALL, FAR, WRONG_SIDE, FACING, DYNAMICS, COSTLY, ARM = range(11, 21)
 
 
