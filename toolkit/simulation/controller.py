@@ -7,7 +7,7 @@ import numpy as np
 from toolkit.centroidal.problem import Margins
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
-from toolkit.simulation.config import ExecutionConfig
+from toolkit.simulation.config import ExecutionConfig, TaskGains
 from toolkit.simulation.dynamics import RobotDynamics, carries
 from toolkit.simulation.joint_box import JointBox
 from toolkit.simulation.limb_target import LimbTargets
@@ -160,15 +160,25 @@ class Controller:
         else:
             linear = angular = gains.swing if limb.is_foot else gains.hand
         share = 1.0 if self.tracker.in_contact[limb] else targets.authority[limb]
-        for part, task in ((slice(0, 3), linear), (slice(3, 6), angular)):
-            root = (share * task.weight) ** 0.5
-            here = slice(rows, rows + 3)
-            np.multiply(dynamics.jacobian[limb, part], root, out=self._tasks[here])
-            error = task.kd * (targets.velocity[limb, part] - dynamics.limb_velocity[limb, part])
-            error += task.kp * targets.error[limb, part]
-            self._wanted[here] = root * (error + targets.acceleration[limb, part] - dynamics.drift[limb, part])
-            rows += 3
-        return rows
+        rows = self._append(limb, slice(0, 3), linear, share, rows)
+        if limb.is_foot:
+            return self._append(limb, slice(3, 6), angular, share, rows)
+        # A palm may turn about the normal as its arm likes: only the two other axes of its frame are rows.
+        rows = self._append(limb, slice(3, 6), angular, share, rows)
+        last, tilt = slice(rows - 3, rows), dynamics.limb_rotation[limb, :, :2].T
+        self._tasks[rows - 3 : rows - 1] = tilt @ self._tasks[last]
+        self._wanted[rows - 3 : rows - 1] = tilt @ self._wanted[last]
+        return rows - 1
+
+    def _append(self, limb: Limb, part: slice, task: TaskGains, share: float, rows: int) -> int:
+        """Append the three rows of a limb's linear or angular task; returns the new number of rows."""
+        dynamics, targets = self.dynamics, self.targets
+        root, here = (share * task.weight) ** 0.5, slice(rows, rows + 3)
+        np.multiply(dynamics.jacobian[limb, part], root, out=self._tasks[here])
+        error = task.kd * (targets.velocity[limb, part] - dynamics.limb_velocity[limb, part])
+        error += task.kp * targets.error[limb, part]
+        self._wanted[here] = root * (error + targets.acceleration[limb, part] - dynamics.drift[limb, part])
+        return rows + 3
 
     def _orient_base(self, index: int, qvel: np.ndarray, target: np.ndarray) -> None:
         """Wanted angular acceleration of the base, in the base."""

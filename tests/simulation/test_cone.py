@@ -1,0 +1,70 @@
+"""Linear wrench cones against the forces that corners of a sole can really exert."""
+
+import numpy as np
+from scipy.optimize import linprog
+
+from toolkit.simulation.cone import friction_rows, sole_rows
+
+HALF, FRICTION = np.array([0.11, 0.065]), 0.5
+CORNERS = np.array([[a * HALF[0], b * HALF[1], 0.0] for a in (-1, 1) for b in (-1, 1)])
+
+
+def wrench_of(forces, points):
+    return np.r_[forces.sum(0), np.cross(points, forces).sum(0)]
+
+
+def corners_can_exert(wrench, friction):
+    """Whether corner forces within square friction pyramids add up to a wrench (a linear programme)."""
+    rays = np.array([[friction * a, friction * b, 1.0] for a in (-1, 1) for b in (-1, 1)])
+    columns = [np.r_[ray, np.cross(point, ray)] for point in CORNERS for ray in rays]
+    answer = linprog(np.zeros(len(columns)), A_eq=np.array(columns).T, b_eq=wrench, bounds=(0, None))
+    return answer.status == 0
+
+
+def test_friction_polygon_lies_inside_the_circular_cone_and_fills_it():
+    rng = np.random.default_rng(0)
+    rows = friction_rows(FRICTION)
+    forces = rng.normal(size=(20000, 3)) * [1.0, 1.0, 2.0]
+    inside = (forces @ rows.T <= 0.0).all(1)
+    ratio = np.hypot(forces[:, 0], forces[:, 1]) / (FRICTION * np.maximum(forces[:, 2], 1e-12))
+    assert (ratio[inside] <= 1.0 + 1e-12).all() and (forces[inside, 2] >= 0.0).all()
+    # The inscribed 16-gon reaches cos(pi / 16) = 0.981 of the circle everywhere.
+    assert inside[(ratio < np.cos(np.pi / 16)) & (forces[:, 2] > 0.0)].all()
+
+
+def test_every_wrench_in_the_sole_cone_can_be_exerted_by_the_corners():
+    rng = np.random.default_rng(1)
+    rows = sole_rows(FRICTION, HALF)
+    inside = outside = 0
+    for _ in range(400):
+        force = np.r_[rng.uniform(-1, 1, 2) * FRICTION, 1.0]
+        moment = np.r_[rng.uniform(-1.2, 1.2, 2) * HALF[::-1], rng.uniform(-1.2, 1.2) * FRICTION * HALF.sum()]
+        wrench = np.r_[force, moment]
+        within = (rows @ wrench <= -1e-9).all()
+        if within:
+            inside += 1
+            assert corners_can_exert(wrench, FRICTION)
+        elif (rows[16:] @ wrench > 1e-9).any() and np.abs(force[:2]).max() <= FRICTION:
+            outside += 1
+            assert not corners_can_exert(wrench, FRICTION)
+    assert inside > 30 and outside > 30
+
+
+def test_wrenches_of_corner_forces_well_inside_are_accepted():
+    rng = np.random.default_rng(2)
+    rows = sole_rows(FRICTION, HALF)
+    for _ in range(300):
+        normal = rng.uniform(0.0, 1.0, 4)
+        tangent = rng.uniform(-1, 1, (4, 2)) * normal[:, None] * FRICTION * 0.69  # inside the circle, any direction
+        forces = np.c_[tangent, normal]
+        assert (rows @ wrench_of(forces, CORNERS) <= 1e-12).all()
+
+
+def test_yaw_factor_shrinks_the_yaw_moment_in_proportion():
+    def most(factor):
+        rows = sole_rows(FRICTION, HALF, factor)
+        moments = np.linspace(0.0, 0.2, 2001)
+        return moments[[(rows @ [0, 0, 1, 0, 0, m] <= 0).all() for m in moments]].max()
+
+    np.testing.assert_allclose(most(1.0), FRICTION * HALF.sum(), atol=1e-4)
+    np.testing.assert_allclose(most(0.7), 0.7 * most(1.0), atol=2e-4)
