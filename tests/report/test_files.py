@@ -103,6 +103,11 @@ def test_json_is_strict(tmp_path):
         "c": [True, 3],
         "d": "PASS",
     }
+    tricky = {"text [1,\n 2]": ["a, 1", "[ 2 ]"], "empty": [], "nested": [[1, 2], [None, 4e-9]], "one": [-1.5]}
+    write_json(path, tricky)
+    assert (
+        json.loads(path.read_text()) == tricky and "[-1.5]" in path.read_text() and "[null, 4e-09]" in path.read_text()
+    )
     path.write_text("{")
     with pytest.raises(InputError, match="not a JSON file"):
         read_json(path)

@@ -146,9 +146,20 @@ def plain(value: Any) -> Any:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write strict JSON (see `plain`), indented, ending in a line break."""
-    text = json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    """Write strict JSON (see `plain`), indented, lists of numbers on one line, ending in a line break."""
+    path.write_text(_json_text(plain(value), "") + "\n", encoding="utf-8")
+
+
+def _json_text(value: Any, indent: str) -> str:
+    """JSON in lines, `indent` before each but the first; a list without lists or dictionaries stays on one line."""
+    inner = indent + "  "
+    if isinstance(value, dict) and value:
+        key = [json.dumps(name, ensure_ascii=False) for name in value]
+        lines = [f"{inner}{k}: {_json_text(v, inner)}" for k, v in zip(key, value.values(), strict=True)]
+        return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+    if isinstance(value, list) and any(isinstance(item, (list, dict)) for item in value):
+        return "[\n" + ",\n".join(inner + _json_text(item, inner) for item in value) + f"\n{indent}]"
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
 
 
 def read_json(path: Path) -> Any:

@@ -120,8 +120,8 @@ def _extent(world: World, points: list[np.ndarray]) -> tuple[np.ndarray, np.ndar
     corners = [(surface.pose @ _flat(surface.boundary[0]))[:, :2] for surface in world.surfaces]
     if corners:
         everything = np.concatenate(corners)
-        low = np.maximum(low - 0.6, np.minimum(low, everything.min(0) - 0.1))
-        high = np.minimum(high + 0.6, np.maximum(high, everything.max(0) + 0.1))
+        low = np.maximum(low - 0.3, np.minimum(low, everything.min(0) - 0.1))
+        high = np.minimum(high + 0.3, np.maximum(high, everything.max(0) + 0.1))
     return low, high
 
 
