@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.build import initial_com
 from toolkit.contacts.category import Category, category_of
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
@@ -43,7 +42,9 @@ class SamplingConfig:
         friction: lower and upper coefficient.
         shift, swing: s; ranges of the timing.
         com_spread: (3,) m; standard deviation of the CoM around home height above the mean feet.
-        speed_spread: m/s; standard deviation of each horizontal component (vertical: a third).
+        speed_spread: m/s; standard deviation of each horizontal component (vertical: a third) of the fast half of the
+            samples; a tenth of it in the slow half.
+        step_spread: factor on the range of a moved foot's place; 1 stays within what legs can usually reach.
     """
 
     tilt: float = math.radians(20)
@@ -51,7 +52,8 @@ class SamplingConfig:
     shift: tuple[float, float] = (1.0, 1.0)
     swing: tuple[float, float] = (1.0, 1.0)
     com_spread: tuple[float, float, float] = (0.06, 0.05, 0.03)
-    speed_spread: float = 0.25
+    speed_spread: float = 2.0
+    step_spread: float = 1.6
 
 
 @dataclass(frozen=True)
@@ -101,10 +103,28 @@ def sample_transition(
     transition = _transition(robot, stance, category, palms, timing, friction, rng, config)
     if category_of(stance, transition) != category:
         raise AssertionError(f"sampled {category_of(stance, transition)!r} instead of {category!r}")
-    heading = stance.mean_feet.rotation
-    com = initial_com(robot, stance) + heading @ (rng.normal(size=3) * config.com_spread)
-    velocity = heading @ (rng.normal(size=3) * np.array([1.0, 1.0, 1 / 3]) * config.speed_spread)
-    return TransitionSample(stance, com, velocity * rng.uniform(0, 1.5), transition)
+    world_from_mean = stance.mean_feet
+    for _ in range(20):  # most states that the limbs cannot reach say nothing about dynamics
+        offset = np.array([0.0, 0.0, robot.com_height]) + rng.normal(size=3) * config.com_spread
+        if _within_reach(robot, stance, world_from_mean, offset):
+            break
+    speed = config.speed_spread * (1.0 if rng.random() < 0.5 else 0.1)
+    velocity = world_from_mean.rotation @ (rng.normal(size=3) * np.array([1.0, 1.0, 1 / 3]) * speed)
+    return TransitionSample(stance, world_from_mean @ offset, velocity, transition)
+
+
+def _within_reach(robot, stance, world_from_mean, offset) -> bool:
+    """Whether every limb reaches its contact from a CoM given in the frame of the mean feet."""
+    for contact in stance.contacts:
+        if contact.limb.is_foot:
+            leg = robot.legs[contact.limb]
+            root, tip, reach = leg.hip_in_com, leg.ankle_in_sole, leg.max_length
+        else:
+            arm = robot.arms[contact.limb]
+            root, tip, reach = arm.shoulder_in_com, np.zeros(3), arm.max_reach
+        if np.linalg.norm(world_from_mean @ (offset + root) - contact.pose @ tip) > reach:
+            return False
+    return True
 
 
 def _transition(robot, stance, category, palms, timing, friction, rng, config) -> ContactTransition:
@@ -122,7 +142,8 @@ def _transition(robot, stance, category, palms, timing, friction, rng, config) -
     standing = stance[foot.mirrored].pose
     world_from_standing = Pose.from_yaw(standing.position, standing.yaw)
     side = 1 if foot.is_left else -1
-    place = np.array([rng.uniform(-0.3, 0.5), side * rng.uniform(0.15, 0.4), rng.uniform(-0.12, 0.12)])
+    place = np.array([rng.uniform(-0.3, 0.5), side * rng.uniform(0.15, 0.4), rng.uniform(-0.15, 0.15)])
+    place *= config.step_spread
     contact = _foot(foot, world_from_standing, place, side * rng.uniform(-0.3, 0.5), friction, rng, config)
     return ContactTransition(foot, contact, timing)
 
@@ -141,7 +162,7 @@ def _palm(robot, limb, world_from_feet, friction, rng, config) -> Contact:
     ahead, up = math.radians(rng.uniform(-10, 60)), math.radians(rng.uniform(-20, 20))
     ray = np.array([math.sin(ahead) * math.cos(up), side * math.cos(ahead) * math.cos(up), math.sin(up)])
     shoulder = arm.shoulder_in_com + np.array([0.0, 0.0, robot.com_height])
-    place = shoulder + rng.uniform(0.5 * arm.max_reach, 1.02 * arm.max_reach) * ray
+    place = shoulder + rng.uniform(0.5 * arm.max_reach, 1.05 * arm.max_reach) * ray
     # Normal: towards the robot, turned about the vertical and tilted.
     turn, tilt = rng.uniform(-config.tilt, config.tilt, 2)
     normal = rotation_about_z(turn) @ np.array([0.0, -side * math.cos(tilt), math.sin(tilt)])

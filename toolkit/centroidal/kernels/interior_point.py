@@ -135,8 +135,12 @@ def solve(data, tolerance, max_iterations, u, x, w):
                     cone.divide(scaling[i], eta[i], p4, q4)
                     for a in range(4):
                         t_round[i, a] += q4[a]
-            g_contact[:] = contact_gradient
-            g_knot[:] = knot_gradient
+            for j in range(contacts):
+                for a in range(6):
+                    g_contact[j, a] = contact_gradient[j, a]
+            for t in range(n + 1):
+                for a in range(9):
+                    g_knot[t, a] = knot_gradient[t, a]
             constraints.subtract_adjoint(data, t_line, t_round, g_contact, g_knot)
             riccati.solve(
                 data, g_contact, g_knot, step_gradient, contact_hessian, spread, total, mixed, theta, gain, du, dx

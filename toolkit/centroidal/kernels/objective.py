@@ -12,7 +12,8 @@ from toolkit.centroidal.kernels import compiled
 @compiled
 def rollout(data, u, x, w):
     """Fill the states x (N + 1, 9) and the total wrenches w (N, 6) of contact wrenches u (C, 6)."""
-    x[0] = data.x0
+    for a in range(9):
+        x[0, a] = data.x0[a]
     for t in range(data.h.shape[0]):
         h = data.h[t]
         w[t] = 0.0

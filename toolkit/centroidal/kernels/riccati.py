@@ -118,7 +118,9 @@ def factor_steps(data, knot_hessian, step_hessian, total, mixed, theta, gain):
     n = data.h.shape[0]
     value = np.empty((9, 9))
     columns = np.empty((15, 9))  # of V [A B], as rows
-    value[:] = knot_hessian[n]
+    for a in range(9):
+        for b in range(9):
+            value[a, b] = knot_hessian[n, a, b]
     row_x, row_w = np.empty(9), np.empty(6)
     product = np.empty((6, 6))
     for t in range(n - 1, -1, -1):
@@ -190,7 +192,9 @@ def solve(data, contact_gradient, knot_gradient, step_gradient, hessian, spread,
     """
     n = data.h.shape[0]
     shift, control = np.zeros((n, 6)), np.empty((n, 6))
-    y, row_x, row_w, beta = knot_gradient[n].copy(), np.empty(9), np.empty(6), np.empty(6)
+    y, row_x, row_w, beta = np.empty(9), np.empty(9), np.empty(6), np.empty(6)
+    for a in range(9):
+        y[a] = knot_gradient[n, a]
     for t in range(n - 1, -1, -1):
         for j in range(data.first[t], data.first[t + 1]):
             g = contact_gradient[j]

@@ -1,0 +1,57 @@
+"""OptimiserEvaluator: transitions judged by the centroidal optimiser itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.centroidal import fast
+from toolkit.centroidal.build import ProblemConfig, transition_problem
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Stance
+from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.robot.model import RobotModel
+
+
+class OptimiserEvaluator:
+    """Solves the centroidal problem of every transition; about a millisecond each.
+
+    Args:
+        robot: the robot.
+        config: what the problems assume.
+        solver: settings of the fast solver.
+        final_at_rest: whether the CoM must be at rest after the transition, as at the goal.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        config: ProblemConfig | None = None,
+        solver: fast.FastConfig | None = None,
+        *,
+        final_at_rest: bool = False,
+    ):
+        self._robot, self._config, self._solver = robot, config, solver
+        self._final_at_rest = final_at_rest
+
+    def evaluate(
+        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+    ) -> TransitionBatch:
+        """Judge transitions; see `TransitionEvaluator`. An infeasible one has an infinite objective and no motion."""
+        n = len(transitions)
+        feasible, objective = np.zeros(n, bool), np.full(n, np.inf)
+        final_com, velocity = np.tile(np.asarray(com, float), (n, 1)), np.zeros((n, 3))
+        for index, transition in enumerate(transitions):
+            problem = transition_problem(
+                self._robot,
+                stance,
+                com,
+                com_velocity,
+                transition,
+                config=self._config,
+                final_at_rest=self._final_at_rest,
+            )
+            motion = fast.solve(problem, config=self._solver)
+            if motion.feasible:
+                feasible[index], objective[index] = True, motion.objective
+                final_com[index], velocity[index] = motion.com[-1], motion.linear_momentum[-1] / problem.mass
+        return TransitionBatch(feasible, objective, final_com, velocity)
