@@ -31,32 +31,37 @@ class IKConfig:
         settle: iterations for the first sample.
         foot_position, foot_orientation, com, palm_position, palm_normal, palm_twist, base: weights per squared m or
             rad.
-        arms, trunk, legs: weights per squared rad of a tick's deviation from the eased return to the home posture; the
-            trunk is what carries both arms, or all that is neither leg nor arm.
+        arms, trunk, legs, rest: weights per squared rad of a tick's deviation from the eased return to the home
+            posture; the trunk is what carries both arms, the rest is a head and the like.
         posture_time: s; time constant of that return.
-        angular_momentum: weight per squared rad of a tick's deviation from the planned angular momentum, in units of
+        arm_swing: rad; a free arm's joints stay this close to the home posture, or come no farther away.
+        angular_momentum: weight per squared rad of a tick's deviation from the planned angular momentum, divided by
             mass times squared CoM height; a large one makes trunk and arms swing wide.
         velocity_fraction: share of the joint velocity limits that may be used.
         range_margin: rad; kept from each end of a joint's range.
+        range_rate: 1/s; how fast a joint may approach the end of its range, per rad of distance.
         min_knee: rad; least knee flexion.
     """
 
     substeps: int = 2
     settle: int = 200
-    foot_position: float = 1e4
-    foot_orientation: float = 1e3
-    com: float = 1e3
-    palm_position: float = 1e3
-    palm_normal: float = 1e2
+    foot_position: float = 1e6
+    foot_orientation: float = 1e5
+    com: float = 1e5
+    palm_position: float = 1e5
+    palm_normal: float = 1e4
     palm_twist: float = 0.1
     base: float = 1.0
-    arms: float = 0.15
+    arms: float = 0.2
     trunk: float = 5.0
     legs: float = 0.01
-    posture_time: float = 0.15
-    angular_momentum: float = 1.4
+    rest: float = 50.0
+    posture_time: float = 0.1
+    arm_swing: float = 0.6
+    angular_momentum: float = 1.4e4
     velocity_fraction: float = 0.95
     range_margin: float = 0.02
+    range_rate: float = 25.0
     min_knee: float = 0.12
 
 
@@ -127,9 +132,13 @@ class WholeBodyIK:
         reaching = [set(chains[palm]) for palm in PALMS if palm in chains]
         both = set.intersection(*reaching) if len(reaching) == 2 else set()
         arms = set().union(*reaching) - both - legs
+        names = {limb: [model.joint(joint).name for joint in chains[limb] if joint in arms] for limb in self.palms}
+        self.arm_joints = {limb: [self.robot.joint_names.index(name) for name in row] for limb, row in names.items()}
         groups: dict[float, list[str]] = {}
         for joint in range(1, model.njnt):
-            weight = config.legs if joint in legs else config.arms if joint in arms else config.trunk
+            in_trunk = joint in both or not reaching
+            weight = config.legs if joint in legs else config.arms if joint in arms else config.rest
+            weight = config.trunk if in_trunk and joint not in legs else weight
             groups.setdefault(weight, []).append(model.joint(joint).name)
         return [(names, weight) for weight, names in groups.items()]
 
@@ -160,8 +169,9 @@ class WholeBodyIK:
                 break
         for task, _, weight in self.postures:
             task.configure("posture", "soft", weight)
-        inertia = self.robot.mass * self.robot.com_height**2
-        self.momentum.configure("momentum", "soft", self.config.angular_momentum / inertia**2)
+        # placo's task is in kg m^2/s: over a tick, and divided by an inertia, it is an angle.
+        angle = self.tick / (self.robot.mass * self.robot.com_height**2)
+        self.momentum.configure("momentum", "soft", self.config.angular_momentum * angle**2)
         self.solver.enable_velocity_limits(True)
         return self.order.qpos_from_q(self.wrapper.state.q)
 
@@ -171,13 +181,20 @@ class WholeBodyIK:
         Raises:
             PlanningError: if the quadratic program has no solution.
         """
+        angles = self.joints
         self._set_targets(time, paths, motion)
-        for task, homes, _ in self.postures:
-            for name, home in homes.items():
-                angle = self.wrapper.get_joint(name)
-                task.set_joint(name, angle + self._ease * (home - angle))
+        self._set_ranges(angles, [palm for palm in self.palms if paths.authority(palm, time) == 0.0])
+        targets = dict(zip(self.robot.joint_names, angles + self._ease * (self.robot.home[7:] - angles), strict=True))
+        for task, names, _ in self.postures:
+            for name in names:
+                task.set_joint(name, targets[name])
         self._solve(time)
         return self.order.qpos_from_q(self.wrapper.state.q)
+
+    @property
+    def joints(self) -> np.ndarray:
+        """(n,) rad; present joint angles."""
+        return self.wrapper.state.q[self.order.q_index]
 
     @property
     def _ease(self) -> float:
@@ -203,6 +220,23 @@ class WholeBodyIK:
         self.base.R_world_frame = rotation_about_z(np.arctan2(heading[1], heading[0]))
         for palm, tasks in self.palms.items():
             self._set_palm(palm, tasks, paths.sample(palm, time).pose, paths.authority(palm, time))
+
+    def _set_ranges(self, angles: np.ndarray, free: list[Limb]) -> None:
+        """Ranges of this tick: approached ever more slowly, and narrow for arms that hang free.
+
+        Momentum asks for wide swings of the arms; people do not make them.
+        """
+        lower, upper = self.lower.copy(), self.upper.copy()
+        for palm in free:
+            arm, swing = self.arm_joints[palm], self.config.arm_swing
+            home = self.robot.home[7:][arm]
+            lower[arm] = np.maximum(lower[arm], np.minimum(home - swing, angles[arm]))
+            upper[arm] = np.minimum(upper[arm], np.maximum(home + swing, angles[arm]))
+        share = min(self.config.range_rate * self.tick, 1.0)
+        lower = np.minimum(angles + share * (lower - angles), angles)
+        upper = np.maximum(angles + share * (upper - angles), angles)
+        for name, low, high in zip(self.robot.joint_names, lower.tolist(), upper.tolist(), strict=True):
+            self.wrapper.set_joint_limits(name, low, high)
 
     def _set_palm(self, palm: Limb, tasks: tuple, pose: Pose | None, authority: float) -> None:
         position, normal, twist = tasks

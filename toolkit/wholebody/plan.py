@@ -63,6 +63,9 @@ def whole_body(
     reasons = [
         f"{limb.label} finds no way clear of the world in transition {transition}" for limb, transition in paths.blocked
     ]
+    if not motion.feasible:
+        reason = f"the centroidal motion is not feasible: {motion.status}"
+        return _failed(robot, paths, times, reason, perf_counter() - begin)
     try:
         qpos = solve_ik(robot, paths, motion, times, config.ik)
     except PlanningError as error:

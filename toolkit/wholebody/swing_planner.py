@@ -19,11 +19,11 @@ Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 class SwingTiming:
     """When, as fractions of a swing, the patch leaves its surface, rises, crosses, descends and lands."""
 
-    leave: Window = Window(0.0, 0.35)
+    leave: Window = Window(0.0, 0.45)
     rise: Window = Window(0.0, 0.5)
     across: Window = Window(0.05, 0.85)
     descend: Window = Window(0.5, 0.95)
-    land: Window = Window(0.6, 1.0)
+    land: Window = Window(0.55, 1.0)
 
 
 EASY = SwingTiming()

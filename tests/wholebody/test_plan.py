@@ -1,0 +1,133 @@
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.wholebody.interpolate import TrajectorySampler
+from toolkit.wholebody.limb_paths import limb_paths
+from toolkit.wholebody.plan import whole_body
+
+
+@pytest.fixture(scope="module", params=["flat_walk", "stair_walk", "palm_walk"])
+def planned(request, robot):
+    walk = request.getfixturevalue(request.param)
+    return walk, whole_body(robot, walk.world, walk.schedule, walk.motion)
+
+
+def test_walks_are_feasible(planned):
+    _, trajectory = planned
+    assert trajectory.reason == ""
+    assert trajectory.feasible and trajectory.limits_respected
+    assert trajectory.max_position_error < 2e-3  # m; far below the thresholds where nothing pulls at the joints' limits
+    assert trajectory.max_orientation_error < 2e-3
+
+
+def test_arrays_fit_and_the_grid_is_uniform(robot, planned):
+    walk, trajectory = planned
+    count, joints = len(trajectory.times), len(robot.joint_names)
+    assert trajectory.qpos.shape == (count, 7 + joints) and trajectory.qvel.shape == (count, 6 + joints)
+    assert trajectory.torque.shape == (count, joints)
+    assert trajectory.limb_pose.shape == (count, 4, 7) and trajectory.limb_velocity.shape == (count, 4, 6)
+    np.testing.assert_allclose(np.diff(trajectory.times), trajectory.times[1], rtol=1e-9)
+    assert trajectory.times[-1] == pytest.approx(walk.schedule.duration)
+    np.testing.assert_allclose(np.linalg.norm(trajectory.qpos[:, 3:7], axis=1), 1.0, atol=1e-9)
+
+
+def test_contacts_are_those_of_the_schedule(planned):
+    walk, trajectory = planned
+    for index in range(0, len(trajectory.times), 7):
+        phase = walk.schedule.phase_at(trajectory.times[index])
+        held = [contact.limb in {c.limb for c in phase.contacts} for contact in phase.contacts]
+        assert all(held)
+        assert list(np.flatnonzero(trajectory.in_contact[index])) == [contact.limb for contact in phase.contacts]
+        for contact in phase.contacts:
+            np.testing.assert_allclose(trajectory.limb_pose[index, contact.limb, :3], contact.pose.position, atol=1e-9)
+
+
+def test_posture_stays_natural(robot, planned):
+    """Base upright and heading forward, arms not flailing, back at home in the end."""
+    _, trajectory = planned
+    free = [limb for limb in robot.arms if not trajectory.in_contact[:, limb].any()]
+    arms = [index for index, name in enumerate(robot.joint_names) if _carries(robot, name, free)]
+    data = mujoco.MjData(robot.mujoco_model)
+    for qpos in trajectory.qpos[::5]:
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(robot.mujoco_model, data)
+        up = data.body(robot.base).xmat.reshape(3, 3)[:, 2]
+        assert up[2] > np.cos(0.25)
+    away = np.abs(trajectory.qpos[:, 7:] - robot.home[7:])[:, arms]
+    assert away.max() < 0.61
+    assert away[-1].max() < 0.15
+
+
+def _carries(robot, name, limbs) -> bool:
+    """Whether a joint moves one of the limbs but neither foot nor the other palm."""
+    model = robot.mujoco_model
+
+    def chain(limb):
+        body, bodies = model.body(robot.limbs[limb].body).id, set()
+        while body:
+            bodies.add(body)
+            body = model.body_parentid[body]
+        return bodies
+
+    body = model.joint(name).bodyid[0]
+    carried = [limb for limb in robot.limbs if body in chain(limb)]
+    return len(carried) == 1 and carried[0] in limbs
+
+
+def test_velocities_are_mujocos(robot, planned):
+    """Integrating qvel over a step leads to the next posture, up to the second order in the step."""
+    _, trajectory = planned
+    model, step = robot.mujoco_model, trajectory.times[1]
+    for index in range(1, len(trajectory.times) - 2, 11):
+        qpos = trajectory.qpos[index].copy()
+        mujoco.mj_integratePos(model, qpos, 0.5 * (trajectory.qvel[index] + trajectory.qvel[index + 1]), step)
+        error = np.zeros(model.nv)
+        mujoco.mj_differentiatePos(model, error, 1.0, qpos, trajectory.qpos[index + 1])
+        assert np.abs(error).max() < 1e-2  # rad or m; a lift-off changes the acceleration by 100 rad/s^2 in 20 ms
+
+
+def test_sampler_passes_through_the_samples_with_continuous_velocity(robot, planned):
+    _, trajectory = planned
+    sampler, h = TrajectorySampler(trajectory), 1e-6
+    model, change = robot.mujoco_model, np.zeros(robot.mujoco_model.nv)
+    for index in range(1, len(trajectory.times) - 1, 13):
+        time = trajectory.times[index]
+        qpos, qvel, _ = sampler.sample(time)
+        mujoco.mj_differentiatePos(model, change, 1.0, trajectory.qpos[index], qpos)
+        np.testing.assert_allclose(change, 0.0, atol=1e-9)
+        np.testing.assert_allclose(qvel, trajectory.qvel[index], atol=1e-6)
+        for moment in (time - h, time + 0.37 * trajectory.times[1]):
+            before, after = sampler.sample(moment - h)[0], sampler.sample(moment + h)[0]
+            mujoco.mj_differentiatePos(model, change, 2 * h, before, after)
+            # The base's rotation leaves out third-order terms of the turn within 20 ms.
+            np.testing.assert_allclose(sampler.sample(moment)[1], change, atol=1e-4)
+
+
+def test_an_infeasible_motion_is_refused(robot, flat_walk):
+    motion = dataclasses.replace(flat_walk.motion, feasible=False, status="no luck")
+    trajectory = whole_body(robot, flat_walk.world, flat_walk.schedule, motion)
+    assert not trajectory.feasible
+    assert trajectory.reason == "the centroidal motion is not feasible: no luck"
+
+
+def test_free_palms_have_no_target(robot, palm_walk):
+    paths = limb_paths(robot, palm_walk.world, palm_walk.schedule, palm_walk.motion)
+    sample = paths.sample(Limb.LEFT_PALM, 0.0)
+    assert sample.pose is None and not sample.in_contact and np.isnan(sample.velocity).all()
+    assert paths.authority(Limb.LEFT_PALM, 0.0) == 0.0
+    assert not paths.blocked
+
+
+def test_paths_are_continuous_over_the_schedule(robot, planned):
+    walk, _ = planned
+    paths = limb_paths(robot, walk.world, walk.schedule, walk.motion)
+    for limb in FEET:
+        for phase in walk.schedule.phases[1:]:
+            before, after = paths.sample(limb, phase.start - 1e-7), paths.sample(limb, phase.start + 1e-7)
+            np.testing.assert_allclose(before.pose.position, after.pose.position, atol=1e-6)
+            np.testing.assert_allclose(before.pose.rotation, after.pose.rotation, atol=1e-6)
+            np.testing.assert_allclose(before.velocity, after.velocity, atol=1e-4)

@@ -1,0 +1,124 @@
+import numpy as np
+import pytest
+
+from tests.wholebody.conftest import FIRST, RISE, stairs, world_of
+from toolkit.geometry.pose import Pose, rotation_on_surface
+from toolkit.wholebody.limb_paths import box_collide
+from toolkit.wholebody.swing_planner import EASY, SwingConfig, SwingTask, _corners, _gaps, plan_swing
+
+HALF = np.array([0.11, 0.065])
+CONFIG = SwingConfig()
+
+
+def task_of(start, end, **options):
+    poses = (Pose.from_yaw(np.array(place), 0.0) for place in (start, end))
+    return SwingTask(0.0, 0.8, *poses, HALF, True, **options)
+
+
+def lowest_over(path, half, x_range):
+    """Least height of the sole's corners while they are within a range of x."""
+    u = np.linspace(0, 1, 401)
+    points = path.positions(u)
+    corners = np.array([[sx * half[0], sy * half[1], 0.0] for sx in (1, -1) for sy in (1, -1)])
+    world = points[:, None] + np.einsum("kij,cj->kci", path.rotations(u), corners)
+    inside = (world[..., 0] > x_range[0]) & (world[..., 0] < x_range[1])
+    return world[..., 2][inside].min()
+
+
+def free(collide_box):
+    return lambda centers, rotations, halves: np.zeros(len(centers), bool)
+
+
+def test_flat_ground_needs_no_raise():
+    path = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), box_collide(world_of("")), CONFIG)
+    assert path.clear
+    heights = path.positions(np.linspace(0, 1, 101))[:, 2]
+    assert heights.max() == pytest.approx(CONFIG.foot_lift, rel=0.05)
+    assert path.sample(0.4).velocity[0] > 0
+
+
+def test_path_clears_the_edge_of_a_step():
+    """Straight over, the toes would hit the riser; the chosen path passes above the edge by the margin."""
+    task = task_of([FIRST - 0.13, 0.1, 0.0], [FIRST + 0.17, 0.1, RISE])
+    path = plan_swing(task, box_collide(world_of(stairs(1))), CONFIG)
+    assert path.clear
+    blind = plan_swing(task, free(None), CONFIG)
+    assert lowest_over(blind, HALF, (FIRST, FIRST + 0.02)) < RISE
+    assert lowest_over(path, HALF, (FIRST, FIRST + 0.02)) > RISE + 0.5 * CONFIG.margin
+    down = task_of([FIRST + 0.17, 0.1, RISE], [FIRST - 0.13, 0.1, 0.0])
+    path = plan_swing(down, box_collide(world_of(stairs(1))), CONFIG)
+    assert path.clear
+    assert lowest_over(path, HALF, (FIRST, FIRST + 0.02)) > RISE + 0.5 * CONFIG.margin
+
+
+def test_path_rises_over_a_wall_in_the_way():
+    wall = '<geom type="box" size="0.02 1 0.1" pos="0.25 0 0.1"/>'
+    path = plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), box_collide(world_of(wall)), CONFIG)
+    assert path.clear
+    assert lowest_over(path, HALF, (0.23, 0.27)) > 0.2
+
+
+def test_a_wall_too_high_leaves_no_clear_path():
+    wall = '<geom type="box" size="0.02 1 1.0" pos="0.25 0 1.0"/>'
+    path = plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), box_collide(world_of(wall)), CONFIG)
+    assert not path.clear
+
+
+def test_a_contact_beside_a_riser_is_not_a_collision():
+    """A sole may rest against a wall; it leaves it and comes back."""
+    wall = '<geom type="box" size="0.1 1 0.5" pos="0.2101 0 0.5"/>'
+    path = plan_swing(task_of([-0.3, 0.1, 0], [0.0, 0.1, 0]), box_collide(world_of(wall)), CONFIG)
+    assert path.clear
+
+
+def test_tilted_contacts_are_left_and_reached_along_their_normals():
+    normal = np.array([0.25, 0.1, 1.0]) / np.linalg.norm([0.25, 0.1, 1.0])
+    start = Pose(rotation_on_surface(normal, 0.2), np.zeros(3))
+    end = Pose(rotation_on_surface(normal * [-1, 1, 1], -0.3), np.array([0.3, 0.0, 0.05]))
+    path = plan_swing(SwingTask(0.0, 0.8, start, end, HALF, True), free(None), CONFIG)
+    early, late = path.positions(np.array([0.06]))[0], path.positions(np.array([0.97]))[0]
+    assert (early - start.position) @ start.normal > 0.95 * np.linalg.norm(early - start.position)
+    assert (late - end.position) @ end.normal > 0.95 * np.linalg.norm(late - end.position)
+
+
+def test_fast_swings_cross_over_the_full_time():
+    slow = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), free(None), CONFIG)
+    fast = plan_swing(task_of([0, 0.1, 0], [2.4, 0.1, 0]), free(None), CONFIG)
+    assert slow.turn == EASY.across
+    assert fast.turn == CONFIG.fast_across
+
+
+def test_foot_goes_around_the_standing_foot():
+    """Between two places on either side of the standing sole the straight way would run through it."""
+    other = (Pose.from_yaw(np.array([0.2, -0.08, 0.0]), 0.0), HALF)
+    start, end = [-0.05, 0.09, 0.0], [0.5, 0.03, 0.0]
+    blocked = plan_swing(task_of(start, end), free(None), CONFIG)
+    path = plan_swing(task_of(start, end, other=other), free(None), CONFIG)
+    standing = _corners(other[0].position[None], other[0].rotation[None], HALF)[0]
+    u = np.linspace(0, 1, 101)
+    gap = {name: _gaps(_corners(p.positions(u), p.rotations(u), HALF), standing).min() for name, p in
+           (("straight", blocked), ("around", path))}  # fmt: skip
+    assert gap["straight"] < 0.01
+    assert gap["around"] > CONFIG.gap - 2e-3
+    np.testing.assert_allclose(path.sample(0.8).pose.position, end, atol=1e-12)
+
+
+def test_palm_retracts_and_approaches_along_the_normal():
+    normal = np.array([0.0, -1.0, 0.0])
+    rotation = np.stack([[0, 0, 1.0], np.cross(normal, [0, 0, 1.0]), normal], 1)
+    start, end = Pose(rotation, np.array([0.2, 0.6, 1.1])), Pose(rotation, np.array([0.5, 0.6, 1.2]))
+    wall = '<geom type="box" size="2 0.05 1" pos="0 0.65 1"/>'
+    task = SwingTask(0.0, 1.0, start, end, np.array([0.04, 0.04]), False)
+    path = plan_swing(task, box_collide(world_of(wall)), CONFIG)
+    assert path.clear
+    away = (path.positions(np.linspace(0, 1, 101)) - start.position) @ normal
+    assert away.max() == pytest.approx(CONFIG.palm_lift, rel=0.05)
+    # The last stretch runs along the normal only, and slowly.
+    late = path.sample(0.9)
+    assert abs(late.velocity[0]) < 1e-9 and late.velocity[1] > 0
+    assert np.linalg.norm(path.sample(0.97).velocity[:3]) < 0.08
+
+
+def test_swept_box_that_always_hits_is_reported():
+    path = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), lambda c, r, h: np.ones(len(c), bool), CONFIG)
+    assert not path.clear
