@@ -98,7 +98,7 @@ class BoxCollider:
             batch: boxes tested in one go.
         """
         self._batch = batch
-        self._model = _box_model(world.mujoco_model, batch)
+        self._model = free_boxes(world.mujoco_model, batch).compile()
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
         self._first = self._model.ngeom - batch
@@ -154,8 +154,8 @@ def boxes_collide(world: World, poses: np.ndarray, half_sizes: np.ndarray) -> np
     return BoxCollider(world).collide(poses, half_sizes)
 
 
-def _box_model(world: mujoco.MjModel, batch: int) -> mujoco.MjModel:
-    """The colliding geoms of a world, all in the world body, followed by `batch` boxes that see only them."""
+def free_boxes(world: mujoco.MjModel, batch: int) -> mujoco.MjSpec:
+    """The colliding geoms of a world, all in the world body, followed by `batch` free boxes that see only them."""
     data = mujoco.MjData(world)
     mujoco.mj_kinematics(world, data)
     spec = mujoco.MjSpec()
@@ -190,4 +190,4 @@ def _box_model(world: mujoco.MjModel, batch: int) -> mujoco.MjModel:
         body = spec.worldbody.add_body()
         body.add_freejoint()
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1], contype=2, conaffinity=1)
-    return spec.compile()
+    return spec

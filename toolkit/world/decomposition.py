@@ -81,7 +81,7 @@ def _components(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
         closed = component.is_watertight and component.is_winding_consistent
         upside_down = component.volume < 0 if closed else component.area_faces @ component.face_normals[:, 2] < 0
         if upside_down:
-            component.invert()
+            component = trimesh.Trimesh(component.vertices, component.faces[:, ::-1], process=False)
         components.append(component)
     return components
 

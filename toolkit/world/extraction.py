@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
 from toolkit.geometry.pose import Pose
-from toolkit.world.convex import convex_cover
+from toolkit.world.convex import convex_partition
 from toolkit.world.faces import Face, faces_of
 from toolkit.world.solids import Solids
 from toolkit.world.source import Source
@@ -80,7 +80,7 @@ def extract_surfaces(
                     geom=face.geom,
                     pose=pose,
                     boundary=tuple(np.asarray(ring.coords)[:-1] for ring in rings),
-                    pieces=tuple(convex_cover(moved)),
+                    pieces=tuple(convex_partition(moved)),
                     friction=face.friction,
                     serves_foot=foot,
                     serves_palm=palm,

@@ -1,0 +1,310 @@
+"""Surfaces of scenes whose answer is known."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from tests.world.probe import area_of, ball_gap, random_points, ray_gap
+from toolkit.errors import WorldError
+from toolkit.world.extraction import SurfaceConfig
+
+BOX_TOP = '<geom name="slab" type="box" size="1 0.8 0.1" pos="0 0 -0.1"/>'
+
+
+def tops(world):
+    return [surface for surface in world.surfaces if surface.serves_foot]
+
+
+def total(surfaces):
+    return sum(area_of(surface) for surface in surfaces)
+
+
+def mesh_asset(name, mesh):
+    vertices = " ".join(f"{v:.7f}" for v in np.ravel(mesh.vertices))
+    faces = " ".join(str(i) for i in np.ravel(mesh.faces))
+    return f'<mesh name="{name}" vertex="{vertices}" face="{faces}"/>'
+
+
+def test_box(make_world):
+    world = make_world(BOX_TOP)
+    (top,) = tops(world)
+    assert top.geom == "slab" and top.friction == 1.0
+    assert area_of(top) == pytest.approx(1.6 * 2, rel=1e-9)
+    np.testing.assert_allclose(top.normal, [0, 0, 1], atol=1e-12)
+    sides = [surface for surface in world.surfaces if surface.serves_palm]
+    assert sorted(round(area_of(side), 6) for side in sides) == [0.32, 0.32, 0.4, 0.4]
+    assert {tuple(np.round(side.normal, 9) + 0.0) for side in sides} == {(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)}
+    assert [surface.index for surface in world.surfaces] == list(range(5))
+
+
+def test_rotated_box_in_a_moved_body(make_world):
+    world = make_world(
+        '<body pos="0.1 0 0.2" euler="0 0 40">'
+        '<geom type="box" size="0.5 0.4 0.3" pos="0 0 -0.3" euler="15 0 0"/></body>',
+        start="0.1 0 0.2",
+    )
+    (top,) = tops(world)
+    assert top.geom == "box#0"
+    assert area_of(top) == pytest.approx(0.8, rel=1e-9)
+    expected = np.array([np.sin(np.radians(40)), -np.cos(np.radians(40)), 0]) * np.sin(np.radians(15))
+    np.testing.assert_allclose(top.normal, expected + [0, 0, np.cos(np.radians(15))], atol=1e-9)
+
+
+@pytest.mark.parametrize(("size", "area"), [("0 0 1", 7.0 * 6.0), ("1.5 0.5 1", 3.0)])
+def test_plane_is_cut_to_a_square_or_to_its_size(make_world, size, area):
+    world = make_world(f'<geom type="plane" size="{size}"/>')
+    assert total(tops(world)) == pytest.approx(area, rel=1e-9)
+    assert world.square == (-3.0, -3.0, 4.0, 3.0)
+
+
+def test_tilted_and_upright_planes(make_world):
+    world = make_world(
+        '<geom type="plane" size="0 0 1" euler="0 20 0"/><geom type="plane" size="0 0 1" pos="0 2 0" euler="90 0 0"/>'
+    )
+    assert {(s.serves_foot, s.serves_palm) for s in world.surfaces} == {(True, False), (False, True)}
+    floor, wall = (next(s for s in world.surfaces if getattr(s, f"serves_{n}")) for n in ("foot", "palm"))
+    np.testing.assert_allclose(wall.normal, [0, -1, 0], atol=1e-12)
+    # The wall's half space covers the floor from y = 2 on; the floor's covers the wall below z = -x tan 20.
+    assert area_of(floor) == pytest.approx(7.0 * (3 + 2) / np.cos(np.radians(20)), rel=2e-3)
+
+
+def test_cylinder_has_caps_only(make_world):
+    world = make_world('<geom type="cylinder" size="0.5 0.3" pos="0 0 -0.3"/>')
+    (top,) = world.surfaces
+    assert area_of(top) == pytest.approx(np.pi * 0.25, rel=2e-3)  # a 64-gon on the circle
+    lying = make_world(
+        '<geom type="plane" size="0 0 1"/><geom type="cylinder" size="0.3 0.5" pos="0 2 0.3" euler="90 0 0"/>'
+    )
+    caps = [surface for surface in lying.surfaces if surface.serves_palm]
+    assert len(caps) == 2 and all(abs(cap.normal[1]) == pytest.approx(1, abs=1e-9) for cap in caps)
+
+
+@pytest.mark.parametrize(
+    "kind", ['type="sphere" size="0.4"', 'type="capsule" size="0.2 0.5"', 'type="ellipsoid" size=".5 .4 .3"']
+)
+def test_round_geoms_are_obstacles_only(make_world, kind):
+    world = make_world(f'<geom name="floor" type="plane" size="0 0 1"/><geom {kind} pos="2 2 0"/>')
+    (floor,) = world.surfaces
+    assert floor.geom == "floor" and len(floor.boundary) == 2
+    # The hole is the part of the geom's shadow from 1 mm to 15 cm up.
+    hole = 42.0 - area_of(floor)
+    expected = {"sphere": np.pi * 0.16, "capsule": np.pi * 0.04, "ellipsoid": np.pi * 0.2}[kind.split('"')[1]]
+    assert hole == pytest.approx(expected, rel=0.05)
+
+
+def test_convex_mesh(make_world):
+    prism = trimesh.creation.cylinder(radius=0.5, height=0.4, sections=6)
+    prism.apply_translation([0, 0, -0.2])
+    world = make_world('<geom type="mesh" mesh="m" pos="0.1 0 0"/>', assets=mesh_asset("m", prism))
+    assert world.mujoco_model.ngeom == 1
+    (top,) = tops(world)
+    assert area_of(top) == pytest.approx(3 * np.sqrt(3) / 2 * 0.25, rel=1e-6)
+    assert len([s for s in world.surfaces if s.serves_palm]) == 6
+
+
+def l_shape():
+    """A closed mesh of an L seen from above, 0.3 m high, its top at z = 0, and one of its inner corners at (0, 0)."""
+    polygon = np.array([[-1, -1], [1, -1], [1, 0], [0, 0], [0, 1], [-1, 1]], float)
+    from shapely.geometry import Polygon
+
+    return trimesh.creation.extrude_polygon(Polygon(polygon), 0.3).apply_translation([0, 0, -0.3])
+
+
+def test_mesh_that_is_not_convex_collides_as_it_looks(make_world):
+    world = make_world('<geom name="ell" type="mesh" mesh="m"/>', assets=mesh_asset("m", l_shape()), start="-.5 -.5 0")
+    (top,) = tops(world)
+    assert top.geom == "ell" and area_of(top) == pytest.approx(3.0, rel=1e-6)
+    assert len(top.pieces) == 2 and sorted(len(piece) for piece in top.pieces) == [4, 4]
+    assert len([s for s in world.surfaces if s.serves_palm]) == 6
+    from toolkit.world.clearance import boxes_collide
+
+    poses = np.tile(np.eye(4), (2, 1, 1))
+    poses[:, :3, 3] = [[0.5, 0.5, -0.1], [0.5, -0.5, -0.01]]
+    # Inside the mesh's hull, but not inside the mesh; and inside the mesh.
+    assert boxes_collide(world, poses, np.full(3, 0.1)).tolist() == [False, True]
+
+
+def test_open_sheet_upside_down_is_turned(make_world):
+    x, y = np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-1, 1, 5), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), (0.2 * np.maximum(x, 0)).ravel()])
+    corner = (np.arange(4)[:, None] * 5 + np.arange(4)).ravel()
+    faces = np.concatenate(
+        [np.column_stack([corner, corner + 6, corner + 5]), np.column_stack([corner, corner + 1, corner + 6])]
+    )
+    world = make_world(
+        '<geom type="mesh" mesh="m"/>', assets=mesh_asset("m", trimesh.Trimesh(points, faces, process=False))
+    )
+    assert len(tops(world)) == 2
+    assert total(tops(world)) == pytest.approx(2 + 2 * np.hypot(1, 0.2), rel=1e-5)
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(5, 9), (9, 5)])
+def test_height_field(make_world, rows, columns):
+    # Level left of the middle column, a 10 degree ramp right of it; the field is turned by 30 degrees.
+    rise = np.maximum(np.linspace(-1, 1, columns), 0) * np.tan(np.radians(10))
+    data = " ".join(f"{value:.8f}" for value in np.tile(rise / rise.max(), rows))
+    asset = f'<hfield name="h" nrow="{rows}" ncol="{columns}" size="1 0.8 {rise.max():.8f} 0.2" elevation="{data}"/>'
+    world = make_world('<geom type="hfield" hfield="h" euler="0 0 30"/>', assets=asset)
+    surfaces = tops(world)
+    assert sorted(round(area_of(s), 4) for s in surfaces) == [1.6, round(1.6 / np.cos(np.radians(10)), 4)]
+    ramp = max(surfaces, key=area_of)
+    assert np.degrees(np.arccos(ramp.normal[2])) == pytest.approx(10, abs=1e-3)
+
+
+def test_rough_height_field_is_split_as_mujoco_splits_it(make_world):
+    rng = np.random.default_rng(3)
+    height = rng.uniform(0, 1, (6, 6)).repeat(1)
+    asset = (
+        '<hfield name="h" nrow="6" ncol="6" size="1.5 1.5 0.4 0.1" elevation="'
+        + " ".join(f"{value:.6f}" for value in height)
+        + '"/>'
+    )
+    world = make_world('<geom type="hfield" hfield="h"/>', assets=asset, start="0 0 0.3")
+    assert len(tops(world)) > 30
+    for surface in tops(world):
+        points = random_points(surface, rng, 5, inset=0.01)
+        np.testing.assert_allclose(ray_gap(world.mujoco_model, surface, points), 0, atol=1e-6)
+        np.testing.assert_allclose(ball_gap(world.mujoco_model, surface, points), 0, atol=1e-5)
+
+
+def test_box_on_the_floor_leaves_a_hole(make_world):
+    world = make_world(
+        '<geom name="floor" type="plane" size="0 0 1"/><geom name="crate" type="box" size="0.3 0.2 0.2" pos="2 1 0.2"/>'
+    )
+    floor = next(s for s in world.surfaces if s.geom == "floor")
+    assert len(floor.boundary) == 2
+    assert area_of(floor) == pytest.approx(42 - 0.24, abs=4e-3)  # a hole is a millimetre wider than what makes it
+    assert len(floor.pieces) <= 5
+    crate = [s for s in world.surfaces if s.geom == "crate"]
+    assert len(crate) == 5
+
+
+@pytest.mark.parametrize(
+    ("height", "covered"),
+    [(0.14, True), (0.16, False)],
+)
+def test_low_ceiling_covers_and_a_high_one_does_not(make_world, height, covered):
+    world = make_world(
+        '<geom name="floor" type="plane" size="0 0 1"/>'
+        f'<geom name="roof" type="box" size="0.5 0.5 0.05" pos="2 1 {height + 0.05}" euler="0 0 20"/>'
+    )
+    floor = next(s for s in world.surfaces if s.geom == "floor")
+    assert area_of(floor) == pytest.approx(41 if covered else 42, abs=5e-3)
+    assert not any(s.geom == "roof" and s.normal[2] < 0 for s in world.surfaces)
+
+
+def test_clearance_is_measured_along_the_normal(make_world):
+    # A roof parallel to a slope of 40 degrees, 0.16 m away along the normal: 0.21 m straight up.
+    world = make_world(
+        '<body euler="0 40 0"><geom name="slope" type="box" size="1 1 0.1" pos="0 0 -0.1"/>'
+        '<geom name="roof" type="box" size="1 1 0.1" pos="0 0 0.26"/></body>'
+    )
+    slope = next(s for s in world.surfaces if s.geom == "slope" and s.serves_foot)
+    assert area_of(slope) == pytest.approx(4.0, rel=1e-6)
+
+
+def test_buried_faces_are_gone(make_world):
+    world = make_world(
+        '<geom name="hill" type="box" size="1 1 0.3" pos="0 0 -0.3"/>'
+        '<geom name="buried" type="box" size="0.2 0.2 0.1" pos="0.1 0.1 -0.3"/>'
+        '<geom name="half" type="box" size="0.2 0.2 0.2" pos="1 0 -0.2"/>'
+    )
+    names = {s.geom for s in world.surfaces}
+    assert "buried" not in names
+    half = [s for s in world.surfaces if s.geom.startswith("half") and s.serves_palm]
+    assert len(half) == 3  # the side inside the hill is gone
+    assert sorted(round(area_of(s), 3) for s in half) == [0.08, 0.08, 0.16]
+
+
+def test_flush_boxes_of_equal_friction_are_one_surface(make_world):
+    world = make_world(
+        '<geom name="a" type="box" size="0.5 0.5 0.1" pos="0 0 -0.1"/>'
+        '<geom name="b" type="box" size="0.5 0.4 0.1" pos="1.0005 0 -0.1004"/>'
+    )
+    (top,) = tops(world)
+    assert top.geom == "a+b"
+    assert area_of(top) == pytest.approx(1.8, rel=2e-3)
+    assert len(top.boundary) == 1  # a sole may straddle the seam
+
+
+@pytest.mark.parametrize(
+    "second",
+    [
+        'size="0.5 0.5 0.1" pos="1 0 -0.1" friction="0.6"',
+        'size="0.5 0.5 0.1" pos="1 0 -0.105"',
+        'size="0.5 0.5 0.1" pos="1.01 0 -0.1"',
+        'size="0.5 0.5 0.1" pos="1 0 -0.1" euler="0 0.6 0"',
+    ],
+    ids=["friction", "step", "gap", "angle"],
+)
+def test_boxes_that_are_not_flush_stay_apart(make_world, second):
+    world = make_world(
+        f'<geom name="a" type="box" size="0.5 0.5 0.1" pos="0 0 -0.1"/><geom name="b" type="box" {second}/>'
+    )
+    assert len(tops(world)) == 2
+    for surface in tops(world):
+        assert area_of(surface) == pytest.approx(1.0, abs=6e-3)
+
+
+def test_a_chain_of_small_steps_is_not_one_surface(make_world):
+    boxes = "".join(
+        f'<geom type="box" size="0.2 0.5 0.1" pos="{0.4 * i} 0 {-0.1 + 0.0009 * i:.4f}"/>' for i in range(6)
+    )
+    world = make_world(boxes)
+    assert len(tops(world)) >= 2
+    rng = np.random.default_rng(0)
+    for surface in tops(world):
+        gaps = ray_gap(world.mujoco_model, surface, random_points(surface, rng, 50, inset=2e-3))
+        assert np.abs(gaps).max() < 1.1e-3
+
+
+def test_tilted_tiles_side_by_side_give_one_surface_each(make_world):
+    rng = np.random.default_rng(5)
+    tiles = "".join(
+        f'<geom name="t{i}{j}" type="box" size="0.2 0.2 0.02" pos="{0.4 * i} {0.4 * j} {rng.uniform(-0.05, 0.05):.3f}" '
+        f'euler="{rng.uniform(-20, 20):.2f} {rng.uniform(-20, 20):.2f} 0"/>'
+        for i in range(5)
+        for j in range(5)
+    )
+    world = make_world(tiles)
+    assert sorted(s.geom for s in world.surfaces) == sorted(f"t{i}{j}" for i in range(5) for j in range(5))
+    assert min(area_of(s) for s in world.surfaces) > 0.11
+
+
+def test_small_and_narrow_regions_are_dropped(make_world):
+    world = make_world(
+        BOX_TOP + '<geom name="beam" type="box" size="0.5 0.029 0.5" pos="0 3 0"/>'
+        '<geom name="post" type="box" size="0.04 0.04 0.5" pos="2 3 0"/>'
+    )
+    assert not any(s.serves_foot for s in world.surfaces if s.geom in ("beam", "post"))
+    config = SurfaceConfig(foot_width=0.02, foot_area=1e-3)
+    assert len(tops(make_world(BOX_TOP + '<geom type="box" size="0.5 0.029 0.5" pos="0 3 0"/>', config=config))) == 2
+
+
+@pytest.mark.parametrize(
+    ("angle", "serves"), [(44, (1, 0)), (46, (0, 0)), (59, (0, 0)), (61, (0, 1)), (119, (0, 1)), (121, (0, 0))]
+)
+def test_what_a_surface_serves_follows_its_angle(make_world, angle, serves):
+    world = make_world(
+        '<geom type="plane" size="1 1 1"/>'
+        f'<geom name="p" type="box" size="0.5 0.5 0.01" pos="0 0 5" euler="{angle} 0 0"/>'
+    )
+    found = [s for s in world.surfaces if s.geom == "p" and abs(np.degrees(np.arccos(s.normal[2])) - angle) < 0.1]
+    assert [(s.serves_foot, s.serves_palm) for s in found] == ([] if serves == (0, 0) else [serves])
+
+
+def test_geoms_that_do_not_collide_offer_and_cover_nothing(make_world):
+    world = make_world(
+        BOX_TOP + '<geom name="ghost" type="box" size="0.3 0.3 0.05" pos="0 0 0.05" contype="0" conaffinity="0"/>'
+    )
+    assert total(tops(world)) == pytest.approx(3.2) and not any(s.geom == "ghost" for s in world.surfaces)
+    # One bit on either side is enough to collide.
+    world = make_world(
+        BOX_TOP + '<geom name="solid" type="box" size="0.3 0.3 0.05" pos="0 0 0.05" contype="0" conaffinity="2"/>'
+    )
+    assert total([s for s in tops(world) if s.geom == "slab"]) == pytest.approx(3.2 - 0.36, abs=4e-3)
+
+
+def test_nothing_to_stand_on(make_world):
+    with pytest.raises(WorldError, match="no usable surface for feet"):
+        make_world('<geom type="sphere" size="1"/>')
