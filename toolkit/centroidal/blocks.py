@@ -1,0 +1,223 @@
+"""A nonlinear program as a sum of small functions, each applied many times: quick to build, whatever its length.
+
+A `Piece` is one small CasADi function with its derivatives; a `Block` applies it n times to variables and rows given by
+index arrays. `Assembly` gathers, maps and scatters, so that building a program of any size takes a handful of graph
+nodes, and hands the solvers ready-made derivatives instead of letting them differentiate the whole program.
+
+The Hessian is Gauss-Newton in the objective: sum_i rho_i(v)^2 + linear(v) has the Hessian 2 Jrho^T Jrho. Rows add their
+curvature only where a piece says that it is wanted (convex ones), so the Hessian stays positive semidefinite.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+
+class Piece:
+    """A small function (v, p) -> (objective, rows) with derivatives.
+
+    Args:
+        name: for messages.
+        v: (nv,) variables.
+        p: (np,) parameters.
+        rho: (nr,) terms whose squares add to the objective, or None.
+        linear: scalar added to the objective, linear in v, or None.
+        rows: (ng,) constraint rows, or None.
+        curved: (ng,) rows with those replaced by 0 whose curvature is left out of the Hessian; None for no curvature.
+        jacobian: (ng, nv) of the rows where the caller knows a shorter expression.
+    """
+
+    def __init__(self, name: str, v: ca.SX, p: ca.SX, *, rho=None, linear=None, rows=None, curved=None, jacobian=None):
+        self.name = name
+        rho = ca.SX(0, 1) if rho is None else rho
+        rows = ca.SX(0, 1) if rows is None else rows
+        cost = ca.sumsqr(rho) + (0 if linear is None else linear)
+        weight, multiplier = ca.SX.sym("weight"), ca.SX.sym("multiplier", rows.numel())
+        gradient = ca.gradient(cost, v)
+        jacobian = ca.jacobian(rows, v) if jacobian is None else jacobian
+        d_rho = ca.jacobian(rho, v)
+        hessian = 2 * weight * (d_rho.T @ d_rho)
+        if curved is not None:
+            hessian = hessian + ca.hessian(ca.dot(multiplier, curved), v)[0]
+        hessian = ca.triu2symm(ca.triu(hessian + ca.SX(hessian.sparsity().T, 0)))
+        lagrangian = ca.gradient(weight * cost + ca.dot(multiplier, rows), v)  # by reverse mode
+        self.size, self.parameters, self.rows = v.numel(), p.numel(), rows.numel()
+        self.jacobian_pattern = _pattern(jacobian)
+        self.hessian_pattern = _pattern(hessian)
+
+        def function(kind: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> ca.Function:
+            return ca.Function(f"{name}_{kind}", inputs, ca.cse(outputs))
+
+        def nonzeros(matrix: ca.SX) -> ca.SX:
+            return ca.vertcat(*matrix.nonzeros()) if matrix.nnz() else ca.SX(0, 1)
+
+        self.cost = function("cost", [v, p], [cost])
+        self.value = function("value", [v, p], [rows])
+        self.gradient = function("gradient", [v, p], [cost, ca.densify(gradient)])
+        self.first = function("first", [v, p], [rows, nonzeros(jacobian)])
+        self.second = function("second", [v, p, weight, multiplier], [ca.densify(lagrangian), nonzeros(hessian)])
+
+
+@dataclass(frozen=True)
+class Block:
+    """A piece applied n times.
+
+    Attributes:
+        piece: the function.
+        variables: (n, piece.size) indices into the program's variables.
+        rows: (n, piece.rows) indices into the program's rows; several may add to one row.
+        parameters: (n, piece.parameters).
+    """
+
+    piece: Piece
+    variables: np.ndarray
+    rows: np.ndarray
+    parameters: np.ndarray
+
+    def __post_init__(self):
+        n = len(self.variables)
+        expected = [(n, self.piece.size), (n, self.piece.rows), (n, self.piece.parameters)]
+        shapes = [self.variables.shape, self.rows.shape, self.parameters.shape]
+        if shapes != expected:
+            raise ValueError(f"{self.piece.name}: shapes {shapes} should be {expected}")
+
+
+class Assembly:
+    """A program of blocks.
+
+    Args:
+        blocks: its parts.
+        size: number of variables.
+        rows: number of constraint rows.
+    """
+
+    def __init__(self, blocks: list[Block], size: int, rows: int):
+        self.blocks = [block for block in blocks if len(block.variables)]
+        self.size, self.rows = size, rows
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """All parameters in the order that the functions take them."""
+        return np.concatenate([block.parameters.ravel() for block in self.blocks])
+
+    def functions(self, upper_hessian: bool) -> dict[str, ca.Function]:
+        """Functions by the names that CasADi's solvers use.
+
+        Args:
+            upper_hessian: the upper triangle of the Hessian alone (Ipopt), else gradient and whole Hessian (Fatrop).
+        """
+        x = ca.MX.sym("x", self.size)
+        p = ca.MX.sym("p", sum(block.parameters.size for block in self.blocks))
+        weight, multiplier = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
+        v, params, lam = [], [], []
+        offset = 0
+        for block in self.blocks:
+            n = len(block.variables)
+            v.append(ca.reshape(x[_list(block.variables)], block.piece.size, n))
+            params.append(ca.reshape(p[offset : offset + block.parameters.size], block.piece.parameters, n))
+            lam.append(ca.reshape(multiplier[_list(block.rows)], block.piece.rows, n))
+            offset += block.parameters.size
+
+        def mapped(name: str, *extra) -> list:
+            outputs = []
+            for index, block in enumerate(self.blocks):
+                function = getattr(block.piece, name).map(len(block.variables))
+                arguments = [part[index] if isinstance(part, list) else part for part in extra]
+                result = function(v[index], params[index], *arguments)
+                outputs.append(result if isinstance(result, tuple | list) else (result,))
+            return outputs
+
+        def stacked(outputs: list, which: int) -> ca.MX:
+            return ca.vertcat(*[ca.vec(output[which]) for output in outputs])
+
+        def total(outputs: list) -> ca.MX:
+            return sum(ca.sum2(output[0]) for output in outputs)
+
+        to_x = self._scatter([block.variables for block in self.blocks], self.size)
+        to_g = self._scatter([block.rows for block in self.blocks], self.rows)
+        jac_pattern, to_jac = self._jacobian()
+        hess_pattern, to_hess = self._hessian(upper_hessian)
+        cost, value = mapped("cost"), mapped("value")
+        gradient, first = mapped("gradient"), mapped("first")
+        second = mapped("second", ca.MX(weight), lam)
+        f, g = total(cost), to_g @ stacked(value, 0)
+        grad_f = to_x @ stacked(gradient, 1)
+        jac = ca.MX(jac_pattern, to_jac @ stacked(first, 1))
+        grad_l = to_x @ stacked(second, 0)
+        hess = ca.MX(hess_pattern, to_hess @ stacked(second, 1))
+        inputs, dual = [x, p], [x, p, weight, multiplier]
+        names, dual_names = ["x", "p"], ["x", "p", "lam_f", "lam_g"]
+        gradient_outputs, hessian_outputs = ([grad_f], [grad_l, hess])
+        gradient_names, hessian_names = (["grad_f_x"], ["grad_gamma_x", "hess_gamma_x_x"])
+        if upper_hessian:
+            gradient_outputs, gradient_names = [total(gradient), grad_f], ["f", "grad_f_x"]
+            hessian_outputs, hessian_names = [hess], ["triu_hess_gamma_x_x"]
+        zeros = ca.MX(p.sparsity(), 0)
+        make = ca.Function
+        return {
+            "nlp": make("nlp", inputs, [f, g], names, ["f", "g"]),
+            "nlp_f": make("nlp_f", inputs, [f], names, ["f"]),
+            "nlp_g": make("nlp_g", inputs, [g], names, ["g"]),
+            "nlp_grad_f": make("nlp_grad_f", inputs, gradient_outputs, names, gradient_names),
+            "nlp_jac_g": make("nlp_jac_g", inputs, [to_g @ stacked(first, 0), jac], names, ["g", "jac_g_x"]),
+            "nlp_hess_l": make("nlp_hess_l", dual, hessian_outputs, dual_names, hessian_names),
+            "nlp_grad": make(
+                "nlp_grad", dual, [f, g, grad_l, zeros], dual_names, ["f", "g", "grad_gamma_x", "grad_gamma_p"]
+            ),
+        }
+
+    @staticmethod
+    def _scatter(indices: list[np.ndarray], size: int) -> ca.MX:
+        """(size, total) matrix that adds stacked entries up at their indices."""
+        row = np.concatenate([index.ravel() for index in indices])
+        return _ones(ca.Sparsity(size, len(row), list(range(len(row) + 1)), row.tolist()))
+
+    def _jacobian(self) -> tuple[ca.Sparsity, ca.MX]:
+        """Pattern of the Jacobian, and the matrix from stacked entries to its nonzeros."""
+        row, column = [], []
+        for block in self.blocks:
+            r, c = block.piece.jacobian_pattern
+            row.append(block.rows[:, r].ravel())
+            column.append(block.variables[:, c].ravel())
+        return _gathered(np.concatenate(row), np.concatenate(column), self.rows, self.size)
+
+    def _hessian(self, upper: bool) -> tuple[ca.Sparsity, ca.MX]:
+        """Pattern of the Hessian (or its upper triangle), and the matrix from stacked entries to its nonzeros."""
+        row, column = [], []
+        for block in self.blocks:
+            r, c = block.piece.hessian_pattern
+            row.append(block.variables[:, r].ravel())
+            column.append(block.variables[:, c].ravel())
+        row, column = np.concatenate(row), np.concatenate(column)
+        return _gathered(row, column, self.size, self.size, row <= column if upper else None)
+
+
+def _gathered(
+    row: np.ndarray, column: np.ndarray, rows: int, columns: int, kept: np.ndarray | None = None
+) -> tuple[ca.Sparsity, ca.MX]:
+    """Compressed-column pattern of entries, and the matrix that adds stacked entries up to its nonzeros."""
+    source = np.arange(len(row)) if kept is None else np.flatnonzero(kept)
+    keys, nonzero = np.unique(column[source] * rows + row[source], return_inverse=True)
+    colind = np.searchsorted(keys, np.arange(columns + 1) * rows)
+    pattern = ca.Sparsity(rows, columns, colind.tolist(), (keys % rows).tolist())
+    start = np.searchsorted(source, np.arange(len(row) + 1))
+    return pattern, _ones(ca.Sparsity(len(keys), len(row), start.tolist(), nonzero.tolist()))
+
+
+def _ones(pattern: ca.Sparsity) -> ca.MX:
+    """Matrix of ones where the pattern has entries."""
+    return ca.MX(ca.DM(pattern, 1.0))
+
+
+def _pattern(matrix: ca.SX) -> tuple[np.ndarray, np.ndarray]:
+    """Row and column of each nonzero in column-major order."""
+    row, column = matrix.sparsity().get_triplet()
+    return np.array(row, int), np.array(column, int)
+
+
+def _list(index: np.ndarray) -> list[int]:
+    """Flat list of an index array: CasADi indexes by lists."""
+    return index.ravel().tolist()

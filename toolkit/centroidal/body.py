@@ -1,0 +1,219 @@
+"""What the body can do: limits of the legs and arms along a centroidal motion, checked in plain NumPy.
+
+Joint angles of the stance legs follow from the CoM in closed form (`toolkit.contacts.reach`), joint torques from the
+wrench under the sole: tau = a . ((p - o) x f + m) about the axis a through o, the leg's own weight and inertia left
+out. A foot in the air is taken on a smooth path between its two contacts; its hip keeps within a leg's length of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
+from toolkit.contacts.reach import LegPosture, ReachMargins, leg_clearances, leg_posture
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.pose import rotation_about_z
+from toolkit.robot.model import RobotModel
+
+TORQUE_ROLES = ("knee", "hip_pitch", "hip_roll", "ankle_pitch", "ankle_roll")
+SWING_LIFT = 0.06  # m; height of the assumed path of a foot in the air above the line between its contacts
+
+
+@dataclass(frozen=True)
+class BodyMargins:
+    """How far inside the body's limits a plan stays; the defaults are what no plan may exceed.
+
+    Attributes:
+        length: m, off both ends of the hip-ankle and shoulder-palm distances.
+        ankle: rad, off both ends of ankle pitch and roll.
+        hip: rad, off both ends of hip roll and pitch.
+        height: m, above the least CoM height.
+        torque: part of each leg joint's torque that may be used.
+    """
+
+    length: float = 0.0
+    ankle: float = 0.0
+    hip: float = 0.0
+    height: float = 0.0
+    torque: float = 1.0
+
+
+@dataclass(frozen=True)
+class BodyResiduals:
+    """By how much a motion exceeds the body's limits.
+
+    Attributes:
+        violation: name of the limit -> (N + 1, 4) by knot and limb; negative or -inf where kept. m and rad; torques and
+            what happens during a step stand at the step's first knot, torques as a part of the limit.
+    """
+
+    violation: dict[str, np.ndarray]
+
+    @property
+    def largest(self) -> float:
+        """The largest violation of all, 0 where there is none; inf where undefined."""
+        largest = max((float(np.max(value)) for value in self.violation.values()), default=0.0)
+        return max(largest, 0.0) if largest < np.inf else np.inf
+
+    @property
+    def worst(self) -> tuple[str, int, Limb]:
+        """Name, knot and limb of the largest violation."""
+        name = max(self.violation, key=lambda item: np.max(self.violation[item]))
+        knot, limb = np.unravel_index(int(np.argmax(self.violation[name])), self.violation[name].shape)
+        return name, int(knot), Limb(int(limb))
+
+
+def knot_contacts(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Contacts that must be in reach at each knot: those of the steps that touch it, and a landing at the last.
+
+    Returns:
+        (n,) knots, (n,) limbs, (n, 3) positions and (n, 3, 3) rotations, each contact once.
+    """
+    n = problem.steps
+    step, limb = np.nonzero(problem.active)
+    first = np.ones(len(step), bool)
+    later = step > 0
+    first[later] = ~problem.active[step[later] - 1, limb[later]]
+    knot = np.concatenate([step + 1, step[first]])  # each contact at the end of its steps, and where it begins
+    at, limb = np.concatenate([step, step[first]]), np.concatenate([limb, limb[first]])
+    position, rotation = problem.position[at, limb], problem.rotation[at, limb]
+    if problem.landing_limb >= 0:
+        knot, limb = np.append(knot, n), np.append(limb, problem.landing_limb)
+        position = np.concatenate([position, problem.landing_position[None]])
+        rotation = np.concatenate([rotation, problem.landing_rotation[None]])
+    return knot, limb, position, rotation
+
+
+def swing_ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the ankle of a foot in the air is, on a smooth path from the contact it left to the one it will make.
+
+    Returns:
+        (n,) knots strictly inside swings, (n,) limbs, (n, 3) ankles in the world.
+    """
+    knots, limbs, ankles = [], [], []
+    times = problem.times
+    for limb in FEET:
+        tip = problem.position[:, limb] + problem.rotation[:, limb] @ problem.tip_in_contact[limb]
+        edges = np.flatnonzero(np.diff(np.concatenate([[1], problem.active[:, limb].astype(int), [1]])))
+        for lift, land in edges.reshape(-1, 2):
+            landing = land == problem.steps
+            if lift == 0 or (landing and problem.landing_limb != limb):
+                continue
+            end = (
+                tip[land]
+                if not landing
+                else (problem.landing_position + problem.landing_rotation @ problem.tip_in_contact[limb])
+            )
+            inside = np.arange(lift + 1, land)
+            s = ((times[inside] - times[lift]) / (times[land] - times[lift]))[:, None]
+            along = s * s * (3 - 2 * s)
+            path = tip[lift - 1] + along * (end - tip[lift - 1])
+            path[:, 2] += SWING_LIFT * (4 * s * (1 - s))[:, 0]
+            knots.append(inside)
+            limbs.append(np.full(len(inside), int(limb)))
+            ankles.append(path)
+    if not knots:
+        return np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3))
+    return np.concatenate(knots), np.concatenate(limbs), np.concatenate(ankles)
+
+
+def leg_torques(posture: LegPosture, sole: np.ndarray, rotation: np.ndarray, force: np.ndarray, moment: np.ndarray):
+    """Static torques of stance legs about their joints.
+
+    Args:
+        posture: of n legs.
+        sole: (n, 3) m; centres of the soles.
+        rotation: (n, 3, 3); world_from_sole.
+        force: (n, 3) N on the sole, in the world.
+        moment: (n, 3) N m on the sole about its centre, in the world.
+
+    Returns:
+        Role -> (n,) N m.
+    """
+    w = posture.pitch_axis
+    horizontal = np.stack([w[:, 1], -w[:, 0], np.zeros(len(w))], -1)
+    roll_axis = horizontal / np.linalg.norm(horizontal, axis=-1, keepdims=True)
+    joints = {
+        "knee": (posture.knee_point, w),
+        "hip_pitch": (posture.hip, w),
+        "hip_roll": (posture.hip, roll_axis),
+        "ankle_pitch": (posture.ankle, w),
+        "ankle_roll": (posture.ankle, rotation[..., 0]),
+    }
+    return {role: (axis * (np.cross(sole - origin, force) + moment)).sum(-1) for role, (origin, axis) in joints.items()}
+
+
+def middle_com(motion: CentroidalMotion) -> np.ndarray:
+    """(N, 3) m; CoM where the torques of each step are judged: half a step on at the first knot's velocity."""
+    half = motion.problem.dt[:, None] / 2
+    return motion.com[:-1] + half * motion.linear_momentum[:-1] / motion.problem.mass
+
+
+def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins = BodyMargins()) -> BodyResiduals:
+    """How far a motion exceeds the body's limits, less `margins`.
+
+    Args:
+        motion: any motion of the robot, feasible or not.
+        robot: its limbs.
+        margins: kept off each limit.
+    """
+    p, n = motion.problem, motion.problem.steps
+    violation: dict[str, np.ndarray] = {}
+
+    def enter(name: str, at: np.ndarray, limb: np.ndarray | int, value: np.ndarray) -> None:
+        table = violation.setdefault(name, np.full((n + 1, 4), -np.inf))
+        np.maximum.at(table, (at, limb), np.where(np.isnan(value), np.inf, value))
+
+    reach = ReachMargins(length=margins.length, ankle=margins.ankle, hip=margins.hip)
+    knots, limbs, positions, rotations = knot_contacts(p)
+    swing_knots, swing_limbs, swing_tips = swing_ankles(p)
+    base = rotation_about_z(p.yaw)
+    for limb in FEET:
+        leg, here = robot.legs[limb], limbs == limb
+        if here.any():
+            at = knots[here]
+            posture = leg_posture(leg, motion.com[at], p.yaw[at], positions[here], rotations[here])
+            for name, clearance in leg_clearances(leg, posture, reach).items():
+                if name != "hip yaw":  # the base may turn to spare it
+                    enter(name, at, limb, -clearance)
+        at = swing_knots[swing_limbs == limb]
+        hip = motion.com[at] + base[at] @ leg.hip_in_com
+        length = np.linalg.norm(hip - swing_tips[swing_limbs == limb], axis=-1)
+        enter("swing leg length", at, limb, length - leg.max_length + margins.length)
+        _enter_torques(motion, robot, limb, margins.torque, enter)
+    for limb, arm in robot.arms.items():
+        here = limbs == limb
+        shoulder = motion.com[knots[here]] + base[knots[here]] @ arm.shoulder_in_com
+        length = np.linalg.norm(shoulder - positions[here], axis=-1)
+        outside = np.maximum(arm.min_reach - length, length - arm.max_reach) + margins.length
+        enter("arm reach", knots[here], limb, outside)
+    floor, foot = lowest_foot(p)
+    enter("CoM height", np.arange(n + 1), foot, floor + p.min_height + margins.height - motion.com[:, 2])
+    return BodyResiduals(violation)
+
+
+def lowest_foot(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
+    """(N + 1,) m height of the lowest foot in contact around each knot, and (N + 1,) which foot; -inf without one."""
+    knots, limbs, positions, _ = knot_contacts(problem)
+    height = np.full((problem.steps + 1, 2), np.inf)
+    feet = limbs < 2
+    np.minimum.at(height, (knots[feet], limbs[feet]), positions[feet, 2])
+    lowest = height.min(1)
+    return np.where(np.isfinite(lowest), lowest, -np.inf), height.argmin(1)
+
+
+def _enter_torques(motion: CentroidalMotion, robot: RobotModel, limb: Limb, part: float, enter) -> None:
+    """Enter how far the torques of a leg exceed `part` of their limits."""
+    p, leg = motion.problem, robot.legs[limb]
+    step = np.flatnonzero(p.active[:, limb])
+    if not len(step):
+        return
+    sole, rotation, force = p.position[step, limb], p.rotation[step, limb], motion.force[step, limb]
+    arm = np.einsum("nij,nj->ni", rotation[:, :, :2], motion.cop[step, limb])
+    moment = np.cross(arm, force) + motion.yaw_torque[step, limb, None] * rotation[:, :, 2]
+    yaw = (p.yaw[step] + p.yaw[step + 1]) / 2
+    posture = leg_posture(leg, middle_com(motion)[step], yaw, sole, rotation)
+    for role, torque in leg_torques(posture, sole, rotation, force, moment).items():
+        enter(role.replace("_", " ") + " torque", step, limb, np.abs(torque) / leg.torques[role] - part)

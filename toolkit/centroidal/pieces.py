@@ -1,0 +1,314 @@
+"""The pieces of the whole-sequence problem, independent of robot, contacts and timing.
+
+Scaled variables of a stage: x = [CoM r (m), velocity v (m/s), kappa = k / m (m^2/s), acceleration a of the step before
+(m/s^2)] and u = [per contact: force and moment at the patch centre, in the contact frame, in weights (and weights
+times 1 m); slacks sigma of friction, CoP and body]. The angular momentum is about the CoM, and its exact integral under
+constant wrenches is a sum over the contacts:
+
+    kappa+ = kappa + dt g sum_i [ (p_i - r - dt v / 2 - dt^2 g_vec / 6) x f_i + tau_i ]
+
+A slack sigma moves its constraints linearly from the wanted margin (0) to the physical limit (1) and beyond, which is
+infeasible: the program itself always has a solution, and says where and how far it had to cheat.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+
+from toolkit.centroidal.blocks import Piece
+from toolkit.centroidal.problem import GRAVITY
+
+STATE = 12
+WRENCH = 6
+SLACKS = 3
+G = float(-GRAVITY[2])
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """All pieces.
+
+    Attributes:
+        stage: number of contacts -> dynamics and momentum objective of a step.
+        contact: cone, patch and yaw moment of a contact in a step, and its objective.
+        leg: joint ranges of a stance leg at a knot.
+        torque: joint torques of a stance leg in the middle of a step.
+        distance: hip or shoulder to tip, between two bounds, at a knot.
+        height: CoM above the lowest foot at a knot.
+        slack: penalty of the slacks of a step.
+        initial: the given state.
+        final: rest, box and centring at the end.
+    """
+
+    stage: dict[int, Piece]
+    contact: Piece
+    leg: Piece
+    torque: Piece
+    distance: Piece
+    height: Piece
+    slack: Piece
+    initial: Piece
+    final: Piece
+
+
+class _Parameters:
+    """Hands out named parts of one growing parameter vector."""
+
+    def __init__(self):
+        self.parts: list[ca.SX] = []
+
+    def __call__(self, size: int = 1) -> ca.SX:
+        self.parts.append(ca.SX.sym(f"p{len(self.parts)}", size))
+        return self.parts[-1]
+
+    @property
+    def vector(self) -> ca.SX:
+        return ca.vertcat(*self.parts)
+
+
+@lru_cache(maxsize=1)
+def pieces() -> Pieces:
+    """The pieces; building them takes tens of milliseconds once."""
+    return Pieces(
+        stage={n: _stage(n) for n in range(1, 5)},
+        contact=_contact(),
+        leg=_leg(),
+        torque=_torque(),
+        distance=_distance(),
+        height=_height(),
+        slack=_slack(),
+        initial=_initial(),
+        final=_final(),
+    )
+
+
+def _stage(contacts: int) -> Piece:
+    """Dynamics and momentum objective of a step with so many contacts.
+
+    Parameters: dt, per contact R (9, row-major) and p (3); square roots of the weights of v, a, kappa, kappa rate,
+    acceleration change, height; wanted height.
+    """
+    p = _Parameters()
+    x, after = ca.SX.sym("x", STATE), ca.SX.sym("after", STATE)
+    wrenches = ca.SX.sym("w", WRENCH * contacts)
+    dt = p()
+    r, v, kappa, before = ca.vertsplit(x, 3)
+    gravity = ca.DM(GRAVITY)
+    total, moment = ca.SX.zeros(3), ca.SX.zeros(3)
+    middle = r + dt / 2 * v + dt**2 / 6 * gravity
+    for i in range(contacts):
+        rotation, position = ca.reshape(p(9), 3, 3).T, p(3)
+        force = rotation @ wrenches[WRENCH * i : WRENCH * i + 3]
+        total += force
+        moment += ca.cross(position - middle, force) + rotation @ wrenches[WRENCH * i + 3 : WRENCH * i + 6]
+    acceleration = G * total + gravity
+    following = ca.vertcat(
+        r + dt * v + dt**2 / 2 * acceleration, v + dt * acceleration, kappa + dt * G * moment, acceleration
+    )
+    weights, height = p(6), p()
+    rho = ca.vertcat(
+        weights[0] * after[3:6],
+        weights[1] * after[9:12],
+        weights[2] * after[6:9],
+        weights[3] * G * moment,
+        weights[4] * (acceleration - before),
+        weights[5] * (after[2] - height),
+    )
+    return Piece(f"stage{contacts}", ca.vertcat(x, wrenches, after), p.vector, rho=rho, rows=after - following)
+
+
+def _contact() -> Piece:
+    """Friction cone, patch and yaw moment (Caron et al., ICRA 2015) of a contact, and its objective.
+
+    Parameters: mu, (2) half extents; wanted friction factor, (2) CoP margin in m, yaw factor; square roots of the
+    weights of force, lateral force, torque (in weights), CoP, early or late load.
+    """
+    p = _Parameters()
+    wrench, slack = ca.SX.sym("w", WRENCH), ca.SX.sym("s", 2)
+    mu, half, wanted, cop_margin, yaw_factor, weights = p(), p(2), p(), p(2), p(), p(5)
+    fx, fy, fz, tx, ty, tz = ca.vertsplit(wrench)
+    mu = mu * (wanted + (1 - wanted) * slack[0])
+    yaw = yaw_factor + (1 - yaw_factor) * slack[0]
+    hx, hy = ca.vertsplit(half - cop_margin * (1 - slack[1]))
+    lateral = (fx**2 + fy**2) / (mu * fz + 1e-7)  # smooth at rest, unlike its square root
+    cone = mu * fz - lateral
+    room = mu * (hx + hy) * fz
+    yaw_rows = []
+    for s in (-1, 1):
+        for q in (-1, 1):
+            yaw_rows.append(yaw * (room + s * (hy * fx - mu * tx) + q * (hx * fy - mu * ty)) + tz)
+            yaw_rows.append(yaw * (room + s * (hy * fx + mu * tx) + q * (hx * fy + mu * ty)) - tz)
+    rows = ca.vertcat(10 * cone, 10 * (hx * fz - ty), 10 * (hx * fz + ty), 10 * (hy * fz - tx), 10 * (hy * fz + tx))
+    rows = ca.vertcat(rows, 10 * ca.vertcat(*yaw_rows))
+    curved = ca.vertcat(-10 * lateral, ca.SX.zeros(rows.numel() - 1))
+    load = fz + 0.01  # an unloaded contact has no CoP: keeps the objective smooth there
+    cop_x, cop_y = -ty / load, tx / load
+    rho = ca.vertcat(
+        weights[0] * wrench[:3],
+        weights[1] * wrench[:2],
+        weights[2] * (tz - cop_x * fy + cop_y * fx),
+        weights[3] * ca.vertcat(cop_x, cop_y) / (2 * half),
+        weights[4] * fz,
+    )
+    return Piece("contact", ca.vertcat(wrench, slack), p.vector, rho=rho, rows=rows, curved=curved)
+
+
+@dataclass(frozen=True)
+class _Posture:
+    """The leg of `toolkit.contacts.reach.LegPosture` as expressions."""
+
+    length: ca.SX
+    hip_roll: ca.SX
+    hip_pitch: ca.SX
+    ankle_pitch: ca.SX
+    ankle_roll: ca.SX
+    hip: ca.SX
+    knee: ca.SX
+    ankle: ca.SX
+    pitch_axis: ca.SX
+
+
+def _posture(com: ca.SX, p: _Parameters) -> tuple[_Posture, ca.SX]:
+    """Posture of a leg, and world_from_sole.
+
+    Parameters: hip relative to the CoM in the world (3), ankle in the world (3), R of the sole (9, row-major), thigh,
+    shin.
+    """
+    hip_offset, ankle, rotation = p(3), p(3), ca.reshape(p(9), 3, 3).T
+    thigh, shin = p(), p()
+    hip = com + hip_offset
+    h = rotation.T @ (hip - ankle)
+    square = ca.sumsqr(h)
+    length = ca.sqrt(square)
+    roll = ca.atan2(h[1], h[2])
+    cosine = (square + shin**2 - thigh**2) / (2 * shin * length)
+    lean = ca.atan2(h[0], ca.sqrt(h[1] ** 2 + h[2] ** 2)) + ca.acos(ca.fmin(ca.fmax(cosine, -0.9999), 0.9999))
+    axis = rotation @ ca.vertcat(0, ca.cos(roll), -ca.sin(roll))
+    up = ca.vertcat(ca.sin(lean), ca.sin(roll) * ca.cos(lean), ca.cos(roll) * ca.cos(lean))
+    knee = ankle + shin * (rotation @ up)
+    thigh_z = hip - knee
+    thigh_x = ca.cross(axis, thigh_z)
+    posture = _Posture(
+        length=length,
+        hip_roll=ca.asin(ca.fmin(ca.fmax(axis[2], -0.9999), 0.9999)),
+        hip_pitch=ca.atan2(-thigh_x[2], thigh_z[2]),
+        ankle_pitch=-lean,
+        ankle_roll=roll,
+        hip=hip,
+        knee=knee,
+        ankle=ankle,
+        pitch_axis=axis,
+    )
+    return posture, rotation
+
+
+def _leg() -> Piece:
+    """Joint ranges of a leg.
+
+    Parameters: of the posture; (2) length, then (2) lower and upper of ankle pitch, ankle roll, hip pitch, hip roll;
+    wanted margins of length, ankle, hip.
+    """
+    p = _Parameters()
+    com, slack = ca.SX.sym("c", 3), ca.SX.sym("s")
+    posture, _ = _posture(com, p)
+    values = [posture.length, posture.ankle_pitch, posture.ankle_roll, posture.hip_pitch, posture.hip_roll]
+    ranges = [p(2) for _ in values]
+    length, ankle, hip = p(), p(), p()
+    rows = []
+    for value, limits, margin, scale in zip(
+        values, ranges, (length, ankle, ankle, hip, hip), (5, 1, 1, 1, 1), strict=True
+    ):
+        kept = margin * (1 - slack)
+        rows += [scale * (value - limits[0] - kept), scale * (limits[1] - value - kept)]
+    return Piece("leg", ca.vertcat(com, slack), p.vector, rows=ca.vertcat(*rows))
+
+
+def _torque() -> Piece:
+    """Joint torques of a stance leg in the middle of a step.
+
+    Parameters: half of dt; of the posture; sole position (3); (5) torque limits of knee, hip pitch, hip roll, ankle
+    pitch, ankle roll in weights times 1 m; wanted part of the limits.
+    """
+    p = _Parameters()
+    com, velocity, wrench = ca.SX.sym("c", 3), ca.SX.sym("v", 3), ca.SX.sym("w", WRENCH)
+    slack, half_dt = ca.SX.sym("s"), p()
+    middle = ca.SX.sym("middle", 3)
+    leg, rotation = _posture(middle, p)
+    sole, limits, wanted = p(3), p(5), p()
+    force, moment = rotation @ wrench[:3], rotation @ wrench[3:]
+
+    def about(point: ca.SX, axis: ca.SX) -> ca.SX:
+        return ca.dot(axis, ca.cross(sole - point, force) + moment)
+
+    w = leg.pitch_axis
+    roll_axis = ca.vertcat(w[1], -w[0], 0) / ca.sqrt(w[0] ** 2 + w[1] ** 2)
+    torques = ca.vertcat(
+        about(leg.knee, w),
+        about(leg.hip, w),
+        about(leg.hip, roll_axis),
+        about(leg.ankle, w),
+        about(leg.ankle, rotation[:, 0]),
+    )
+    ratio = torques / limits
+    reduced = ca.vertcat(middle, wrench)
+    slope = ca.jacobian(ratio, reduced)
+    slope = ca.horzcat(slope[:, :3], half_dt * slope[:, :3], slope[:, 3:])  # the middle is com + dt / 2 velocity
+    part, gain = wanted + (1 - wanted) * slack, ca.repmat(1 - wanted, 5, 1)
+    rows = ca.vertcat(part - ratio, part + ratio)
+    jacobian = ca.vertcat(ca.horzcat(-slope, gain), ca.horzcat(slope, gain))
+    rows, jacobian = ca.substitute([rows, jacobian], [middle], [com + half_dt * velocity])
+    return Piece("torque", ca.vertcat(com, velocity, wrench, slack), p.vector, rows=rows, jacobian=jacobian)
+
+
+def _distance() -> Piece:
+    """Distance from hip or shoulder to a tip.
+
+    Parameters: root relative to the CoM in the world (3), tip (3), lower and upper bound, wanted margin.
+    """
+    p = _Parameters()
+    com, slack = ca.SX.sym("c", 3), ca.SX.sym("s")
+    root, tip, lower, upper, margin = p(3), p(3), p(), p(), p()
+    length = ca.sqrt(ca.sumsqr(com + root - tip) + 1e-12)
+    kept = margin * (1 - slack)
+    rows = ca.vertcat(5 * (length - lower - kept), 5 * (upper - length - kept))
+    return Piece("distance", ca.vertcat(com, slack), p.vector, rows=rows)
+
+
+def _height() -> Piece:
+    """Least height of the CoM; parameters: that height in the world, wanted margin."""
+    p = _Parameters()
+    z, slack, least, margin = ca.SX.sym("z"), ca.SX.sym("s"), p(), p()
+    return Piece("height", ca.vertcat(z, slack), p.vector, rows=5 * (z - least - margin * (1 - slack)))
+
+
+def _slack() -> Piece:
+    """Price of the slacks of a step; parameters: penalty, and square root of the weight of the squares."""
+    p = _Parameters()
+    slack, linear, square = ca.SX.sym("s", SLACKS), p(), p()
+    return Piece("slack", slack, p.vector, rho=square * slack, linear=linear * ca.sum1(slack))
+
+
+def _initial() -> Piece:
+    """Given state; parameters: the state (12), its acceleration is what the first step is compared with."""
+    p = _Parameters()
+    x = ca.SX.sym("x", STATE)
+    rows = x - p(STATE)
+    return Piece("initial", x, p.vector, rows=rows)
+
+
+def _final() -> Piece:
+    """Rest, box and centring; rows: the velocity (3), and the offset from the centre in the yaw frame (3).
+
+    Parameters: centre (3), (2) cos and sin of the final yaw, square roots of the weights of centring, acceleration and
+    angular momentum.
+    """
+    p = _Parameters()
+    x = ca.SX.sym("x", STATE)
+    center, heading, weights = p(3), p(2), p(3)
+    dx, dy, dz = ca.vertsplit(x[:3] - center)
+    offset = ca.vertcat(heading[0] * dx + heading[1] * dy, -heading[1] * dx + heading[0] * dy, dz)
+    rho = ca.vertcat(weights[0] * offset[:2], weights[1] * x[9:12], weights[2] * x[6:9])
+    return Piece("final", x, p.vector, rho=rho, rows=ca.vertcat(x[3:6], offset))

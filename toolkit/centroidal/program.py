@@ -1,0 +1,298 @@
+"""The whole-sequence problem as an optimal-control program in the layout of Fatrop: stages of states and controls.
+
+Stage t holds the state at knot t, the wrenches of step t and three slacks; the last one a state and the body's slack.
+Rows of stage t are the dynamics to knot t + 1, then its inequalities.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.centroidal.blocks import Assembly, Block, Piece
+from toolkit.centroidal.body import (
+    TORQUE_ROLES,
+    BodyMargins,
+    knot_contacts,
+    lowest_foot,
+    swing_ankles,
+)
+from toolkit.centroidal.pieces import SLACKS, STATE, WRENCH, G, pieces
+from toolkit.centroidal.problem import CentroidalProblem
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.pose import rotation_about_z
+from toolkit.robot.model import RobotModel
+
+OPEN = 1e3  # bound of rows that are left free
+SCALE = 1e-2  # of the objective inside the program
+
+
+@dataclass(frozen=True)
+class Regularisers:
+    """Small terms beside the paper's objective that make a plan easy to execute; each an integral like the objective's.
+
+    Attributes:
+        jerk: weight of (change of CoM acceleration from step to step / dt)^2.
+        height: weight of the CoM's distance from home height above the feet, m^2.
+        load: weight of the normal force (in weights) of a contact in the step after it is made or before it is broken.
+        final_center: weight of the distance of the last CoM from the mean of the feet, m^2.
+        final_acceleration: weight of the last CoM acceleration, m^2/s^4.
+        final_spin: weight of the last angular momentum per mass, m^4/s^2.
+        slack: penalty of relaxing a margin from wanted to physical for 0.2 s.
+    """
+
+    jerk: float = 0.02
+    height: float = 400.0
+    load: float = 20.0
+    final_center: float = 2000.0
+    final_acceleration: float = 20.0
+    final_spin: float = 200.0
+    slack: float = 3000.0
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where things are in the vector of variables.
+
+    Attributes:
+        offset: (N + 1,) first variable of each stage.
+        wrench: (N, 4) first variable of a limb's wrench; -1 where not active.
+        slack: (N + 1, 3) variables of the slacks of friction, CoP and body; at the last knot all are the body's.
+        states, controls: (N + 1,) sizes.
+    """
+
+    offset: np.ndarray
+    wrench: np.ndarray
+    slack: np.ndarray
+    states: np.ndarray
+    controls: np.ndarray
+
+    @classmethod
+    def of(cls, active: np.ndarray) -> Layout:
+        """Layout for (N, 4) active contacts."""
+        count = active.sum(1)
+        controls = np.append(WRENCH * count + SLACKS, 1)
+        states = np.full(len(controls), STATE)
+        offset = np.concatenate([[0], np.cumsum(states + controls)[:-1]])
+        rank = np.cumsum(active, 1) - 1
+        wrench = np.where(active, offset[:-1, None] + STATE + WRENCH * rank, -1)
+        slack = (offset[:-1] + STATE + WRENCH * count)[:, None] + np.arange(SLACKS)
+        slack = np.concatenate([slack, np.full((1, SLACKS), offset[-1] + STATE)])
+        return cls(offset, wrench, slack, states, controls)
+
+    @property
+    def size(self) -> int:
+        """Number of variables."""
+        return int((self.states + self.controls).sum())
+
+
+class Program:
+    """Blocks, bounds and structure of one problem.
+
+    Args:
+        problem: the motion wanted; its margins are the wanted ones.
+        robot: for the limits of the body.
+        body: wanted margins of the body.
+        regularisers: weights.
+    """
+
+    def __init__(self, problem: CentroidalProblem, robot: RobotModel, body: BodyMargins, regularisers: Regularisers):
+        self.problem, self.robot, self.body, self.regularisers = problem, robot, body, regularisers
+        self.layout = Layout.of(problem.active)
+        self.path_rows = np.zeros(problem.steps + 1, int)
+        self._parts: list[tuple[Piece, np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
+        self._bounds: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self._heading = rotation_about_z(problem.yaw)
+        self._middle_heading = rotation_about_z((problem.yaw[:-1] + problem.yaw[1:]) / 2)
+        self._add_edges()
+        self._add_contacts()
+        self._add_body()
+        self._add_slacks()
+        self._finish()
+
+    def _add(self, piece: Piece, stage: np.ndarray, variables: np.ndarray, *columns: np.ndarray) -> np.ndarray:
+        """Enter a piece at stages, each at most once; returns the (n, rows) rows counted from the stage's first."""
+        n = len(stage)
+        rows = self.path_rows[stage][:, None] + np.arange(piece.rows)
+        self.path_rows[stage] += piece.rows
+        parameters = np.concatenate([np.reshape(column, (n, -1)) for column in columns], 1)
+        self._parts.append((piece, stage, variables, rows, parameters))
+        return rows
+
+    def _state(self, knot: np.ndarray, *parts: slice) -> np.ndarray:
+        """Variables of parts of the states at knots."""
+        index = np.concatenate([np.arange(STATE)[part] for part in parts or (slice(None),)])
+        return self.layout.offset[knot][:, None] + index
+
+    def _add_edges(self) -> None:
+        """Initial state and final conditions."""
+        p, reg = self.problem, self.regularisers
+        n = p.steps
+        first, last = np.array([0]), np.array([n])
+        initial = np.concatenate([p.com, p.com_velocity, p.angular_momentum / p.mass, np.zeros(3)])
+        rows = self._add(pieces().initial, first, self._state(first), initial[None])
+        self._bounds.append((first, rows, np.zeros((STATE, 2))))
+        weights = np.sqrt(SCALE * np.array([reg.final_center, reg.final_acceleration, reg.final_spin]))
+        yaw = p.yaw[-1]
+        columns = np.concatenate([p.final_center, [np.cos(yaw), np.sin(yaw)], weights])
+        rows = self._add(pieces().final, last, self._state(last), columns[None])
+        speed = 0.0 if p.final_at_rest else OPEN
+        bound = np.concatenate([np.full(3, speed), p.final_half_size])
+        self._bounds.append((last, rows, np.stack([-bound, bound], 1)))
+
+    def _add_contacts(self) -> None:
+        """Cones of the contacts."""
+        p, w, reg = self.problem, self.problem.weights, self.regularisers
+        duration = SCALE * p.dt / 0.2
+        weight = p.mass * G
+        cop_margin = p.half_size - p.reduced_half_size
+        for limb in range(4):
+            step = np.flatnonzero(p.active[:, limb])
+            if not len(step):
+                continue
+            on = p.active[:, limb]
+            made = np.concatenate([[False], on[1:] & ~on[:-1]])[step]
+            broken = np.concatenate([on[:-1] & ~on[1:], [False]])[step]
+            edge = np.where(made | broken, reg.load, 0.0)
+            squares = [np.full(len(step), value) for value in (w.force, w.lateral_force, w.torque * weight**2, w.cop)]
+            weights = np.sqrt(duration[step, None] * np.stack([*squares, edge], 1))
+            wanted = np.array([p.margins.friction, *cop_margin[limb], p.margins.yaw])
+            variables = np.concatenate(
+                [p_index(self.layout.wrench[step, limb], WRENCH), self.layout.slack[step, :2]], 1
+            )
+            fixed = np.tile(np.concatenate([p.half_size[limb], wanted]), (len(step), 1))
+            self._add(pieces().contact, step, variables, p.friction[step, limb], fixed, weights)
+
+    def _add_body(self) -> None:
+        """Limits of legs and arms."""
+        p, body, layout = self.problem, self.body, self.layout
+        knots, limbs, positions, rotations = knot_contacts(p)
+        swing_knots, swing_limbs, tips = swing_ankles(p)
+        weight = p.mass * G
+        com = slice(0, 3)
+        for limb in FEET:
+            leg = self.robot.legs[limb]
+            hip = self._heading @ leg.hip_in_com
+            here = limbs == limb
+            at = knots[here]
+            variables = np.concatenate([self._state(at, com), layout.slack[at, 2:]], 1)
+            ranges = [leg.ranges[role] for role in ("ankle_pitch", "ankle_roll", "hip_pitch", "hip_roll")]
+            fixed = np.concatenate([[leg.min_length, leg.max_length], *ranges, [body.length, body.ankle, body.hip]])
+            rotation = rotations[here]
+            ankle = positions[here] + rotation @ leg.ankle_in_sole
+            links = np.tile([leg.thigh, leg.shin], (len(at), 1))
+            posture = (hip[at], ankle, rotation, links)
+            self._add(pieces().leg, at, variables, *posture, np.tile(fixed, (len(at), 1)))
+
+            step = np.flatnonzero(p.active[:, limb])
+            wrench = p_index(layout.wrench[step, limb], WRENCH)
+            variables = np.concatenate([self._state(step, com, slice(3, 6)), wrench, layout.slack[step, 2:]], 1)
+            sole, rotation = p.position[step, limb], p.rotation[step, limb]
+            limits = np.array([leg.torques[role] for role in TORQUE_ROLES]) / weight
+            posture = (self._middle_heading[step] @ leg.hip_in_com, sole + rotation @ leg.ankle_in_sole, rotation)
+            fixed = np.tile(np.append(limits, body.torque), (len(step), 1))
+            links = np.tile([leg.thigh, leg.shin], (len(step), 1))
+            # order of the piece: half of dt, posture, sole, limits
+            self._add(pieces().torque, step, variables, p.dt[step] / 2, *posture, links, sole, fixed)
+
+            here = swing_limbs == limb
+            self._add_distance(swing_knots[here], hip[swing_knots[here]], tips[here], 0.0, leg.max_length)
+        for limb in (Limb.LEFT_PALM, Limb.RIGHT_PALM):
+            here = limbs == limb
+            if here.any():
+                arm = self.robot.arms[limb]
+                shoulder = self._heading[knots[here]] @ arm.shoulder_in_com
+                self._add_distance(knots[here], shoulder, positions[here], arm.min_reach, arm.max_reach)
+        floor, _ = lowest_foot(p)
+        at = np.flatnonzero(np.isfinite(floor))
+        variables = np.concatenate([self._state(at, slice(2, 3)), layout.slack[at, 2:]], 1)
+        least = floor[at] + p.min_height
+        self._add(pieces().height, at, variables, least, np.full(len(at), body.height))
+
+    def _add_distance(self, knot: np.ndarray, root: np.ndarray, tip: np.ndarray, lower: float, upper: float) -> None:
+        """Bounds on the distance from a root to a tip at knots."""
+        if len(knot):
+            variables = np.concatenate([self._state(knot, slice(0, 3)), self.layout.slack[knot, 2:]], 1)
+            fixed = np.tile([lower, upper, self.body.length], (len(knot), 1))
+            self._add(pieces().distance, knot, variables, root, tip, fixed)
+
+    def _add_slacks(self) -> None:
+        """Penalties of the slacks."""
+        slack = self.layout.slack
+        step = np.arange(self.problem.steps)
+        # A short step costs as much as one of 0.05 s: else margins would be given away where steps are short.
+        duration = SCALE * np.maximum(self.problem.dt, 0.05) / 0.2
+        linear = self.regularisers.slack * duration
+        self._add(pieces().slack, step, slack[:-1], linear, np.sqrt(0.1 * linear))
+        last = np.array([self.problem.steps])
+        self._add(pieces().slack, last, slack[-1:], linear[-1:] / SLACKS, np.sqrt(0.1 * linear[-1:]))
+
+    def _finish(self) -> None:
+        """Dynamics, bounds and the assembly."""
+        p, w, reg, layout = self.problem, self.problem.weights, self.regularisers, self.layout
+        n = p.steps
+        dynamics = np.append(np.full(n, STATE), 0)
+        first_row = np.concatenate([[0], np.cumsum(dynamics + self.path_rows)])
+        total = int(first_row[-1])
+        blocks = [
+            Block(piece, variables, (first_row[stage] + dynamics[stage])[:, None] + rows, parameters)
+            for piece, stage, variables, rows, parameters in self._parts
+        ]
+        duration = p.dt / 0.2
+        at_rest = not np.any(p.com_velocity)
+        squares = np.stack(
+            [
+                w.linear_momentum * p.mass**2 * duration,
+                w.linear_momentum_rate * p.mass**2 * duration,
+                w.angular_momentum * p.mass**2 * duration,
+                w.angular_momentum_rate * p.mass**2 * duration,
+                reg.jerk / (0.2 * np.maximum(p.dt, 0.02)),
+                reg.height * duration,
+            ],
+            1,
+        )
+        squares[0, 4] *= at_rest  # the acceleration before a start in motion is unknown
+        height = _home_height(p)
+        weights = np.sqrt(SCALE * squares)
+        count = p.active.sum(1)
+        for contacts in range(1, 5):
+            step = np.flatnonzero(count == contacts)
+            if not len(step):
+                continue
+            limbs = np.nonzero(p.active[step])[1].reshape(-1, contacts)
+            wrench = p_index(layout.wrench[step[:, None], limbs].ravel(), WRENCH).reshape(len(step), -1)
+            variables = np.concatenate([self._state(step), wrench, self._state(step + 1)], 1)
+            rotation = p.rotation[step[:, None], limbs].reshape(len(step), contacts, 9)
+            pose = np.concatenate([rotation, p.position[step[:, None], limbs]], 2).reshape(len(step), -1)
+            parameters = np.concatenate([p.dt[step, None], pose, weights[step], height[step + 1, None]], 1)
+            rows = first_row[step][:, None] + np.arange(STATE)
+            blocks.append(Block(pieces().stage[contacts], variables, rows, parameters))
+        self.assembly = Assembly(blocks, layout.size, total)
+        self.row_bounds = np.stack([np.zeros(total), np.full(total, np.inf)], 1)
+        for stage in range(n):
+            self.row_bounds[first_row[stage] : first_row[stage] + STATE] = 0.0
+        for stage, rows, bound in self._bounds:
+            self.row_bounds[first_row[stage[0]] + dynamics[stage[0]] + rows[0]] = bound
+        self.variable_bounds = np.stack([np.full(layout.size, -np.inf), np.full(layout.size, np.inf)], 1)
+        self.variable_bounds[layout.slack, 0] = 0.0
+        step, limb = np.nonzero(p.active)
+        normal = layout.wrench[step, limb] + 2
+        self.variable_bounds[normal, 0] = 0.0
+        self.variable_bounds[normal, 1] = p.max_normal_force[limb] / (p.mass * G)
+
+
+def _home_height(problem: CentroidalProblem) -> np.ndarray:
+    """(N + 1,) m; home height of the CoM above the mean of the feet around each knot."""
+    home = problem.final_center[2] - problem.position[-1, :2, 2].mean()
+    knots, limbs, positions, _ = knot_contacts(problem)
+    feet = limbs < 2
+    total, count = np.zeros(problem.steps + 1), np.zeros(problem.steps + 1)
+    np.add.at(total, knots[feet], positions[feet, 2])
+    np.add.at(count, knots[feet], 1.0)
+    return total / np.maximum(count, 1.0) + home
+
+
+def p_index(first: np.ndarray, size: int) -> np.ndarray:
+    """(n, size) consecutive indices from (n,) first ones."""
+    return first[:, None] + np.arange(size)

@@ -1,0 +1,278 @@
+"""The whole-sequence optimisation: the motion that is executed.
+
+The paper's objective under exact cones, with what the body can do (`toolkit.centroidal.body`), and with margins: the
+wanted margins may be relaxed at a price, so they shrink only where nothing else is feasible, and the motion says how
+far (its problem's margins). Solved by Fatrop, which exploits the stages; by Ipopt where Fatrop gives up.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+
+import casadi as ca
+import numpy as np
+
+from toolkit.centroidal.body import BodyMargins, BodyResiduals, body_residuals, knot_contacts
+from toolkit.centroidal.build import ProblemConfig, sequence_problem
+from toolkit.centroidal.pieces import G
+from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem, Margins
+from toolkit.centroidal.program import Program, Regularisers, p_index
+from toolkit.centroidal.residual import TOLERANCE, check, confirmed
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.geometry.limb import Limb
+from toolkit.robot.model import RobotModel
+
+WANTED = Margins(friction=0.66, cop=(0.055, 0.045), yaw=0.6)
+WANTED_BODY = BodyMargins(length=0.015, ankle=0.1, hip=0.05, height=0.02, torque=0.85)
+CONVERGED = "converged"
+HOPELESS = 1.5  # slack at which a sequence is infeasible even where the solver has not converged
+BODY_TOLERANCE = 1e-5  # m, rad, part of a torque limit
+
+
+@dataclass(frozen=True)
+class SequenceConfig:
+    """What a sequence is planned with.
+
+    Attributes:
+        problem: discretisation, final box, weights and the wanted margins of the contacts.
+        body: wanted margins of legs and arms.
+        regularisers: small terms beside the paper's objective.
+        solver: "fatrop" (Ipopt is tried where it fails) or "ipopt".
+        max_iterations: of either solver.
+        tolerance: of either solver; its constraints are met to about this.
+    """
+
+    problem: ProblemConfig = field(default_factory=lambda: ProblemConfig(margins=WANTED))
+    body: BodyMargins = WANTED_BODY
+    regularisers: Regularisers = field(default_factory=Regularisers)
+    solver: str = "fatrop"
+    max_iterations: int = 100
+    tolerance: float = 1e-4
+
+
+def optimise(
+    robot: RobotModel,
+    schedule: ContactSchedule,
+    com: np.ndarray,
+    com_velocity: np.ndarray,
+    *,
+    config: SequenceConfig = SequenceConfig(),
+    warm: CentroidalMotion | None = None,
+) -> CentroidalMotion:
+    """Optimise the motion of a whole schedule, which ends at rest.
+
+    Args:
+        robot: mass, patches, legs and arms.
+        schedule: phases; the last one has both feet in contact.
+        com: (3,) m initial CoM in the world.
+        com_velocity: (3,) m/s.
+        config: see the class.
+        warm: a motion to start the solver from, of any schedule; it is sampled in time.
+
+    Returns:
+        The motion. Feasible where NumPy confirms it within `motion.problem.margins` and the body's limits; else
+        `status` names the constraint that is violated most, and where.
+
+    Raises:
+        InputError: as `sequence_problem`.
+    """
+    start = time.perf_counter()
+    problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem)
+    motion = optimise_problem(robot, problem, config=config, warm=warm)
+    ends = np.array([phase.end for phase in schedule.phases])
+    status = motion.status
+    if "at knot" in status:
+        before, _, rest = status.rpartition("at knot ")
+        knot = min(int(rest), problem.steps - 1)
+        middle = (problem.times[knot] + problem.times[knot + 1]) / 2
+        phase = schedule.phases[min(int(np.searchsorted(ends, middle)), len(ends) - 1)]
+        status = f"{before}in transition {phase.transition}, {problem.times[knot]:.2f} s"
+    return replace(motion, status=status, seconds=time.perf_counter() - start)
+
+
+def optimise_problem(
+    robot: RobotModel,
+    problem: CentroidalProblem,
+    *,
+    config: SequenceConfig = SequenceConfig(),
+    warm: CentroidalMotion | None = None,
+) -> CentroidalMotion:
+    """Optimise a problem whose margins are the wanted ones; as `optimise`."""
+    start = time.perf_counter()
+    program = Program(problem, robot, config.body, config.regularisers)
+    x, status, iterations = _solve(program, _guess(program, warm), config.solver, config)
+    motion = _judged(_motion(program, x, status), program, robot, x)
+    # Far beyond a physical limit the verdict will not change: Ipopt is asked only where it may.
+    hopeless = x[program.layout.slack].max() > HOPELESS and np.isfinite(x).all()
+    if not motion.feasible and status != CONVERGED and config.solver == "fatrop" and not hopeless:
+        x, status, count = _solve(program, _guess(program, warm), "ipopt", config)
+        iterations += count
+        motion = _judged(_motion(program, x, status), program, robot, x)
+    return replace(motion, iterations=iterations, seconds=time.perf_counter() - start)
+
+
+def _solve(program: Program, guess: np.ndarray, solver: str, config: SequenceConfig) -> tuple[np.ndarray, str, int]:
+    """Variables, the solver's word ("converged" or what it said) and its iterations."""
+    functions = program.assembly.functions(upper_hessian=solver == "ipopt")
+    nlp = functions.pop("nlp")
+    options: dict = {
+        "cache": functions,
+        "print_time": False,
+        "calc_lam_x": False,
+        "calc_lam_p": False,
+        "calc_f": False,
+        "calc_g": False,
+    }
+    if solver == "fatrop":
+        layout = program.layout
+        options |= {
+            "structure_detection": "manual",
+            "N": program.problem.steps,
+            "nx": layout.states.tolist(),
+            "nu": layout.controls.tolist(),
+            "ng": program.path_rows.tolist(),
+            "fatrop": {
+                "print_level": 0,
+                "max_iter": config.max_iterations,
+                "tolerance": config.tolerance,
+                "constr_viol_tol": 1e-8,
+            },
+        }
+    else:
+        options["ipopt"] = {
+            "print_level": 0,
+            "sb": "yes",
+            "max_iter": config.max_iterations,
+            "tol": config.tolerance,
+            "bound_relax_factor": 0.0,
+        }
+    instance = ca.nlpsol("sequence", solver, nlp, options)
+    bounds = program.variable_bounds, program.row_bounds
+    result = instance(
+        x0=guess,
+        p=program.assembly.parameters,
+        lbx=bounds[0][:, 0],
+        ubx=bounds[0][:, 1],
+        lbg=bounds[1][:, 0],
+        ubg=bounds[1][:, 1],
+    )
+    stats = instance.stats()
+    status = CONVERGED if stats["success"] else f"{solver} stopped: {stats['return_status']}"
+    return np.array(result["x"]).ravel(), status, int(stats["iter_count"])
+
+
+def _guess(program: Program, warm: CentroidalMotion | None) -> np.ndarray:
+    """Start of the solver: the CoM along the mean of the feet, the weight shared; or a sampled motion."""
+    p, layout = program.problem, program.layout
+    n = p.steps
+    knots, limbs, positions, _ = knot_contacts(p)
+    x = np.zeros(layout.size)
+    com, velocity = np.zeros((n + 1, 3)), np.zeros((n + 1, 3))
+    if warm is not None:
+        for knot, at in enumerate(p.times):
+            com[knot], velocity[knot], _ = warm.sample(float(at))
+    else:
+        feet = limbs < 2
+        total, count = np.zeros((n + 1, 3)), np.zeros(n + 1)
+        np.add.at(total, knots[feet], positions[feet])
+        np.add.at(count, knots[feet], 1.0)
+        total /= np.maximum(count, 1.0)[:, None]
+        com = total + [0.0, 0.0, p.final_center[2] - p.position[-1, :2, 2].mean()]
+        width = max(n // 20, 3)
+        padded = np.concatenate([np.repeat(p.com[None], width, 0), com, np.repeat(com[-1:], width, 0)])
+        window = np.hanning(2 * width + 3)[1:-1]
+        com = np.stack([np.convolve(padded[:, i], window / window.sum(), "valid") for i in range(3)], 1)
+        velocity[:-1] = np.diff(com, axis=0) / p.dt[:, None]
+    com[0], velocity[0] = p.com, p.com_velocity
+    x[p_index(layout.offset, 3)] = com
+    x[p_index(layout.offset + 3, 3)] = velocity
+    share = np.array([0.0, 0.0, 1.0]) / p.active.sum(1)[:, None, None]
+    local = np.einsum("tlji,tlj->tli", p.rotation, np.broadcast_to(share, (n, 4, 3)))
+    step, limb = np.nonzero(p.active)
+    local[..., 2] = np.maximum(local[..., 2], 0.01)
+    x[p_index(layout.wrench[step, limb], 3)] = local[step, limb]
+    x[layout.slack] = 0.01
+    return x
+
+
+def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
+    """The motion of the program's variables, its knots integrated exactly from the wrenches."""
+    p, layout = program.problem, program.layout
+    n, weight = p.steps, p.mass * G
+    local, moment = np.zeros((n, 4, 3)), np.zeros((n, 4, 3))
+    step, limb = np.nonzero(p.active)
+    local[step, limb] = weight * x[p_index(layout.wrench[step, limb], 3)]
+    moment[step, limb] = weight * x[p_index(layout.wrench[step, limb] + 3, 3)]
+    normal = local[..., 2]
+    loaded = normal > 1e-7 * weight
+    scale = np.where(loaded, normal, 1.0)
+    cop = np.where(loaded[..., None], np.stack([-moment[..., 1], moment[..., 0]], -1) / scale[..., None], 0.0)
+    torque = moment[..., 2] - cop[..., 0] * local[..., 1] + cop[..., 1] * local[..., 0]
+    state = x[layout.offset[:, None] + np.arange(9)]
+    return CentroidalMotion(
+        problem=p,
+        feasible=False,
+        status=status,
+        com=state[:, :3],
+        linear_momentum=p.mass * state[:, 3:6],
+        angular_momentum=p.mass * state[:, 6:9],
+        force=np.einsum("tlij,tlj->tli", p.rotation, local),
+        cop=cop,
+        yaw_torque=torque,
+        objective=np.inf,
+        seconds=0.0,
+        iterations=0,
+    )
+
+
+def _judged(motion: CentroidalMotion, program: Program, robot: RobotModel, x: np.ndarray) -> CentroidalMotion:
+    """The motion with the margins that it keeps, and the verdict of the independent checks."""
+    slack = x[program.layout.slack]
+    judged = motion
+    for margins in _margins(motion.problem, np.clip(slack[:-1].max(0), 0.0, 1.0)):
+        judged = confirmed(replace(motion, problem=replace(motion.problem, margins=margins)), TOLERANCE)
+        if judged.feasible:
+            break
+    body = body_residuals(judged, robot)
+    if judged.feasible and body.largest <= BODY_TOLERANCE:
+        return judged
+    return replace(judged, feasible=False, status=f"{motion.status}; {_reason(judged, body, slack)}")
+
+
+def _margins(problem: CentroidalProblem, used: np.ndarray) -> list[Margins]:
+    """Margins that a motion may keep, the wanted ones first.
+
+    A relaxed yaw factor is no looser where lateral forces and CoP alone demand a yaw moment: both are tried.
+
+    Args:
+        problem: with the wanted margins.
+        used: largest slack of friction and of CoP, at most 1.
+    """
+    wanted = problem.margins
+    cop = (problem.half_size - problem.reduced_half_size)[problem.active.any(0)].min(0) * (1 - used[1])
+    friction, yaw = (float(factor + (1 - factor) * used[0]) for factor in (wanted.friction, wanted.yaw))
+    kept = (float(cop[0]), float(cop[1]))
+    return [wanted, *[Margins(friction, kept, factor) for factor in (yaw, wanted.yaw, (yaw + wanted.yaw) / 2, 1.0)]]
+
+
+def _reason(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) -> str:
+    """Which constraint is violated most, by how much, and where."""
+    name, knot, limb = body.worst
+    if body.largest > BODY_TOLERANCE and slack[:, 2].max() >= slack[:-1, :2].max():
+        return f"infeasible: {name} of {limb.label} beyond its limit by {body.largest:.3g} at knot {knot}"
+    step, kind = np.unravel_index(int(np.argmax(slack[:-1, :2])), slack[:-1, :2].shape)
+    if slack[step, kind] > 1.0 + 1e-4:
+        p = motion.problem
+        local = np.einsum("lji,lj->li", p.rotation[step], motion.force[step])
+        loaded = p.active[step] & (local[:, 2] > 1e-3 * p.mass * G)
+        excess = np.hypot(local[:, 0], local[:, 1]) - p.friction[step] * local[:, 2]
+        if kind == 1:
+            excess = (np.abs(motion.cop[step]) - p.half_size).max(-1)
+        limb = Limb(int(np.argmax(np.where(loaded, excess, -np.inf))))
+        what = ("friction", "centre of pressure")[kind]
+        return f"infeasible: {what} of {limb.label} beyond the physical limit at knot {step}"
+    if body.largest > BODY_TOLERANCE:
+        return f"infeasible: {name} of {limb.label} beyond its limit by {body.largest:.3g} at knot {knot}"
+    residuals = check(motion)
+    return f"unsolved: {residuals.worst.replace('_', ' ')} is violated by {residuals.largest:.2g}"
