@@ -12,7 +12,7 @@ import pytest
 from tests.robot.samples import LEG, TOML, URDF_TOML, biped_mjcf, biped_urdf, write_robot
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.robot.loader import find_robots, load_robot, robots_folder
+from toolkit.robot.loader import default_robot, find_robots, load_robot, robots_folder
 
 KNEE = '<joint name="left_knee" axis="0 1 0" range="0.0 2.4" actuatorfrcrange="-250 250" armature="0.01"/>'
 
@@ -32,6 +32,18 @@ def test_robots_in_the_current_directory_come_first(tmp_path: Path, monkeypatch:
     assert robots_folder() == Path(__file__).resolve().parents[2] / "robots"
     write_robot(tmp_path / "robots" / "ape")
     assert find_robots() == ("ape",)
+
+
+def test_robot_meant_where_none_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="which robot is meant"):
+        default_robot(tmp_path)
+    write_robot(tmp_path / "ape")
+    assert default_robot(tmp_path) == "ape" and load_robot(None, tmp_path).name == "ape"
+    write_robot(tmp_path / "bear")
+    with pytest.raises(RobotError, match="Found ape, bear; name one with --robot"):
+        load_robot(None, tmp_path)
+    (tmp_path / "default").write_text("bear\n")
+    assert load_robot(None, tmp_path).name == "bear"
 
 
 def test_biped(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 
 import mujoco
 import numpy as np
+import placo
 import pytest
 
 from toolkit.geometry.limb import Limb
@@ -15,6 +16,7 @@ from toolkit.robot.description import FILE_NAME, RobotDescription, read_descript
 from toolkit.robot.loader import find_robots, load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.robot.picture import standing_scene
+from toolkit.robot.placo import pinocchio_map, placo_wrapper
 
 
 @pytest.fixture(scope="module", params=find_robots())
@@ -48,7 +50,7 @@ def test_some_robot_is_there() -> None:
 
 def test_declared_numbers(robot: RobotModel, declared: dict) -> None:
     known = {"joints", "mass", "leg_mass", "thigh", "shin", "armature", "symmetric", "joint_limits"}
-    assert set(declared) <= known
+    assert set(declared) <= known | {"wrist_lever", "stance_width"}
     model = robot.mujoco_model
     if "joints" in declared:
         assert len(robot.joint_names) == declared["joints"]
@@ -176,6 +178,56 @@ def test_leg_geometry_predicts_the_ankle(robot: RobotModel) -> None:
         assert leg.ranges["knee"][1] > 1.0
         assert min(leg.torques.values()) > 0
     assert model.nbody > 1
+
+
+def test_palm_force_passes_by_the_wrist(robot: RobotModel, declared: dict) -> None:
+    """A force along the palm's normal takes next to no torque of the last three joints, however they stand."""
+    if "wrist_lever" not in declared:
+        pytest.skip("does not declare a wrist lever")
+    model, data, rng = robot.mujoco_model, home_data(robot), np.random.default_rng(0)
+    jacobian = np.zeros((3, model.nv))
+    for limb in robot.arms:
+        site, last = model.site(robot.limbs[limb].site).id, model.body(robot.limbs[limb].body).id
+        wrist = [model.jnt_dofadr[model.body_jntadr[body]] for body in (last, last - 1, last - 2)]
+        for _ in range(10):
+            data.qpos[7:] = rng.uniform(robot.lower, robot.upper)
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_jacSite(model, data, jacobian, None, site)
+            levers = np.abs(data.site_xmat[site].reshape(3, 3)[:, 2] @ jacobian[:, wrist])
+            assert all(within(lever, declared["wrist_lever"]) for lever in levers)
+
+
+def test_no_self_contact_while_walking(robot: RobotModel, declared: dict) -> None:
+    """Legs do not touch in strides of 0.4 m at the declared widths, found by placo and judged by MuJoCo."""
+    if "stance_width" not in declared:
+        pytest.skip("does not declare a stance width")
+    wrapper = placo_wrapper(robot)
+    order, data = pinocchio_map(robot, wrapper.model), mujoco.MjData(robot.mujoco_model)
+    for width in declared["stance_width"]:
+        for stride, rise in ((-0.4, 0.0), (0.0, 0.1), (0.4, 0.1), (0.4, -0.1)):
+            wrapper.state.q = order.q_from_qpos(robot.home)
+            wrapper.update_kinematics()
+            solver = placo.KinematicsSolver(wrapper)
+            solver.enable_joint_limits(True)
+            targets = {}
+            for foot, sign in ((Limb.LEFT_FOOT, 1), (Limb.RIGHT_FOOT, -1)):
+                targets[foot] = np.eye(4)
+                targets[foot][:3, 3] = sign * np.array([stride, width, rise]) / 2
+                solver.add_frame_task(foot.label, targets[foot]).configure(foot.label, "soft", 1e3, 1e3)
+            height = 0.95 * robot.com_height
+            solver.add_com_task(np.array([0, 0, height])).configure("com", "soft", 100)
+            posture = solver.add_joints_task()
+            posture.set_joints(dict(zip(robot.joint_names, robot.home[7:], strict=True)))
+            posture.configure("posture", "soft", 1e-2)
+            for _ in range(40):
+                solver.solve(True)
+                wrapper.update_kinematics()
+            for foot, target in targets.items():
+                np.testing.assert_allclose(wrapper.get_T_world_frame(foot.label), target, atol=1e-3)
+            data.qpos[:] = order.qpos_from_q(wrapper.state.q)
+            mujoco.mj_fwdPosition(robot.mujoco_model, data)
+            assert data.ncon == 0
 
 
 @pytest.mark.parametrize("seconds", [1.0, pytest.param(5.0, marks=pytest.mark.slow)])

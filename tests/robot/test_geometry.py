@@ -1,0 +1,153 @@
+"""Two-link legs and arm reaches against MuJoCo's kinematics, on joints with other signs, zeros and orders too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.robot.samples import TOML, biped_mjcf, write_robot
+from toolkit.errors import RobotError
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.model import RobotModel
+
+LEFT = Limb.LEFT_FOOT
+
+
+def reversed_knees() -> tuple[str, str]:
+    """Knees that turn about -y, and thighs whose zero points 0.3 rad forwards."""
+    model = biped_mjcf()
+    for side in ("left", "right"):
+        model = model.replace(
+            f'name="{side}_knee" axis="0 1 0" range="0.0 2.4"', f'name="{side}_knee" axis="0 -1 0" range="-2.4 0"'
+        )
+        model = model.replace(f'name="{side}_hip_pitch" axis', f'name="{side}_hip_pitch" ref="0.3" axis')
+    model = model.replace('range="-2.0 1.0"', 'range="-1.7 1.3"')
+    toml = TOML.replace('"*_knee" = 0.7', '"*_knee" = -0.7').replace('"*_hip_pitch" = -0.35', '"*_hip_pitch" = -0.05')
+    return model, toml
+
+
+def bent_zero() -> tuple[str, str]:
+    """Knees whose zero is flexed by 0.4 rad: the link itself is turned."""
+    quaternion = f'quat="{np.cos(0.2)} 0 {np.sin(0.2)} 0"'
+    model = biped_mjcf()
+    for side in ("left", "right"):
+        model = model.replace(
+            f'name="{side}_knee_link" pos="0 0 -0.35"', f'name="{side}_knee_link" pos="0 0 -0.35" {quaternion}'
+        )
+    model = model.replace('range="0.0 2.4"', 'range="-0.4 2.0"')
+    return model, TOML.replace('"*_knee" = 0.7', '"*_knee" = 0.3')
+
+
+@pytest.fixture(params=["plain", "reversed knees", "bent zero", *find_robots()])
+def robot(request: pytest.FixtureRequest, tmp_path: Path) -> RobotModel:
+    variants = {"plain": (biped_mjcf(), TOML), "reversed knees": reversed_knees(), "bent zero": bent_zero()}
+    if request.param not in variants:
+        return load_robot(request.param)
+    return load_robot(str(write_robot(tmp_path / "biped", *variants[request.param])))
+
+
+def test_leg_lengths_and_angles(robot: RobotModel) -> None:
+    """In random crouches the hip stands where the two links and the sole's angles put it."""
+    model, data = robot.mujoco_model, mujoco.MjData(robot.mujoco_model)
+    data.qpos[:] = robot.home
+    mujoco.mj_forward(model, data)
+    base = data.xmat[1].reshape(3, 3)
+    hips = {foot: base.T @ (data.subtree_com[1] - data.xpos[1]) + leg.hip_in_com for foot, leg in robot.legs.items()}
+    rng = np.random.default_rng(3)
+    for foot, leg in robot.legs.items():
+        side = foot.label.partition("_")[0]
+        for _ in range(20):
+            angles = {role: rng.uniform(*leg.ranges[role]) for role in ("hip_pitch", "knee", "ankle_pitch")}
+            data.qpos[:] = robot.home
+            for role, angle in angles.items():
+                joint = model.joint(f"{side}_{role}")
+                _set(data, model, joint.id, angle, leg.ranges[role])
+            mujoco.mj_kinematics(model, data)
+            base = data.xmat[1].reshape(3, 3)
+            sole = data.site(robot.limbs[foot].site)
+            rotation = sole.xmat.reshape(3, 3)
+            ankle = sole.xpos + rotation @ leg.ankle_in_sole
+            h = rotation.T @ (data.xpos[1] + base @ hips[foot] - ankle)  # hip seen from the ankle, in the sole frame
+            shin, thigh = angles["ankle_pitch"], angles["ankle_pitch"] + angles["knee"]
+            expected = -leg.shin * np.array([np.sin(shin), 0, -np.cos(shin)])
+            expected += -leg.thigh * np.array([np.sin(thigh), 0, -np.cos(thigh)])
+            np.testing.assert_allclose(h[[0, 2]], expected[[0, 2]], atol=1e-9)
+            pitch = sum(angles.values())
+            expected_sole = [[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]]
+            np.testing.assert_allclose(base.T @ rotation, expected_sole, atol=1e-9)
+
+
+def _set(data: mujoco.MjData, model: mujoco.MjModel, joint: int, angle: float, bounds: tuple[float, float]) -> None:
+    """Put a joint where its role's angle is; range ends map onto range ends, so no sign or zero is assumed."""
+    low, high = model.jnt_range[joint]
+    share = (angle - bounds[0]) / (bounds[1] - bounds[0])
+    forward = data.xaxis[joint] @ data.xmat[1].reshape(3, 3)[:, 1] > 0 if data.xaxis[joint].any() else True
+    data.qpos[model.jnt_qposadr[joint]] = low + share * (high - low) if forward else high - share * (high - low)
+
+
+def test_length_limits(robot: RobotModel) -> None:
+    for leg in robot.legs.values():
+        thigh, shin, flexion = leg.thigh, leg.shin, leg.ranges["knee"][1]
+        expected = np.hypot(thigh + shin * np.cos(flexion), shin * np.sin(flexion))
+        assert leg.min_length == pytest.approx(expected)
+        assert leg.max_length <= 0.985 * (thigh + shin) + 1e-12
+        assert leg.ranges["knee"][0] < 0.5 < leg.ranges["knee"][1]
+
+
+def test_offset_zeros_are_taken_out(tmp_path: Path) -> None:
+    plain = load_robot(str(write_robot(tmp_path / "plain"))).legs[LEFT]
+    for index, variant in enumerate((reversed_knees(), bent_zero())):
+        leg = load_robot(str(write_robot(tmp_path / str(index), *variant))).legs[LEFT]
+        for role, bounds in plain.ranges.items():
+            # MuJoCo writes XML with six digits
+            np.testing.assert_allclose(leg.ranges[role], bounds, atol=2e-6, err_msg=role)
+        np.testing.assert_allclose(leg.hip_in_com, plain.hip_in_com, atol=2e-6)
+
+
+def test_knee_that_cannot_straighten_limits_the_length(tmp_path: Path) -> None:
+    model = biped_mjcf().replace('range="0.0 2.4"', 'range="0.5 2.4"')
+    leg = load_robot(str(write_robot(tmp_path / "biped", model))).legs[LEFT]
+    assert leg.max_length == pytest.approx(np.hypot(0.35 + 0.30 * np.cos(0.5), 0.30 * np.sin(0.5)))
+
+
+@pytest.mark.parametrize("name", find_robots())
+def test_arm_reach(name: str) -> None:
+    """No bend of the joints beyond the shoulder reaches farther, and the reach given keeps a margin."""
+    robot = load_robot(name)
+    model, data = robot.mujoco_model, mujoco.MjData(robot.mujoco_model)
+    data.qpos[:] = robot.home
+    mujoco.mj_forward(model, data)
+    base = data.xmat[1].reshape(3, 3)
+    rng = np.random.default_rng(0)
+    for limb, arm in robot.arms.items():
+        shoulder = data.subtree_com[1] + base @ arm.shoulder_in_com
+        side = limb.label.partition("_")[0]
+        outward = base[:, 1] @ (shoulder - data.subtree_com[1])
+        assert outward > 0.05 if limb.is_left else outward < -0.05
+        other = mujoco.MjData(model)
+        distances = []
+        for _ in range(300):
+            other.qpos[:] = robot.home
+            for joint in range(1, model.njnt):
+                if model.joint(joint).name.startswith(side):
+                    other.qpos[model.jnt_qposadr[joint]] = rng.uniform(*model.jnt_range[joint])
+            mujoco.mj_kinematics(model, other)
+            distances.append(np.linalg.norm(other.site(robot.limbs[limb].site).xpos - shoulder))
+        assert max(distances) <= arm.max_reach / 0.95 + 1e-6
+        assert 0.1 < arm.min_reach < 0.6 * arm.max_reach
+    assert set(robot.legs) == set(FEET)
+
+
+def test_arm_with_too_few_joints(tmp_path: Path) -> None:
+    stump = (
+        '<body name="stump" pos="0 0.2 0.3"><joint name="shoulder" axis="0 1 0" range="-1 1" actuatorfrcrange="-9 9"/>'
+    )
+    stump += '<geom size="0.03" mass="0.5"/></body>'
+    model = biped_mjcf().replace('<body name="left_hip_pitch_link"', stump + '<body name="left_hip_pitch_link"')
+    toml = TOML.replace("[home]", '[limbs.left_palm]\nbody = "stump"\npatch = [0.05, 0.05]\n[home]')
+    with pytest.raises(RobotError, match="left_palm: 1 joints between the trunk and the palm; an arm needs four"):
+        load_robot(str(write_robot(tmp_path / "biped", model, toml)))
