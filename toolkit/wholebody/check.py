@@ -100,38 +100,38 @@ def _tracking(
     """Largest position and orientation error over CoM and contacts, and the reasons to fail."""
     model = robot.mujoco_model
     data = mujoco.MjData(model)
-    worst: dict[tuple[str, str], tuple[float, float, float]] = {}  # (thing, unit): ratio, error, time
+    worst: dict[tuple[str, str], tuple[float, float, float]] = {}  # (thing, unit): error, limit, time
 
-    def note(thing: str, unit: str, error: float, limit: float, time: float) -> None:
-        error = error if np.isfinite(error) else np.inf
-        if error / limit >= worst.get((thing, unit), (-1.0, 0.0, 0.0))[0]:
-            worst[thing, unit] = (error / limit, error, time)
+    def note(thing: str, unit: str, error: float, limit: float, time: float) -> float:
+        error = float(error) if np.isfinite(error) else np.inf
+        if error > worst.get((thing, unit), (-1.0,))[0]:
+            worst[thing, unit] = (error, limit, time)
+        return error
 
     position = orientation = 0.0
     for time, state in zip(times, qpos, strict=True):
         data.qpos[:] = state
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        error = float(np.linalg.norm(data.subtree_com[0] - motion.sample(time)[0]))
-        position = max(position, error)
-        note("the CoM", "m", error, config.com, time)
+        error = np.linalg.norm(data.subtree_com[0] - motion.sample(time)[0])
+        position = max(position, note("the CoM", "m", error, config.com, time))
         for limb, item in robot.limbs.items():
             sample = paths.sample(limb, time)
             if sample.pose is None or not (limb.is_foot or sample.in_contact):
                 continue
             site = data.site(item.site)
-            error = float(np.linalg.norm(site.xpos - sample.pose.position))
+            error = np.linalg.norm(site.xpos - sample.pose.position)
             if not sample.in_contact:
                 note(f"{limb.label} in the air", "m", error, config.swing, time)
                 continue
             turn = _angle(limb, site.xmat.reshape(3, 3), sample.pose.rotation)
-            position, orientation = max(position, error), max(orientation, turn)
-            note(limb.label, "m", error, config.foot if limb.is_foot else config.palm, time)
-            note(limb.label, "rad", turn, config.orientation, time)
+            limit = config.foot if limb.is_foot else config.palm
+            position = max(position, note(limb.label, "m", error, limit, time))
+            orientation = max(orientation, note(limb.label, "rad", turn, config.orientation, time))
     reasons = [
-        f"{thing} is {error:.3g} {unit} off its plan at {time:.2f} s (limit {error / ratio:.3g} {unit})"
-        for (thing, unit), (ratio, error, time) in worst.items()
-        if ratio > 1.0
+        f"{thing} is {error:.3g} {unit} off its plan at {time:.2f} s (limit {limit:.3g} {unit})"
+        for (thing, unit), (error, limit, time) in worst.items()
+        if error > limit
     ]
     return position, orientation, reasons
 

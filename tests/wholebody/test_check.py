@@ -1,0 +1,139 @@
+"""Each check passes on a good walk and fails on a broken input, with a reason that names what is wrong."""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.wholebody.conftest import world_of
+from toolkit.geometry.limb import Limb
+from toolkit.wholebody.check import CheckConfig, check
+from toolkit.wholebody.collision import CollisionConfig, first_collision
+from toolkit.wholebody.limb_paths import limb_paths
+from toolkit.wholebody.plan import whole_body
+from toolkit.wholebody.torque import contact_wrenches, inverse_dynamics
+
+
+@pytest.fixture(scope="module")
+def good(robot, flat_walk):
+    paths = limb_paths(robot, flat_walk.world, flat_walk.schedule, flat_walk.motion)
+    trajectory = whole_body(robot, flat_walk.world, flat_walk.schedule, flat_walk.motion)
+    return paths, trajectory.times, trajectory.qpos
+
+
+def reasons(robot, walk, good, *, world=None, qpos=None, paths=None):
+    kept, times, states = good
+    report = check(
+        robot, world or walk.world, paths or kept, walk.motion, times, states if qpos is None else qpos, CheckConfig()
+    )
+    return report, "; ".join(report.reasons)
+
+
+def test_good_walk_passes(robot, flat_walk, good):
+    report, text = reasons(robot, flat_walk, good)
+    assert text == "" and report.limits_respected
+
+
+@pytest.mark.parametrize(
+    ("field", "factor", "word"), [("torque_limit", 0.02, "N m"), ("velocity_limit", 0.02, "rad/s")]
+)
+def test_shrunk_limits_fail(robot, flat_walk, good, field, factor, word):
+    weak = dataclasses.replace(robot, **{field: factor * getattr(robot, field)})
+    report, text = reasons(weak, flat_walk, good)
+    assert not report.limits_respected
+    assert any(f"joint {name} " in text for name in robot.joint_names) and word in text and "limit" in text
+
+
+def test_a_narrow_joint_range_fails(robot, flat_walk, good):
+    joint = int(np.argmax(np.ptp(good[2][:, 7:], axis=0)))
+    upper = robot.upper.copy()
+    upper[joint] = good[2][:, 7 + joint].max() - 0.01
+    report, text = reasons(dataclasses.replace(robot, upper=upper), flat_walk, good)
+    assert not report.limits_respected and f"joint {robot.joint_names[joint]} is at" in text
+
+
+@pytest.mark.parametrize(("shift", "expected"), [((0.03, 0, 0), "the CoM"), ((0, 0, 0.006), "left_foot")])
+def test_a_shifted_body_fails(robot, flat_walk, good, shift, expected):
+    qpos = good[2].copy()
+    qpos[:, :3] += shift
+    report, text = reasons(robot, flat_walk, good, qpos=qpos)
+    assert f"{expected} is" in text and "off its plan" in text
+    assert report.max_position_error == pytest.approx(np.linalg.norm(shift), rel=0.1)
+
+
+def test_a_tilted_sole_fails(robot, flat_walk, good):
+    model = robot.mujoco_model
+    last = model.body_jntadr[model.body(robot.limbs[Limb.LEFT_FOOT].body).id]
+    qpos = good[2].copy()
+    qpos[20, model.jnt_qposadr[last]] += 0.05  # while both feet stand
+    report, text = reasons(robot, flat_walk, good, qpos=qpos)
+    assert "left_foot is 0.05 rad off its plan" in text
+    assert report.max_orientation_error == pytest.approx(0.05, rel=0.05)
+
+
+def test_a_wall_in_the_way_collides(robot, flat_walk, good):
+    world = world_of(f'<geom name="post" type="box" size="0.05 2 2" pos="{0.5 * robot.com_height} 0 2"/>')
+    _, text = reasons(robot, flat_walk, good, world=world)
+    assert "world/post" in text and "collide at" in text
+
+
+def test_a_low_ceiling_collides(robot, flat_walk, good):
+    model, data = robot.mujoco_model, mujoco.MjData(robot.mujoco_model)
+    data.qpos[:] = good[2][0]
+    mujoco.mj_forward(model, data)
+    top = data.geom_xpos[model.geom_contype != 0, 2].max()
+    world = world_of(f'<geom name="ceiling" type="box" size="3 3 0.05" pos="0 0 {top + 0.03}"/>')
+    _, text = reasons(robot, flat_walk, good, world=world)
+    assert "world/ceiling" in text
+
+
+def test_soles_may_rest_but_not_sink(robot, flat_walk, good):
+    _, times, states = good
+    config = CollisionConfig()
+    for depth, expected in ((0.003, ""), (0.006, "world/floor")):
+        qpos = states.copy()
+        qpos[:, 2] -= depth
+        text = first_collision(robot, flat_walk.world, times, qpos, config)
+        assert (text == "") if expected == "" else (expected in text)
+
+
+def test_folding_the_body_into_itself_collides(robot, flat_walk, good):
+    """Some posture with all joints at random collides; none is missed because the robot was at home before."""
+    _, times, states = good
+    rng, qpos = np.random.default_rng(0), states.copy()
+    qpos[:, 2] += 2.0  # off the ground
+    qpos[:, 7:] = rng.uniform(robot.lower, robot.upper, size=qpos[:, 7:].shape)
+    assert "collide at" in first_collision(robot, flat_walk.world, times, qpos, CollisionConfig())
+
+
+def test_not_a_number_fails(robot, flat_walk, good):
+    qpos = good[2].copy()
+    qpos[20, 9] = np.nan
+    report, text = reasons(robot, flat_walk, good, qpos=qpos)
+    assert text and not report.limits_respected and report.max_position_error == np.inf
+
+
+def test_a_blocked_swing_is_reported(robot, flat_walk):
+    world = world_of('<geom name="slab" type="box" size="0.01 1 1" pos="0.17 0 1"/>')
+    trajectory = whole_body(robot, world, flat_walk.schedule, flat_walk.motion)
+    assert not trajectory.feasible
+    assert "finds no way clear of the world in transition 0" in trajectory.reason
+
+
+def test_planned_forces_carry_the_weight(robot, flat_walk, good):
+    """No force is left at the base where the posture follows the planned CoM."""
+    _, times, states = good
+    _, residual = inverse_dynamics(robot, flat_walk.motion, times, states)
+    weight = robot.mass * 9.81
+    middle = len(times) - 10  # within the last rest
+    np.testing.assert_allclose(residual[middle, :3], 0.0, atol=1e-3 * weight)
+    wrench = contact_wrenches(flat_walk.motion, times, times[1])
+    np.testing.assert_allclose(wrench[middle, :, 2].sum(), weight, atol=1e-3 * weight)
+
+
+def test_wrenches_are_averaged_over_a_knot(flat_walk):
+    """Exactly at a knot half of both neighbours' wrenches counts."""
+    knots = flat_walk.motion.problem.times
+    force = contact_wrenches(flat_walk.motion, knots[1:2], 1e-3)[0, :, :3]
+    np.testing.assert_allclose(force, 0.5 * (flat_walk.motion.force[0] + flat_walk.motion.force[1]))
