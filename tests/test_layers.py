@@ -15,6 +15,7 @@ LAYERS = [
     "centroidal",
     "prediction",
     "search",
+    "learning",
     "wholebody",
     "simulation",
     "report",
@@ -56,7 +57,7 @@ def test_a_module_imports_only_its_own_layer_and_those_above(path):
         if name.split(".")[0] == "rerun":
             assert here.startswith("toolkit.report"), f"{here} imports rerun; only report may"
         if name.split(".")[0] == "torch":
-            assert here.startswith("toolkit.prediction") or here == "toolkit.train"
+            assert here.startswith("toolkit.learning") or here == "toolkit.train"
 
 
 def test_no_import_cycle():

@@ -16,11 +16,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from toolkit import cli
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError, InputError
-from toolkit.prediction.collect import CollectConfig, collect
-from toolkit.prediction.dataset import read_dataset
-from toolkit.prediction.evaluate import Score, balanced, score
+from toolkit.learning.collect import CollectConfig, collect
+from toolkit.learning.dataset import read_dataset
+from toolkit.learning.evaluate import Score, balanced, score
 from toolkit.prediction.networks import load_networks
-from toolkit.prediction.query import query_seconds
+from toolkit.learning.query import query_seconds
 from toolkit.report.console import make_console
 from toolkit.report.scores import score_table
 from toolkit.robot.loader import load_robot
@@ -101,7 +101,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
     try:
         import torch
 
-        from toolkit.prediction.fit import FitConfig, fit_category
+        from toolkit.learning.fit import FitConfig, fit_category
     except ImportError:
         raise InputError("fit needs torch: pip install -e '.[train]'") from None
     from toolkit.report.curves import draw_curves

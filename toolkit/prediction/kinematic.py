@@ -49,7 +49,12 @@ class KinematicEvaluator:
     Args:
         robot: the robot.
         config: settings.
+
+    Attributes:
+        rejection: what it means where this evaluator finds a transition infeasible, for messages.
     """
+
+    rejection = "ground too steep for a foot to rest on with its friction"
 
     def __init__(self, robot: RobotModel, config: KinematicConfig | None = None):
         self._robot, self._config = robot, config or KinematicConfig()

@@ -15,7 +15,7 @@ from toolkit.report.colors import EXECUTED, OPTIMISED, unit
 
 
 class CurveLike(Protocol):
-    """Losses per epoch, and the epoch that was kept; see `toolkit.prediction.fit.Curve` (which needs torch)."""
+    """Losses per epoch, and the epoch that was kept; see `toolkit.learning.fit.Curve` (which needs torch)."""
 
     @property
     def training(self) -> np.ndarray:

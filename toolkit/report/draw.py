@@ -16,6 +16,7 @@ from toolkit.report.meshes import TriangleMesh, geom_rgba, mesh_of_geom, name_of
 from toolkit.world.surface import Surface
 from toolkit.world.world import Goal
 
+ROBOT_ALPHA = 140  # of 255, so that the CoM and the forces inside the robot are seen
 SCENE_SHADE = 0.8  # darkens the scene a little, so that what is drawn on a bright floor stands out
 
 SURFACE_OFFSET = 0.002  # m along the normal, so that a surface does not flicker with the geom it lies on
@@ -78,6 +79,7 @@ def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "
             triangle_indices=np.concatenate([m.triangles + o for m, o in zip(meshes, offsets, strict=True)]),
             vertex_normals=np.concatenate([mesh.normals for mesh in meshes]).astype(np.float32),
             vertex_colors=(colors * 255).astype(np.uint8),
+            albedo_factor=[255, 255, 255, ROBOT_ALPHA],
         )
         stream.log(entities[int(body)], shape, static=True)
     return entities
@@ -142,12 +144,13 @@ def draw_patches(
     outline = rr.LineStrips3D(strips, radii=0.004, colors=colors, labels=labels, show_labels=labels is not None)
     stream.log(path, outline, static=static)
     fill = _fill(corners)
-    shades = np.repeat([[*color, alpha] for color in colors], 4, axis=0).reshape(-1, 4).astype(np.uint8)
+    shades = np.repeat([[*color, 255] for color in colors], 4, axis=0).reshape(-1, 4).astype(np.uint8)
     mesh = rr.Mesh3D(
         vertex_positions=fill.vertices.astype(np.float32),
         triangle_indices=fill.triangles,
         vertex_normals=fill.normals.astype(np.float32),
         vertex_colors=shades,
+        albedo_factor=[255, 255, 255, alpha],
     )
     stream.log(f"{path}/fill", mesh, static=static)
 

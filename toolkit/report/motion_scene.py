@@ -79,7 +79,7 @@ def draw_com(
         return
     points = path if moving is None else moving
     entity = f"world/com/{name}/now"
-    stream.log(entity, rr.Points3D.from_fields(radii=0.025, colors=color), static=True)
+    stream.log(entity, rr.Points3D.from_fields(radii=0.03, colors=color), static=True)
     stream.send_columns(entity, at(times), rr.Points3D.columns(positions=points))
 
 

@@ -95,8 +95,8 @@ def write_recording(
             rows = frames(execution.tick_times, rate)
             times, pose = execution.tick_times[rows], execution.limb_pose[rows]
             draw_made_contacts(stream, execution, robot.half_sizes)
-            draw_forces(stream, "planned", times, execution.wrench_planned[rows], pose, 0.006)
-            draw_forces(stream, "measured", times, execution.wrench[rows], pose, 0.014)
+            draw_forces(stream, "planned", times, execution.wrench_planned[rows], pose, 0.008)
+            draw_forces(stream, "measured", times, execution.wrench[rows], pose, 0.018)
             plot_execution(stream, execution, trajectory)
             for time, text in touchdown_entries(execution):
                 stream.set_time(TIMELINE, duration=time)

@@ -8,7 +8,7 @@ from rich import box
 from rich.table import Table
 
 from toolkit.contacts.category import Category
-from toolkit.prediction.evaluate import Score
+from toolkit.learning.evaluate import Score
 
 
 def score_table(scores: Mapping[Category, Score]) -> Table:

@@ -305,6 +305,7 @@ def training(
     friction: float = 0.5,
     shift: float = 1.0,
     swing: float = 1.0,
+    walls: int = 1,
 ) -> str:
     """Terrain to collect transitions on: 3 x 3 tilted tiles, the start on the middle one, and a wall beside the robot.
 
@@ -316,9 +317,10 @@ def training(
         friction: sliding coefficient.
         shift: s.
         swing: s.
+        walls: 1 for a wall on one side, 2 for one on each.
 
     Returns:
-        MJCF text. The wall's foot is 0.4 to 0.9 m from the start, on either side, up to 45 degrees forwards or back.
+        MJCF text. A wall's foot is 0.4 to 0.9 m from the start, on either side, up to 45 degrees forwards or back.
     """
     world = WorldText(
         "training",
@@ -334,14 +336,16 @@ def training(
             turn = Rotation.from_euler("xy", rng.uniform(-tilt, tilt, 2), degrees=True)
             top = ((row - 1) * tile, (column - 1) * tile, 0.0 if middle else rng.uniform(-rise, rise))
             world.tile(f"tile_{row}_{column}", (tile, tile), top, rotation=turn)
-    side = rng.choice([-1.0, 1.0])
-    bearing = side * np.radians(90.0 + rng.uniform(-45.0, 45.0))
-    distance, lean = rng.uniform(0.4, 0.9), rng.uniform(-tilt, tilt)
-    # z of the panel looks back at the robot; it then leans about its level axis.
-    upright = Rotation.from_euler("zy", [bearing, -np.pi / 2])
-    turn = Rotation.from_euler("zyz", [bearing, np.radians(lean), -bearing]) * upright
-    centre = distance * np.array([np.cos(bearing), np.sin(bearing), 0.0]) + [0.0, 0.0, 1.0]
-    world.tile("wall", (2.0, 2.0), centre, material="panel", rotation=turn)
+    first = rng.choice([-1.0, 1.0])
+    for side in (first, -first)[:walls]:
+        bearing = side * np.radians(90.0 + rng.uniform(-45.0, 45.0))
+        distance, lean = rng.uniform(0.4, 0.9), rng.uniform(-tilt, tilt)
+        # z of the panel looks back at the robot; it then leans about its level axis.
+        upright = Rotation.from_euler("zy", [bearing, -np.pi / 2])
+        turn = Rotation.from_euler("zyz", [bearing, np.radians(lean), -bearing]) * upright
+        centre = distance * np.array([np.cos(bearing), np.sin(bearing), 0.0]) + [0.0, 0.0, 1.0]
+        name = "wall" if side == first else "other_wall"
+        world.tile(name, (2.0, 2.0), centre, material="panel", rotation=turn)
     return world.render()
 
 

@@ -6,7 +6,7 @@ from safetensors.numpy import save_file
 
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError, NetworkError
-from toolkit.prediction.dataset import (
+from toolkit.learning.dataset import (
     Manifest,
     Samples,
     read_dataset,
@@ -14,7 +14,7 @@ from toolkit.prediction.dataset import (
     shard_path,
     write_shard,
 )
-from toolkit.prediction.evaluate import balanced, score
+from toolkit.learning.evaluate import balanced, score
 from toolkit.prediction.features import feature_size
 from toolkit.prediction.network import HIDDEN, SCHEMA, load_network, network_path
 from toolkit.prediction.networks import NetworkEvaluator

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.prediction.dataset import Samples
+from toolkit.learning.dataset import Samples
 from toolkit.prediction.network import TransitionNetwork
 
 

@@ -14,7 +14,7 @@ from torch import nn
 
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
-from toolkit.prediction.dataset import Samples
+from toolkit.learning.dataset import Samples
 from toolkit.prediction.features import TARGETS
 from toolkit.prediction.network import HIDDEN, LAYERS, SCHEMA, network_path
 

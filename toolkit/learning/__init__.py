@@ -1,0 +1,1 @@
+"""Learning what the centroidal optimiser says: data sets, collection, training, evaluation."""
