@@ -17,7 +17,7 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
-from toolkit.search.ana_star import AnaStar, AnaStarConfig, Edge, Path, Progress
+from toolkit.search.ana_star import AnaStar, AnaStarConfig, AnaStarResult, Edge, Path, Progress
 from toolkit.search.contact_table import ContactTable
 from toolkit.search.heuristic import Distance, EuclideanDistance, GridConfig
 from toolkit.search.moves import MoveConfig, MoveGenerator
@@ -180,8 +180,12 @@ class ContactPlanner:
             expansions=result.expansions,
             exhausted=result.stopped_by == "exhausted",
             expanded=np.column_stack([expanded[0][:, :2], expanded[1]]),
-            reason="" if result.paths else _reason(result.stopped_by, result.seconds, result.expansions, problem),
+            reason="" if result.paths else self._reason(result, problem),
         )
+
+    def _reason(self, result: AnaStarResult, problem: ContactProblem) -> str:
+        dynamics = getattr(self._evaluator, "rejection", screen.REASONS[screen.DYNAMICS])
+        return _reason(result.stopped_by, result.seconds, result.expansions, problem.rejected, dynamics)
 
     def _model(self, wide: bool) -> TransitionModel:
         steps = steps_60() if self.config.steps == 60 else steps_38()
@@ -258,20 +262,22 @@ def _solution(problem: ContactProblem, path: Path) -> Solution:
     )
 
 
-def _reason(stopped_by: str, seconds: float, expansions: int, problem: ContactProblem) -> str:
-    """One line on why there is no solution and what rejected most candidates."""
+def _reason(stopped_by: str, seconds: float, expansions: int, rejected: np.ndarray, dynamics: str) -> str:
+    """One line on why there is no solution and what rejected most candidates, the choice of palms apart."""
     how = {
         "exhausted": f"every stance that can be reached was looked at ({expansions})",
         "time": f"the time limit of {seconds:.3g} s was reached after {expansions} expansions; a longer one may help",
         "expansions": f"the limit of {expansions} expansions was reached; a higher one may help",
         "memory": f"the limit on memory was reached after {expansions} expansions",
     }[stopped_by]
-    rejected = np.where(np.isin(np.arange(len(screen.REASONS)), screen.PALM_REASONS), 0, problem.rejected)
+    rejected = np.where(np.isin(np.arange(len(screen.REASONS)), screen.PALM_REASONS), 0, rejected)
     total = int(rejected.sum())
     if total == 0:
         return f"no contact sequence found: {how}"
     order = np.argsort(-rejected, kind="stable")[:4]
     shares = ", ".join(
-        f"{screen.REASONS[code]} {100 * rejected[code] / total:.0f} %" for code in order if rejected[code] > 0
+        f"{dynamics if code == screen.DYNAMICS else screen.REASONS[code]} {100 * rejected[code] / total:.0f} %"
+        for code in order
+        if rejected[code] > 0
     )
     return f"no contact sequence found: {how}; candidates were rejected for: {shares}"

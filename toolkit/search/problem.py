@@ -37,6 +37,8 @@ class CostConfig:
         stagger: per m that one foot is ahead of the other in the final stance.
         swing_speed: m/s; a foot may not have to fly faster on average.
         com_drops: m; the predicted CoM may be lower by any of these for the legs to reach.
+        lift_off: parts of the shift time at whose CoM the legs may reach at lift-off, since when the CoM moves is the
+            optimiser's choice.
         arm_slack: m; an arm may reach further by this much, since the torso can lean.
     """
 
@@ -46,6 +48,7 @@ class CostConfig:
     stagger: float = 5.0
     swing_speed: float = 3.0
     com_drops: tuple[float, ...] = (0.0, 0.03, 0.06, 0.1)
+    lift_off: tuple[float, ...] = (1.0, 0.5)
     arm_slack: float = 0.03
 
 
@@ -278,10 +281,12 @@ class ContactProblem:
         # Lift-off: the old stance under the CoM at the end of the shift, on the cubic between the known ends.
         shift = np.array([item.shift for item in self._timings])[timing]
         total = shift + np.array([item.swing for item in self._timings])[timing]
-        lift = _cubic(com, velocity, end, end_velocity, shift / total, total)
         feet = row[CONTACTS]
-        yaw = np.full(n, self.feet(feet[None])[1][0])
-        broken = self._legs(lift, yaw, np.full(n, feet[0]), np.full(n, feet[1]))
+        yaw, left, right = np.full(n, self.feet(feet[None])[1][0]), np.full(n, feet[0]), np.full(n, feet[1])
+        broken = np.full(n, 0)
+        for lag in self._config.lift_off:
+            lift = _cubic(com, velocity, end, end_velocity, lag * shift / total, total)
+            broken = np.where(broken >= 0, self._legs(lift, yaw, left, right), -1)
         codes[broken >= 0] = screen.LEG + broken[broken >= 0]
         for palm in self._palms:
             held = np.flatnonzero(after[:, palm] >= 0)

@@ -35,7 +35,9 @@ class TerrainDistance:
         first, last = table.edge_start[:-1], table.edge_start[1:]
         owner = np.repeat(np.arange(len(first)), last - first)
         points = table.origin[owner] + np.einsum("nij,nj->ni", table.rotation[owner][:, :, :2], table.edges[:, :2])
-        self._ground = points[table.foot[owner]]
+        lower = np.minimum.reduceat(points, first)[table.foot]
+        upper = np.maximum.reduceat(points, first)[table.foot]
+        self._ground = lower, upper  # corners of the boxes around foot surfaces
         self._bounds = [self._around(detour) for detour in _DETOURS]
         self.occupancy = self._occupy(self._bounds[0])
         self._detour = 0
@@ -43,17 +45,18 @@ class TerrainDistance:
     def _around(self, detour: float) -> tuple[float, float, float, float]:
         """Bounds in XY around start and goal, no larger than the ground."""
         ends = np.stack([self._world.start.position[:2], self._world.goal.position[:2]])
-        low = np.maximum(ends.min(0) - detour, np.minimum(self._ground[:, :2].min(0), ends.min(0)) - 0.3)
-        high = np.minimum(ends.max(0) + detour, np.maximum(self._ground[:, :2].max(0), ends.max(0)) + 0.3)
+        lower, upper = self._ground
+        low = np.maximum(ends.min(0) - detour, np.minimum(lower[:, :2].min(0), ends.min(0)) - 0.3)
+        high = np.minimum(ends.max(0) + detour, np.maximum(upper[:, :2].max(0), ends.max(0)) + 0.3)
         return (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
 
     def _occupy(self, bounds: tuple[float, float, float, float]) -> Occupancy:
         low, high = np.array(bounds[:2]) - 0.5, np.array(bounds[2:]) + 0.5
-        inside = (self._ground[:, :2] >= low).all(1) & (self._ground[:, :2] <= high).all(1)
-        heights = self._ground[inside, 2] if inside.any() else np.array([self._world.start.position[2]])
-        lower = np.array([*low, heights.min() + self.box.bottom - 0.3])
-        upper = np.array([*high, heights.max() + self.box.top + 0.3])
-        return Occupancy.of(self._world.mujoco_model, lower, upper)
+        lower, upper = self._ground
+        near = (upper[:, :2] >= low).all(1) & (lower[:, :2] <= high).all(1)
+        heights = np.append(np.concatenate([lower[near, 2], upper[near, 2]]), self._world.start.position[2])
+        bottom, top = heights.min() + self.box.bottom - 0.3, heights.max() + self.box.top + 0.3
+        return Occupancy.of(self._world.mujoco_model, np.array([*low, bottom]), np.array([*high, top]))
 
     def distance(self, start: Pose, stride: float) -> GridDistance | None:
         """Distance to the goal with steps of at most `stride` m; None where no way leads there from `start`."""

@@ -1,0 +1,234 @@
+import numpy as np
+import pytest
+
+from tests.search.worlds import FLOOR, box, corridor, make_world
+from toolkit.contacts.category import Category, category_of
+from toolkit.errors import InputError, PlanningError
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
+from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.planner import ContactPlanner, PlannerConfig
+from toolkit.search.problem import CostConfig
+from toolkit.world.timing import Timing
+
+QUICK = PlannerConfig(search=AnaStarConfig(max_expansions=150))
+
+
+def plan(robot, world, config=QUICK, seed=0, kinematic=None, limit=20.0):
+    planner = ContactPlanner(robot, world, KinematicEvaluator(robot, kinematic), config)
+    return planner.search(np.random.default_rng(seed), limit)
+
+
+def check(robot, world, result):
+    """What must hold for every solution, recomputed from the sequence alone."""
+    assert result.solutions and result.reason == ""
+    half = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
+    for solution in result.solutions:
+        stances = solution.sequence.stances
+        moved = [transition.limb for transition in solution.sequence.transitions]
+        assert all(a != b for a, b in zip(moved, moved[1:], strict=False))
+        final = stances[-1].mean_feet.position
+        assert np.linalg.norm(final[:2] - world.goal.position[:2]) <= world.goal.radius + 1e-9
+        assert solution.com.shape == solution.com_velocity.shape == (len(stances), 3)
+        cost = 0.0
+        for before, after, objective in zip(stances[:-1], stances[1:], solution.objective, strict=True):
+            d = np.linalg.norm((after.mean_feet.position - before.mean_feet.position)[:2])
+            cost += d + 3.0 + 0.1 * objective
+        heading = stances[-1].mean_feet.rotation[:, 0]
+        left, right = (stances[-1][limb].pose.position for limb in FEET)
+        assert solution.cost == pytest.approx(cost + 5.0 * abs((left - right) @ heading), abs=1e-6)
+        for stance in stances:
+            for contact in stance.contacts:
+                surface = world.surfaces[contact.surface]
+                corners = contact.pose @ np.column_stack([half * robot.half_sizes[contact.limb], np.zeros(4)])
+                local = surface.pose.inverse() @ corners
+                np.testing.assert_allclose(local[:, 2], 0.0, atol=1e-6)
+                np.testing.assert_allclose(contact.pose.normal, surface.normal, atol=1e-9)
+                assert all(inside(point, surface.boundary) for point in local[:, :2])
+    costs = [solution.cost for solution in result.solutions]
+    assert costs == sorted(set(costs), reverse=True)
+
+
+def inside(point, rings):
+    """Even-odd rule over all rings."""
+    odd = False
+    for ring in rings:
+        for (ax, ay), (bx, by) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+            if (ay > point[1]) != (by > point[1]):
+                odd ^= point[0] < ax + (point[1] - ay) / (by - ay) * (bx - ax)
+    return odd
+
+
+def test_walks_on_flat_ground(robot):
+    world = make_world(FLOOR)
+    result = plan(robot, world)
+    check(robot, world, result)
+    last = result.solutions[-1].sequence
+    limbs = [transition.limb for transition in last.transitions]
+    assert set(limbs) == set(FEET) and len(limbs) <= 8
+    assert all(abs(stance[limb].pose.yaw) < 0.6 for stance in last.stances for limb in FEET)
+
+
+def test_start_stance_is_the_home_stance(robot):
+    world = make_world(FLOOR, start=(0.3, -0.2, 0.1), goal=(1.5, 0, 0))
+    stance = ContactPlanner(robot, world, KinematicEvaluator(robot)).start_stance()
+    np.testing.assert_allclose(stance.mean_feet.position[1:], [-0.2, 0], atol=1e-6)
+    width = stance[Limb.LEFT_FOOT].pose.position[1] - stance[Limb.RIGHT_FOOT].pose.position[1]
+    assert 0.1 < width < 0.4
+
+
+def test_gap_needs_wide_steps(robot):
+    gap = [box([0, 0, -0.05], [0.5, 0.6, 0.05]), box([1.7, 0, -0.05], [0.7, 0.6, 0.05])]  # 0.5 m wide
+    world = make_world(*gap, goal=(1.7, 0, 0))
+    check(robot, world, plan(robot, world, PlannerConfig(search=AnaStarConfig(max_expansions=600))))
+    with pytest.raises(PlanningError, match=r"made\.xml: nothing leads to the goal at \(1\.7, 0\): .* gap wider than"):
+        plan(robot, world, PlannerConfig(wide_steps="off"))
+
+
+@pytest.mark.parametrize(
+    ("geoms", "goal", "message"),
+    [
+        ([box([0, 0, -0.05], [0.5, 0.5, 0.05]), box([2.5, 0, -0.05], [0.5, 0.5, 0.05])], (2.5, 0), "gap wider"),
+        ([box([0, 0, -0.05], [1, 1, 0.05]), box([2, 0, 0.45], [1, 1, 0.05])], (2, 0), "a rise higher"),
+        ([FLOOR, box([1.0, 0, 1.3], [0.3, 30, 0.2])], (2, 0), "no room for the body"),
+        ([FLOOR, box([1.0, 0, 1.0], [0.05, 30, 1.0])], (2, 0), "no room for the body"),
+        ([box([0, 0, -0.05], [1, 1, 0.05])], (2, 0), "no surface within its radius"),
+        ([FLOOR, box([1.5, 0, 0.5], [0.5, 0.5, 0.5])], (1.5, 0), "a rise higher"),
+    ],
+)
+def test_unreachable_goals_say_why(robot, geoms, goal, message):
+    world = make_world(*geoms, goal=(*goal, 0))
+    with pytest.raises(PlanningError, match=f"nothing leads to the goal.*{message}"):
+        plan(robot, world)
+
+
+def test_start_without_room(robot):
+    tiny = make_world(box([0, 0, -0.05], [0.12, 0.09, 0.05]), box([1, 0, -0.05], [0.5, 0.5, 0.05]), goal=(1, 0, 0))
+    with pytest.raises(PlanningError, match="cannot stand at the start|no room for the (left|right) foot"):
+        plan(robot, tiny)
+    low = make_world(FLOOR, box([0, 0, 1.3], [0.5, 0.5, 0.1]))
+    with pytest.raises(PlanningError, match=r"cannot stand at the start \(body hits the world\)"):
+        plan(robot, low)
+
+
+def test_a_way_around_a_wall(robot):
+    wall = box([0.8, -1.0, 1.0], [0.05, 2.0, 1.0])  # free for y > 1
+    world = make_world(FLOOR, wall, goal=(1.6, 0, 0))
+    result = plan(robot, world, PlannerConfig(search=AnaStarConfig(max_expansions=400)))
+    check(robot, world, result)
+    assert max(stance.mean_feet.position[1] for stance in result.solutions[-1].sequence.stances) > 1.1
+
+
+def test_reason_of_failure_names_what_rejected_most(robot):
+    steep = make_world(
+        box([0, 0, -0.05], [0.5, 0.5, 0.05]),
+        *[box([x, 0, -0.05], [0.15, 0.5, 0.05], [0, 25, 0], friction=0.3) for x in (0.7, 1.0, 1.3)],
+        box([2.0, 0, -0.05], [0.5, 0.5, 0.05]),
+        goal=(2.0, 0, 0),
+    )
+    config = PlannerConfig(wide_steps="off", search=AnaStarConfig(max_expansions=200))
+    result = plan(robot, steep, config)
+    assert not result.solutions
+    assert "limit of 200 expansions" in result.reason and "too steep" in result.reason and "\n" not in result.reason
+
+
+def test_search_exhausted(robot):
+    """A floor barely larger than the stance: few states, the goal out of reach of any."""
+    world = make_world(box([0, 0, -0.05], [0.14, 0.19, 0.05]), goal=(0.3, 0, 0), radius=0.1)
+    config = PlannerConfig(heuristic="euclidean", wide_steps="off")
+    result = plan(robot, world, config)
+    assert result.exhausted and "every stance that can be reached" in result.reason
+
+
+def test_same_seed_same_plan(robot):
+    world = corridor(3)
+
+    def costs(seed):
+        result = plan(robot, world, seed=seed)
+        return [solution.cost for solution in result.solutions], result.expanded
+
+    first, second, other = costs(5), costs(5), costs(6)
+    assert first[0] == second[0]
+    np.testing.assert_array_equal(first[1], second[1])
+    assert len(first[1]) != len(other[1]) or not np.array_equal(first[1], other[1])
+
+
+def test_time_limit(robot):
+    world = corridor(1)
+    result = plan(robot, world, PlannerConfig(), limit=1.0)
+    assert 0.0 < result.seconds <= 1.05
+    assert all(solution.seconds <= result.seconds for solution in result.solutions)
+
+
+class Recorder(KinematicEvaluator):
+    """Notes the category of every transition that it is asked about."""
+
+    def evaluate(self, stance, com, com_velocity, transitions):
+        self.seen = getattr(self, "seen", set()) | {category_of(stance, item) for item in transitions}
+        return super().evaluate(stance, com, com_velocity, transitions)
+
+
+def test_all_ten_categories_occur_and_palms_are_chosen_where_they_help(robot):
+    world = corridor(2)
+    evaluator = Recorder(robot, KinematicConfig(palm_relief=0.3, stride=300.0, spread=50.0))
+    config = PlannerConfig(search=AnaStarConfig(epsilon=0.3, max_expansions=400))
+    result = ContactPlanner(robot, world, evaluator, config).search(np.random.default_rng(0), 20.0)
+    check(robot, world, result)
+    assert evaluator.seen == set(Category)
+    assert any(stance.palms for stance in result.solutions[-1].sequence.stances)
+    for stance in result.solutions[-1].sequence.stances:
+        feet = stance.mean_feet
+        for palm in stance.palms:
+            local = feet.inverse() @ stance[palm].pose.position
+            assert local[1] * (1 if palm.is_left else -1) > 0.1
+    feet_only = PlannerConfig(palms=False, search=AnaStarConfig(max_expansions=200))
+    without = ContactPlanner(robot, world, evaluator, feet_only).search(np.random.default_rng(0), 20.0)
+    assert not any(stance.palms for solution in without.solutions for stance in solution.sequence.stances)
+
+
+def test_timing_is_chosen(robot):
+    class HurriesAreHard(KinematicEvaluator):
+        def evaluate(self, stance, com, com_velocity, transitions):
+            batch = super().evaluate(stance, com, com_velocity, transitions)
+            fast = np.array([item.timing.swing < 0.6 for item in transitions])
+            lands = np.array([item.contact is not None and item.contact.pose.position[0] > 0.8 for item in transitions])
+            return type(batch)(batch.feasible & ~(fast & lands), batch.objective, batch.com, batch.com_velocity)
+
+    timings = (Timing(0.3, 0.5), Timing(1.0, 1.0))
+    config = PlannerConfig(timings=timings, cost=CostConfig(time=5.0), search=AnaStarConfig(max_expansions=150))
+    planner = ContactPlanner(robot, make_world(FLOOR), HurriesAreHard(robot), config)
+    last = planner.search(np.random.default_rng(0), 20.0).solutions[-1].sequence
+    used = [transition.timing for transition in last.transitions]
+    assert used[0] == timings[0] and used[-1] == timings[1]
+
+
+def test_goal_evaluator_has_the_last_word(robot):
+    class Never(KinematicEvaluator):
+        def evaluate(self, stance, com, com_velocity, transitions):
+            batch = super().evaluate(stance, com, com_velocity, transitions)
+            return type(batch)(batch.feasible & False, batch.objective, batch.com, batch.com_velocity)
+
+    class Costly(KinematicEvaluator):
+        def evaluate(self, stance, com, com_velocity, transitions):
+            batch = super().evaluate(stance, com, com_velocity, transitions)
+            return type(batch)(batch.feasible, batch.objective + 500.0, batch.com, batch.com_velocity)
+
+    world, base = make_world(FLOOR, goal=(0.6, 0, 0)), KinematicEvaluator(robot)
+    plain = ContactPlanner(robot, world, base, QUICK).search(np.random.default_rng(0), 9.0)
+    never = ContactPlanner(robot, world, base, QUICK, Never(robot)).search(np.random.default_rng(0), 9.0)
+    costly = ContactPlanner(robot, world, base, QUICK, Costly(robot)).search(np.random.default_rng(0), 9.0)
+    assert plain.solutions and not never.solutions
+    assert costly.solutions[-1].objective[-1] > 500.0
+    assert costly.solutions[-1].cost >= 50.0
+
+
+def test_bad_settings():
+    for setting in ({"steps": 50}, {"wide_steps": "maybe"}, {"heuristic": "none"}):
+        name = next(iter(setting))
+        with pytest.raises(InputError, match=name):
+            PlannerConfig(**setting)
+
+
+def test_a_start_at_the_goal_needs_no_transition(robot):
+    result = plan(robot, make_world(FLOOR, goal=(0.05, 0, 0)))
+    assert result.solutions[0].sequence.transitions == () and result.solutions[0].cost == 0.0
