@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 import trimesh
+from shapely.geometry import Polygon
 
 from toolkit.world.convex import convex_partition
 from toolkit.world.facets import Facet, find_facets
@@ -17,6 +18,7 @@ FACET_DISTANCE = 1e-3  # m; and corners within this of its plane
 _DEPTH = 0.06  # m; thickness of a part where the mesh is thick enough
 _LEAST_DEPTH = 2e-3  # m; and where it is not
 _TAPER = 0.7  # size of a part's back relative to its front: sharp edges of the mesh stay sharp
+_LEAST_WIDTH = 2e-4  # m; narrower slivers are no parts
 _MOST_PARTS = 4000
 
 
@@ -61,13 +63,21 @@ def decompose_mesh(vertices: np.ndarray, triangles: np.ndarray) -> Decomposition
     for component, whole in zip(components, convex, strict=True):
         found = find_facets(component, angle=FACET_ANGLE, distance=FACET_DISTANCE)
         facets += found
-        parts += [np.asarray(component.vertices)] if whole else _frusta(component, found)
-    if len(parts) > _MOST_PARTS:
-        raise ValueError(
-            f"it is not convex and has {len(parts)} flat parts, more than {_MOST_PARTS}; simplify it or "
-            "use a height field"
-        )
+        if whole:
+            parts.append(np.asarray(component.vertices))
+        else:
+            fronts = _fronts(found)
+            _check_count(len(parts) + len(fronts))
+            parts += _frusta(component, fronts)
+    _check_count(len(parts))
     return Decomposition(facets, parts)
+
+
+def _check_count(parts: int) -> None:
+    if parts > _MOST_PARTS:
+        raise ValueError(
+            f"it is not convex and has {parts} flat parts, more than {_MOST_PARTS}; simplify it or use a height field"
+        )
 
 
 def _components(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
@@ -93,21 +103,28 @@ def _is_convex(mesh: trimesh.Trimesh) -> bool:
     return mesh.volume > (1.0 - 1e-4) * mesh.convex_hull.volume
 
 
-def _frusta(mesh: trimesh.Trimesh, facets: list[Facet]) -> list[np.ndarray]:
-    """Frusta behind the facets of a mesh, (2 k, 3) vertices each."""
+def _fronts(facets: list[Facet]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Convex pieces of facets as (corners (k, 3), normal (3,)); slivers, which touch nothing, are left out."""
     fronts = []
     for facet in facets:
-        if facet.polygon.area < 1e-8:
-            continue
         shape = shapely.remove_repeated_points(facet.polygon, 1e-6)
-        for ring in convex_partition(shape):
-            fronts.append((facet, facet.frame @ np.column_stack([ring, np.zeros(len(ring))])))
-    centres = np.array([front.mean(axis=0) for _, front in fronts])
-    normals = np.array([facet.frame.normal for facet, _ in fronts])
+        for ring in convex_partition(shape) if shape.area > 1e-8 else []:
+            piece = Polygon(ring)
+            if 2 * piece.area > _LEAST_WIDTH * piece.length:
+                fronts.append((facet.frame @ np.column_stack([ring, np.zeros(len(ring))]), facet.frame.normal))
+    return fronts
+
+
+def _frusta(mesh: trimesh.Trimesh, fronts: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    """Frusta that reach from convex fronts into the mesh, (2 k, 3) vertices each."""
+    if not fronts:
+        return []
+    centres = np.array([front.mean(axis=0) for front, _ in fronts])
+    normals = np.array([normal for _, normal in fronts])
     depth = np.clip(0.5 * _thickness(mesh, centres, normals), _LEAST_DEPTH, _DEPTH)
     return [
         np.concatenate([front, centre + _TAPER * (front - centre) - deep * normal])
-        for (_, front), centre, normal, deep in zip(fronts, centres, normals, depth, strict=True)
+        for (front, normal), centre, deep in zip(fronts, centres, depth, strict=True)
     ]
 
 

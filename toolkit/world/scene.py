@@ -40,6 +40,8 @@ def compose_scene(robot: RobotModel, world: World) -> mujoco.MjModel:
     scenery = source.spec
     for key in list(spec.keys):
         spec.delete(key)
+    for element in [*scenery.keys, *scenery.sensors, *scenery.pairs, *scenery.excludes]:
+        scenery.delete(element)
     priority = max([0, *(geom.priority for geom in spec.geoms)]) + 1
     fresh = mujoco.MjSpec().worldbody.add_geom()
     for geom in scenery.geoms:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ PART_GROUP = 3  # convex parts of a mesh that is drawn as a whole; hidden by def
 RAY_GROUPS = np.array([1, 1, 0, 1, 1, 1], np.uint8)  # `geomgroup` of mj_ray that sees exactly what collides
 
 _ALL_BITS = 0x7FFFFFFF
+_NAN = re.compile(r"""=\s*["'][^"']*(?<![^\s"'])[+-]?nan(?![^\s"'])""", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,7 @@ def geom_label(model: mujoco.MjModel, index: int) -> str:
 def _compiled(path: Path, mjcf: str | None) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     if mjcf is None and not path.is_file():
         raise WorldError(f"{path}: no such world file; give the path of an MJCF file")
+    _check_text(path, mjcf)
     try:
         if mjcf is None:
             spec = mujoco.MjSpec.from_file(str(path))
@@ -99,6 +102,17 @@ def _compiled(path: Path, mjcf: str | None) -> tuple[mujoco.MjSpec, mujoco.MjMod
         return spec, spec.compile()
     except ValueError as error:
         raise WorldError(f"{path}: MuJoCo cannot read this world: {one_line(error)}") from error
+
+
+def _check_text(path: Path, mjcf: str | None) -> None:
+    """Raise for NaN before MuJoCo, which would only write a warning into a log file, reads it."""
+    try:
+        text = mjcf if mjcf is not None else path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise WorldError(f"{path}: cannot be read as text ({error}); give the path of an MJCF file") from error
+    for number, line in enumerate(text.splitlines(), 1):
+        if _NAN.search(line):
+            raise WorldError(f"{path}: line {number} has a NaN: {line.strip()[:80]}; give plain numbers")
 
 
 def _check_static(path: Path, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
@@ -128,12 +142,11 @@ def _check_finite(path: Path, model: mujoco.MjModel) -> None:
         "geom": ("geom_pos", "geom_quat", "geom_size", "geom_friction"),
         "site": ("site_pos", "site_quat", "site_size"),
         "body": ("body_pos", "body_quat"),
-        "numeric": (),
     }
     for kind, names in fields.items():
         for name in names:
-            values = getattr(model, name).reshape(getattr(model, name).shape[0], -1)
-            bad = ~np.isfinite(values).all(axis=1)
+            values = getattr(model, name)
+            bad = ~np.isfinite(values).all(axis=tuple(range(1, values.ndim)))
             if bad.any():
                 index = int(np.argmax(bad))
                 label = getattr(model, kind)(index).name or f"{kind}#{index}"
@@ -215,7 +228,6 @@ def _add_parts(
             meshname=name,
             pos=centre,
             friction=model.geom_friction[index],
-            rgba=model.geom_rgba[index],
             group=PART_GROUP,
             contype=_ALL_BITS,
             conaffinity=_ALL_BITS,

@@ -1,0 +1,168 @@
+"""What a world file says, and one clear line for each way in which it can be wrong."""
+
+import os
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.world.conftest import mjcf_of
+from toolkit.errors import WorldError
+from toolkit.world.loader import load_world
+from toolkit.world.timing import Timing
+
+FLOOR = '<geom name="floor" type="plane" size="0 0 1"/>'
+TIMING = '<custom><numeric name="transition_timing" data="{}"/></custom>'
+
+
+def test_reads_start_goal_and_timing(make_world):
+    world = make_world(
+        f'{FLOOR}<body pos="0 0 0.1" euler="0 0 90"><site name="inner"/></body>',
+        start='0.1 0.2 0.05" euler="0 0 30',
+        goal="1.5 -0.5 0",
+        more=TIMING.format("0.05 0.35"),
+    )
+    np.testing.assert_allclose(world.start.position, [0.1, 0.2, 0.05])
+    assert world.start.yaw == pytest.approx(np.radians(30))
+    np.testing.assert_allclose(world.goal.position, [1.5, -0.5, 0])
+    assert world.goal.radius == 0.2
+    assert world.timing == Timing(0.05, 0.35)
+    assert world.name == "made"
+
+
+def test_timing_of_the_paper_where_none_is_given(make_world):
+    assert make_world(FLOOR).timing == Timing(1.0, 1.0)
+
+
+def test_file_with_includes_and_meshes_beside_it(tmp_path, monkeypatch):
+    import trimesh
+
+    (tmp_path / "meshes").mkdir()
+    trimesh.creation.box((2, 2, 0.2)).export(tmp_path / "meshes" / "slab.stl")
+    (tmp_path / "sites.xml").write_text(
+        '<mujoco><worldbody><site name="start" pos="0 0 0.1"/>'
+        '<site name="goal" type="cylinder" pos="0.5 0 0" size="0.2 0.1"/></worldbody></mujoco>'
+    )
+    path = tmp_path / "world.xml"
+    path.write_text(
+        '<mujoco><compiler meshdir="meshes"/><include file="sites.xml"/><asset><mesh name="slab" file="slab.stl"/>'
+        '</asset><worldbody><geom type="mesh" mesh="slab"/></worldbody></mujoco>'
+    )
+    monkeypatch.chdir(tmp_path.parent)
+    world = load_world(str(path.relative_to(tmp_path.parent)))
+    assert sum(surface.serves_foot for surface in world.surfaces) == 1
+
+
+def test_start_between_two_stones_is_on_the_ground(make_world):
+    stones = '<geom type="box" size="0.3 0.15 0.1" pos="0 {} -0.1"/>'
+    make_world(stones.format(0.17) + stones.format(-0.17))
+
+
+@pytest.mark.parametrize("height", [0.29, -0.1])
+def test_start_a_little_off_the_ground(make_world, height):
+    make_world(FLOOR, start=f"0 0 {height}")
+
+
+CASES = {
+    "no_start": (mjcf_of(FLOOR).replace('"start"', '"begin"'), r"no site 'start'; add <site name=\"start\""),
+    "no_goal": (
+        mjcf_of(FLOOR).replace('"goal"', '"end"'),
+        r"no site 'goal'; add <site name=\"goal\" type=\"cylinder\"",
+    ),
+    "goal_not_a_cylinder": (mjcf_of(FLOOR).replace('"cylinder"', '"sphere"'), "'goal' is not a cylinder; write it as"),
+    "start_in_the_air": (mjcf_of(FLOOR, start="0 0 0.5"), r"'start' is in the air: .* \(0, 0, 0.5\); move it"),
+    "start_under_the_ground": (mjcf_of(FLOOR, start="0 0 -0.5"), "'start' is in the air"),
+    "start_beside_the_ground": (mjcf_of('<geom type="box" size="1 1 1" pos="3 0 -1"/>'), "'start' is in the air"),
+    "start_tilted": (mjcf_of(FLOOR, start='0 0 0" euler="90 0 0'), "'start' is tilted; turn it about z only"),
+    "no_geom": (mjcf_of(), "no usable surface for feet; add a static colliding geom"),
+    "only_a_wall": (mjcf_of('<geom type="plane" size="0 0 1" euler="90 0 0"/>'), "no usable surface for feet"),
+    "does_not_collide": (mjcf_of(FLOOR.replace("/>", ' contype="0" conaffinity="0"/>')), "no usable surface for feet"),
+    "zero_friction": (mjcf_of(FLOOR.replace("/>", ' friction="0"/>')), "geom 'floor' has friction 0; give"),
+    "negative_friction": (mjcf_of(FLOOR.replace("/>", ' friction="-0.5"/>')), "geom 'floor' has friction -0.5; give"),
+    "unnamed_frictionless": (
+        mjcf_of(FLOOR + '<geom size="1" friction="0" pos="0 0 9"/>'),
+        "geom 'sphere#1' has friction 0",
+    ),
+    "nan_friction": (mjcf_of(FLOOR.replace("/>", ' friction="nan"/>')), r"line \d+ has a NaN: <geom name=\"floor\""),
+    "nan_position": (mjcf_of(FLOOR, start="0 NaN 0"), r"line \d+ has a NaN"),
+    "infinite_position": (mjcf_of(FLOOR, start="0 inf 0"), "pos of site 'start' is not finite"),
+    "infinite_friction": (mjcf_of(FLOOR.replace("/>", ' friction="inf"/>')), "friction of geom 'floor' is not finite"),
+    "joint": (
+        mjcf_of(FLOOR + '<body name="door"><joint name="hinge"/><geom size="0.1"/></body>'),
+        r"body 'door' moves \(joint 'hinge'\); a world is static, remove the joint",
+    ),
+    "free_joint": (mjcf_of(FLOOR + '<body name="ball"><freejoint/><geom size="0.1"/></body>'), "body 'ball' moves"),
+    "mocap": (mjcf_of(FLOOR + '<body name="hand" mocap="true"><geom size="0.1"/></body>'), "'hand' is a mocap body"),
+    "equality": (
+        mjcf_of(FLOOR + '<body name="a"/>', more='<equality><weld body1="a"/></equality>'),
+        "the world has an equality constraint",
+    ),
+    "timing_zero": (mjcf_of(FLOOR, more=TIMING.format("0 1")), "numeric 'transition_timing' is '0 1'; give two times"),
+    "timing_negative": (mjcf_of(FLOOR, more=TIMING.format("1 -1")), "'transition_timing' is '1 -1'"),
+    "timing_one": (mjcf_of(FLOOR, more=TIMING.format("1")), "'transition_timing' is '1'; give two"),
+    "timing_three": (mjcf_of(FLOOR, more=TIMING.format("1 1 1")), "'transition_timing' is '1 1 1'; give two"),
+    "timing_infinite": (mjcf_of(FLOOR, more=TIMING.format("1 inf")), "'transition_timing' is '1 inf'; give two"),
+    "broken_xml": (mjcf_of(FLOOR).replace("</worldbody>", ""), "MuJoCo cannot read this world: "),
+    "not_xml": ("hello", "MuJoCo cannot read this world: "),
+    "empty": ("", "MuJoCo cannot read this world: "),
+    "unknown_attribute": (
+        mjcf_of(FLOOR.replace("size", "sise")),
+        "cannot read this world: .*unrecognized attribute: 'sise'",
+    ),
+    "missing_mesh": (
+        mjcf_of(FLOOR + '<geom type="mesh" mesh="m"/>', '<mesh name="m" file="nowhere.stl"/>'),
+        "cannot read this world: .*nowhere.stl",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_world(case, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text, message = CASES[case]
+    path = tmp_path / "bad.xml"
+    path.write_text(text)
+    with pytest.raises(WorldError, match=message) as caught:
+        load_world(path)
+    line = str(caught.value)
+    assert line.startswith(f"{path}: ") and "\n" not in line
+    assert os.listdir(tmp_path) == ["bad.xml"]  # no log of MuJoCo's either
+
+
+@pytest.mark.parametrize("content", [None, b"\xff\xfe\x00junk"], ids=["missing", "binary"])
+def test_not_a_world_file(tmp_path, content):
+    path = tmp_path / "other.xml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(WorldError, match="other.xml: (no such world file|cannot be read as text)"):
+        load_world(path)
+    with pytest.raises(WorldError, match="no such world file"):
+        load_world(tmp_path)
+
+
+def test_mesh_of_too_many_parts(make_world):
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=1.0)
+    rough = np.array(ball.vertices) * np.random.default_rng(0).uniform(0.98, 1.02, (len(ball.vertices), 1))
+    vertices, faces = (" ".join(map(str, np.ravel(x))) for x in (rough, ball.faces))
+    with pytest.raises(
+        WorldError, match="mesh geom 'ball': it is not convex and has [0-9]+ flat parts, more than 4000"
+    ):
+        make_world(
+            FLOOR + '<geom name="ball" type="mesh" mesh="m"/>', f'<mesh name="m" vertex="{vertices}" face="{faces}"/>'
+        )
+
+
+def test_world_model_holds_only_static_geoms_with_full_contact_bits(make_world):
+    model = make_world(FLOOR + '<geom name="ghost" size="1" contype="0" conaffinity="0"/>').mujoco_model
+    assert model.nv == 0
+    assert model.geom_contype.tolist() == [0x7FFFFFFF, 0] and model.geom_conaffinity.tolist() == [0x7FFFFFFF, 0]
+    # Rays of `RAY_GROUPS` see what collides and nothing else.
+    from toolkit.world.source import RAY_GROUPS
+
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    geom = np.zeros(1, np.int32)
+    down = np.array([0, 0, -1.0])
+    assert mujoco.mj_ray(model, data, np.array([0, 0, 5.0]), down, RAY_GROUPS, True, -1, geom) == pytest.approx(5)
