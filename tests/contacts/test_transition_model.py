@@ -1,0 +1,47 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toolkit.contacts.transition_model import TransitionModel, palm_rays, steps_38, steps_60, wide_steps
+from toolkit.geometry.limb import Limb
+from toolkit.robot.loader import load_robot
+
+ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
+
+
+def rows(array):
+    return {tuple(row) for row in np.round(array, 9)}
+
+
+def test_counts_of_the_paper_and_38_within_60():
+    assert len(rows(steps_38())) == 38 and len(rows(steps_60())) == 60
+    assert rows(steps_38()) < rows(steps_60())
+
+
+def test_steps_obey_the_rules():
+    steps = steps_60()
+    x, y, yaw = steps.T
+    assert x.min() == -0.2 and x.max() == 0.4
+    assert set(np.round(y, 3)) == {0.2, 0.3, 0.4} and (y[x < 0] == 0.2).all()
+    assert set(np.round(np.degrees(yaw)).astype(int)) == {-30, -15, 0, 15, 30}
+    assert (yaw[(x == 0) | (x == 0.4)] == 0).all()
+    assert wide_steps()[:, 0].min() == 0.45 and wide_steps()[:, 0].max() == 0.75 and (wide_steps()[:, 2] == 0).all()
+
+
+def test_rays_are_unit_and_point_to_the_left():
+    rays = palm_rays()
+    assert rays.shape == (18, 3)
+    np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1.0)
+    assert (rays[:, 0] > 0).all() and (rays[:, 1] > 0).all()
+    assert set(np.round(np.degrees(np.arcsin(rays[:, 2]))).astype(int)) == {-20, 0, 20}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_right_limbs_mirror_left_ones_and_soles_stay_apart(name):
+    robot = load_robot(name)
+    model = TransitionModel.of(robot, steps_60())
+    np.testing.assert_array_equal(model.steps_of(Limb.RIGHT_FOOT), model.steps_of(Limb.LEFT_FOOT) * [1, -1, -1])
+    np.testing.assert_array_equal(model.rays_of(Limb.RIGHT_PALM), model.rays_of(Limb.LEFT_PALM) * [1, -1, 1])
+    assert model.steps[:, 1].min() >= 2 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04 - 1e-12
+    assert len(model.rays) == (18 if robot.arms else 0)
