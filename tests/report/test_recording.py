@@ -15,7 +15,7 @@ from toolkit.report import draw
 from toolkit.report.motion_scene import NEWTON_PER_METRE, frames, standing
 from toolkit.report.recording import write_recording
 from toolkit.report.run_report import RunReport
-from toolkit.report.summary import summary
+from toolkit.report.summary import search_summary, summary
 from toolkit.simulation.check import Check
 
 
@@ -97,6 +97,7 @@ PATHS = [
     "/contacts/left_foot/planned",
     "/contacts/left_palm/measured",
     "/search/cost",
+    "/search/best_cost",
     "/search/solutions",
     "/search/expanded_states",
     "/events",
@@ -215,6 +216,12 @@ def test_the_summary_states_verdict_checks_and_legend(run):
     )
     assert summary(passed).startswith("# PASS") and "FAIL" not in summary(passed)
     assert json.dumps(passed.as_dict())
+
+
+def test_the_search_s_summary_has_a_row_per_solution(run):
+    text = search_summary(run.search)
+    assert "| 0.100 s | 9.000 | unknown | 6 |" in text and "| 0.600 s | 7.000 | 40 % | 6 |" in text
+    assert "**no way**" in search_summary(replace(run.search, solutions=(), reason="no way"))
 
 
 def test_frames_keep_the_ends():

@@ -46,9 +46,9 @@ def blueprint(start: np.ndarray, goal: np.ndarray, *, executed: bool, searched: 
     else:
         tabs = [rrb.Vertical(*momenta, name="Momenta")]
     if searched:
-        bars = rrb.BarChartView(origin="search/solutions", name="Cost of each solution, oldest first")
-        progress = rrb.TimeSeriesView(origin="search", name="Progress (timeline: search)")
-        tabs.append(rrb.Vertical(bars, progress, name="Search"))
+        bars = rrb.BarChartView(origin="search/best_cost", name="Cost of the best solution over the search's seconds")
+        solutions = rrb.TextDocumentView(origin="search/solutions", name="Solutions")
+        tabs.append(rrb.Vertical(bars, solutions, name="Search"))
     right = rrb.Vertical(
         rrb.Tabs(*tabs, active_tab=0), rrb.TextDocumentView(origin="summary", name="Verdict"), row_shares=[3, 2]
     )

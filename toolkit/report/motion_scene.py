@@ -237,4 +237,6 @@ def draw_search(
     index = [rr.TimeColumn(SEARCH_TIMELINE, duration=seconds)]
     stream.send_columns("search/cost", index, rr.Scalars.columns(scalars=cost))
     stream.log("search/cost", rr.SeriesPoints(names="cost of the solution", colors=PREDICTED), static=True)
-    stream.log("search/solutions", rr.BarChart(cost, color=PREDICTED), static=True)
+    widths = np.maximum(np.diff([*seconds, max(search.seconds, seconds[-1])]), 1e-3)
+    bars = rr.BarChart(cost, abscissa=seconds, widths=widths, color=PREDICTED)
+    stream.log("search/best_cost", bars, static=True)

@@ -25,7 +25,7 @@ from toolkit.report.motion_scene import (
 )
 from toolkit.report.run_report import RunReport
 from toolkit.report.series import plot_execution, plot_motion, send_contact_states, touchdown_entries
-from toolkit.report.summary import summary
+from toolkit.report.summary import search_summary, summary
 from toolkit.robot.model import RobotModel
 from toolkit.search.result import SearchResult, Solution
 from toolkit.simulation.execution import Execution
@@ -109,6 +109,8 @@ def write_recording(
             plot_motion(stream, motion)
         send_contact_states(stream, schedule, execution)
         if search is not None:
+            text = rr.TextDocument(search_summary(search), media_type=rr.MediaType.MARKDOWN)
+            stream.log("search/solutions", text, static=True)
             draw_search(stream, search, _ground(world, sequence))
     finally:
         stream.disconnect()

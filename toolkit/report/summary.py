@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from toolkit.report.motion_scene import NEWTON_PER_METRE
 from toolkit.report.run_report import RunReport
+from toolkit.search.result import SearchResult
 
 SIGNS = {"PASS": "✔", "FAIL": "✘", "NOT_CHECKED": "–"}
 
@@ -46,3 +49,19 @@ def summary(report: RunReport | None) -> str:
             lines.append(f"| {check.name} | {value} | {check.limit:.4g}{unit} | {SIGNS[check.result]} {check.result} |")
         lines.append("")
     return "\n".join([*lines, LEGEND])
+
+
+def search_summary(search: SearchResult) -> str:
+    """Markdown text of a search: its figures and a row per solution."""
+    spent = f"{search.seconds:.2f} s, after {search.heuristic_seconds:.2f} s for the heuristic"
+    everything = "; every reachable state was looked at" if search.exhausted else ""
+    lines = [f"{search.expansions} states expanded in {spent}{everything}.", ""]
+    if search.reason:
+        lines += [f"**{search.reason}**", ""]
+    if search.solutions:
+        lines += ["| found after | cost | at most so much above the best | transitions |", "|---:|---:|---:|---:|"]
+    for solution in search.solutions:
+        above = f"{100 * (solution.bound - 1):.0f} %" if math.isfinite(solution.bound) else "unknown"
+        count = len(solution.sequence.transitions)
+        lines.append(f"| {solution.seconds:.3f} s | {solution.cost:.3f} | {above} | {count} |")
+    return "\n".join(lines)
