@@ -119,6 +119,25 @@ def test_sites_and_pads(tmp_path: Path) -> None:
     assert robot.mass == pytest.approx(mujoco.MjModel.from_xml_string(model).body_subtreemass[1])
 
 
+def test_nothing_of_the_file_acts_on_the_robot(tmp_path: Path) -> None:
+    """Gravity compensation, servos, priorities, options and keyframes of a file stay behind."""
+    model = biped_mjcf().replace(
+        "<worldbody>", '<option gravity="0 0 -1"><flag gravity="disable"/></option><worldbody>'
+    )
+    model = model.replace('<body name="left_knee_link"', '<body name="left_knee_link" gravcomp="1"')
+    model = model.replace('type="capsule"', 'type="capsule" priority="2"')
+    servo = '<position name="servo" joint="left_knee" kp="500" ctrlrange="0 1" forcerange="-200 180"/>'
+    model = model.replace("</mujoco>", f'<actuator>{servo}</actuator><keyframe><key name="k"/></keyframe></mujoco>')
+    robot = load_robot(str(write_robot(tmp_path / "biped", model)))
+    compiled = robot.mujoco_model
+    assert compiled.opt.gravity[2] == -9.81 and compiled.opt.disableflags == 0
+    assert not compiled.body_gravcomp.any() and not compiled.geom_priority.any() and compiled.nkey == 0
+    assert compiled.nu == 12 and not compiled.actuator_biastype.any()
+    # The tighter of joint and servo, the same both ways
+    assert robot.torque_limit[robot.joint_names.index("left_knee")] == 180.0
+    assert robot.torque_limit[robot.joint_names.index("right_knee")] == 250.0
+
+
 def test_body_named_like_its_limb(tmp_path: Path) -> None:
     """Sites own the limbs' names; a body of that name gives way."""
     folder = write_robot(

@@ -147,6 +147,9 @@ def _strip(source: ModelSource) -> None:
             spec.delete(item)
     for body in spec.bodies:
         body.gravcomp = 0.0
+    for geom in spec.geoms:
+        geom.priority = 0  # the world's friction counts
+    spec.option.gravity, spec.option.disableflags = [0.0, 0.0, -9.81], 0
 
 
 def _check_names(source: ModelSource) -> None:
@@ -233,7 +236,8 @@ def _add_site(description: RobotDescription, item: LimbDescription, spec: mujoco
         site = bare.site(item.site)
         body, pose = bare.body(site.bodyid[0]).name, Pose.from_quaternion(site.pos, site.quat) @ item.pose
     else:
-        body = f"{item.body}_link" if item.body in {limb.label for limb in Limb} else item.body
+        wanted = item.body or ""
+        body = f"{wanted}_link" if wanted in {limb.label for limb in Limb} else wanted
         if body not in bodies:
             raise RobotError(f"{where}: [limbs.{label}] body '{item.body}' does not exist; {suggestion(body, bodies)}")
         pose = item.pose
@@ -251,5 +255,8 @@ def _add_site(description: RobotDescription, item: LimbDescription, spec: mujoco
             quat=pose.quaternion_wxyz,
             size=[*(item.patch / 2), item.pad / 2],
             mass=0.0,
+            contype=1,
+            conaffinity=1,
+            condim=3,
         )
     return body

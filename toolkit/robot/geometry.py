@@ -104,7 +104,8 @@ def arm_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> ArmG
     def distances(joint: int) -> np.ndarray:
         home = data.qpos[model.jnt_qposadr[joint]]
         axis, anchor = data.xaxis[joint], data.xanchor[joint]
-        angles = np.linspace(*model.jnt_range[joint], 200) - home
+        low, high = model.jnt_range[joint]
+        angles = np.linspace(low, high, 200) - home
         arm = palm - anchor
         along = axis * (axis @ arm)
         turned = along + np.cos(angles)[:, None] * (arm - along) + np.sin(angles)[:, None] * np.cross(axis, arm)
