@@ -37,6 +37,15 @@ def test_a_mesh_has_the_geom_s_volume_and_outward_normals(geom, expected, rtol):
     assert (facing > -1e-12).all()
 
 
+def test_a_fine_mesh_shares_its_vertices(monkeypatch):
+    text = f"<mujoco><asset>{TETRAHEDRON}</asset><worldbody><geom type='mesh' mesh='tetra'/></worldbody></mujoco>"
+    monkeypatch.setattr("toolkit.report.meshes.FLAT_SHADED", 3)
+    mesh = mesh_of_geom(mujoco.MjModel.from_xml_string(text), 0)
+    assert len(mesh.vertices) == 4 and volume(mesh) == pytest.approx(1 / 6, rel=1e-6)
+    outward = mesh.vertices - mesh.vertices.mean(0)
+    assert ((outward * mesh.normals).sum(1) > 0).all()
+
+
 def test_planes_and_height_fields_face_up():
     text = """<mujoco><asset><hfield name="hills" nrow="3" ncol="4" size="2 1 0.5 0.1"
         elevation="0 0 0 0  0 1 1 0  0 0 0 0"/></asset>

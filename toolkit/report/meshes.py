@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 SHOWN_GROUPS = range(3)  # MuJoCo's viewer shows geom groups 0-2; by custom collision-only geoms are in group 3
+FLAT_SHADED = 2000  # triangles; a finer mesh is shaded smoothly
 
 
 @dataclass(frozen=True)
@@ -147,12 +148,24 @@ def _flat_shaded(vertices: np.ndarray, triangles: np.ndarray) -> TriangleMesh:
     )
 
 
+def _smooth_shaded(vertices: np.ndarray, triangles: np.ndarray) -> TriangleMesh:
+    """A mesh whose triangles share vertices, with the mean of their normals: a sixth of the size."""
+    corners = vertices[triangles]
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = np.zeros_like(vertices)
+    for corner in range(3):
+        np.add.at(normal, triangles[:, corner], face)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return TriangleMesh(vertices, triangles, np.where(length > 0, normal / np.maximum(length, 1e-300), [0.0, 0.0, 1.0]))
+
+
 def _compiled_mesh(model: mujoco.MjModel, mesh: int) -> TriangleMesh:
     """A mesh asset as MuJoCo compiled it."""
     first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
     vertices = np.array(model.mesh_vert[first : first + count], float)
     first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    return _flat_shaded(vertices, np.array(model.mesh_face[first : first + count], int))
+    triangles = np.array(model.mesh_face[first : first + count], int)
+    return _flat_shaded(vertices, triangles) if count <= FLAT_SHADED else _smooth_shaded(vertices, triangles)
 
 
 def _height_field(model: mujoco.MjModel, field: int) -> TriangleMesh:
