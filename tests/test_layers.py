@@ -1,4 +1,4 @@
-"""The layer order of the packages holds, nothing imports in a circle, and the library neither prints nor names a robot."""
+"""The layer order of the packages holds, nothing imports in a circle, and the library names no robot."""
 
 import ast
 from pathlib import Path

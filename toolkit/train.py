@@ -19,8 +19,8 @@ from toolkit.errors import DatasetError, InputError
 from toolkit.learning.collect import CollectConfig, collect
 from toolkit.learning.dataset import read_dataset
 from toolkit.learning.evaluate import Score, balanced, score
-from toolkit.prediction.networks import load_networks
 from toolkit.learning.query import query_seconds
+from toolkit.prediction.networks import load_networks
 from toolkit.report.console import make_console
 from toolkit.report.scores import score_table
 from toolkit.robot.loader import load_robot

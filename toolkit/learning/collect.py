@@ -60,21 +60,26 @@ class CollectConfig:
         friction: range of the coefficient.
         considered: transitions of a state that are labelled.
         expansions: states of a terrain that are expanded.
-        disturbance: m/s; spread of velocities added to a tenth of the states, so that rarer ones are seen as well.
+        disturbed: share of the states whose CoM and velocity are disturbed before labelling: what the planner meets
+            is mostly feasible, and the networks must know where that ends.
+        com_spread: (3,) m; velocity_spread: (3,) m/s; standard deviations of a full disturbance in the frame of the
+            feet; each one is scaled by a number drawn from [0, 1].
     """
 
     robot: str
     robots: str | None = None
     seed: int = 0
     samples_per_category: int = 100_000
-    per_shard: int = 200
+    per_shard: int = 250
     default_share: float = 0.4
     shift: tuple[float, float] = (0.05, 1.0)
     swing: tuple[float, float] = (0.3, 1.0)
     friction: tuple[float, float] = (0.3, 0.9)
     considered: int = 10
     expansions: int = 60
-    disturbance: float = 0.15
+    disturbed: float = 0.6
+    com_spread: tuple[float, float, float] = (0.12, 0.10, 0.05)
+    velocity_spread: tuple[float, float, float] = (0.5, 0.4, 0.2)
 
     @property
     def shards(self) -> int:
@@ -155,14 +160,13 @@ class _Recorder:
         )
         if self._quota.full:
             return result
-        if rng.random() < 0.1:
-            com_velocity = com_velocity + self._config.disturbance * rng.normal(size=3) * [1.0, 1.0, 0.3]
+        if rng.random() < self._config.disturbed:
+            scale = rng.random()
+            turn = scale * stance.mean_feet.rotation
+            com = com + turn @ (rng.normal(size=3) * self._config.com_spread)
+            com_velocity = com_velocity + turn @ (rng.normal(size=3) * self._config.velocity_spread)
         categories = [category_of(stance, item) for item in transitions]
-        # Categories that lack most come first; within one the draw is even.
-        counts = {category: categories.count(category) for category in set(categories)}
-        weight = np.array([max(self._quota.lack(c), 0.02 * self._quota.wanted) / counts[c] for c in categories])
-        size = min(self._config.considered, n)
-        for index in rng.choice(n, size, replace=False, p=weight / weight.sum()):
+        for index in self._choose(categories):
             transition, category = transitions[index], categories[index]
             batch = self._optimiser.evaluate(stance, com, com_velocity, [transition])
             feasible = bool(batch.feasible[0])
@@ -180,6 +184,19 @@ class _Recorder:
                 self._quota.feasible[category].append(feasible)
                 self._quota.targets[category].append(target)
         return result
+
+    def _choose(self, categories: list[Category]) -> list[int]:
+        """Transitions to label: of categories that lack samples, most of those that lack most; two more to go on."""
+        rng, lack = self._rng, {category: self._quota.lack(category) for category in set(categories)}
+        counts = {category: categories.count(category) for category in lack}
+        weight = np.array([max(lack[category], 0) / counts[category] for category in categories])
+        size = min(self._config.considered, int((weight > 0).sum()))
+        chosen = list(rng.choice(len(categories), size, replace=False, p=weight / weight.sum())) if size else []
+        others = np.setdiff1d(np.arange(len(categories)), chosen)
+        weight = np.array([1.0 / counts[categories[index]] for index in others])
+        if len(others):
+            chosen += list(rng.choice(others, min(2, len(others)), replace=False, p=weight / weight.sum()))
+        return [int(index) for index in chosen]
 
 
 @lru_cache(maxsize=2)
