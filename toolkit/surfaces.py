@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 from pathlib import Path
 
@@ -54,9 +55,10 @@ def main(argv: list[str] | None = None) -> int:
         write_surface_recording(draft, world)
         os.replace(draft, args.out / RECORDING)
     except OSError as error:
-        draft.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            draft.unlink()
         for folder in made:
-            if folder.exists():
+            with contextlib.suppress(OSError):
                 folder.rmdir()
         raise InputError(f"{args.out}: cannot be written ({error.strerror or error}); choose another --out") from error
     console.print(f"written to {args.out / RECORDING}", soft_wrap=True, markup=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import inspect
 import os
 import sys
@@ -82,7 +83,8 @@ def main(argv: list[str] | None = None) -> int:
         draft.write_text(text)
         os.replace(draft, out)
     except OSError as error:
-        draft.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            draft.unlink()
         raise InputError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
     return 0
 

@@ -307,12 +307,12 @@ def training(
     swing: float = 1.0,
     walls: int = 1,
 ) -> str:
-    """Terrain to collect transitions on: 3 x 3 tilted tiles, the start on the middle one, and a wall beside the robot.
+    """Terrain to collect transitions on: 3 x 3 tilted tiles, the start on the middle one, and walls beside the robot.
 
     Args:
         rng: source of everything random.
         tile: m; edge of a tile.
-        tilt: deg; roll and pitch of tiles, and the tilts of the wall about its own axes, lie within this.
+        tilt: deg; roll and pitch of tiles, and the lean of a wall lie within this.
         rise: m; heights lie within this.
         friction: sliding coefficient.
         shift: s.
@@ -320,11 +320,12 @@ def training(
         walls: 1 for a wall on one side, 2 for one on each.
 
     Returns:
-        MJCF text. A wall's foot is 0.4 to 0.9 m from the start, on either side, up to 45 degrees forwards or back.
+        MJCF text. A wall is 0.4 to 0.9 m from the start at a height of 1 m, up to 45 degrees before or behind the
+        robot's side.
     """
     world = WorldText(
         "training",
-        "3 x 3 tilted tiles and a wall",
+        "3 x 3 tilted tiles and walls",
         friction,
         (shift, swing),
         (0.0, 0.0, 0.05),
@@ -340,9 +341,8 @@ def training(
     for side in (first, -first)[:walls]:
         bearing = side * np.radians(90.0 + rng.uniform(-45.0, 45.0))
         distance, lean = rng.uniform(0.4, 0.9), rng.uniform(-tilt, tilt)
-        # z of the panel looks back at the robot; it then leans about its level axis.
-        upright = Rotation.from_euler("zy", [bearing, -np.pi / 2])
-        turn = Rotation.from_euler("zyz", [bearing, np.radians(lean), -bearing]) * upright
+        # z of the panel looks back at the robot and leans up or down.
+        turn = Rotation.from_euler("ZY", [bearing, np.radians(lean) - np.pi / 2])
         centre = distance * np.array([np.cos(bearing), np.sin(bearing), 0.0]) + [0.0, 0.0, 1.0]
         name = "wall" if side == first else "other_wall"
         world.tile(name, (2.0, 2.0), centre, material="panel", rotation=turn)
