@@ -10,25 +10,12 @@ import math
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled, cone, constraints, objective, riccati
+from toolkit.centroidal.kernels import compiled, cone, constraints, objective, riccati, start
 from toolkit.centroidal.kernels.setup import ROWS
 
 SOLVED, INFEASIBLE, UNDECIDED = 0, 1, 2
 REST_STIFFNESS = 1e7
 """Of the proximal term that carries the final rest; the multiplier makes it exact."""
-
-
-@compiled
-def start(data, u):
-    """Fill u with wrenches well inside the cones: the feet share the weight, palms press a little."""
-    for t in range(data.h.shape[0]):
-        vertical = 0.0
-        for j in range(data.first[t], data.first[t + 1]):
-            vertical += max(data.rotation[j, 2, 2], 0.0)
-        for j in range(data.first[t], data.first[t + 1]):
-            share = max(data.rotation[j, 2, 2], 0.0) / max(vertical, 0.3)
-            u[j] = 0.0
-            u[j, 2] = min(max(share, 0.1), 0.5 * data.force_bound[j])
 
 
 @compiled
@@ -44,20 +31,18 @@ def solve(data, tolerance, max_iterations, u, x, w):
     dz_line, dz_round = np.empty(lines), np.empty((rounds, 4))
     t_line, t_round = np.empty(lines), np.empty((rounds, 4))
     inverse, eta, scaling, lam = np.empty(lines), np.empty(rounds), np.empty((rounds, 4)), np.empty((rounds, 4))
-    contact_gradient, contact_hessian = np.empty((contacts, 6)), np.empty((contacts, 6, 6))
+    contact_gradient = np.empty((contacts, 6))
     knot_gradient, knot_hessian = np.empty((n + 1, 9)), np.empty((n + 1, 9, 9))
     step_gradient, step_hessian = np.empty((n, 15)), np.empty((n, 15, 15))
     g_contact, g_knot = np.empty((contacts, 6)), np.empty((n + 1, 9))
-    spread, total = np.empty((contacts, 6, 6)), np.empty((n, 6, 6))
-    mixed, theta, gain = np.empty((n, 6, 15)), np.empty((n, 6, 6)), np.empty((n, 6, 9))
+    sweep = riccati.allocate(n, contacts)
     du, dx = np.empty((contacts, 6)), np.empty((n + 1, 9))
     y_rest, y_next = np.zeros(3), np.zeros(3)
     p4, q4 = np.empty(4), np.empty(4)
     degree = float(lines + rounds)
 
     constraints.constants(data, c_line, c_round)
-    start(data, u)
-    objective.rollout(data, u, x, w)
+    start.follow(data, sweep, u, x, w)
     constraints.apply(data, u, x, s_line, s_round)
     mu = 0.0
     for i in range(lines):
@@ -99,7 +84,7 @@ def solve(data, tolerance, max_iterations, u, x, w):
         for t in range(n):
             omega = data.omega[t]
             for j in range(data.first[t], data.first[t + 1]):
-                value += objective.contact_terms(data, t, j, u[j], contact_gradient[j], contact_hessian[j])
+                value += objective.contact_terms(data, t, j, u[j], contact_gradient[j], sweep.hessian[j])
             value += objective.step_terms(data.h[t], omega, data.weights, x[t], w[t], step_gradient[t], step_hessian[t])
             value += objective.knot_terms(omega, data.weights, x[t + 1], knot_gradient[t + 1], knot_hessian[t + 1])
         if data.rest:
@@ -107,9 +92,9 @@ def solve(data, tolerance, max_iterations, u, x, w):
                 worst = max(worst, abs(x[n, 3 + a]))
                 knot_gradient[n, 3 + a] += y_rest[a] + REST_STIFFNESS * x[n, 3 + a]
                 knot_hessian[n, 3 + a, 3 + a] += REST_STIFFNESS
-        constraints.add_hessian(data, inverse, scaling, eta, contact_hessian, knot_hessian)
-        riccati.factor_contacts(data, contact_hessian, spread, total)
-        riccati.factor_steps(data, knot_hessian, step_hessian, total, mixed, theta, gain)
+        constraints.add_hessian(data, inverse, scaling, eta, sweep.hessian, knot_hessian)
+        riccati.factor_contacts(data, sweep)
+        riccati.factor_steps(data, knot_hessian, step_hessian, sweep)
 
         step, sigma, decrement = 0.0, 0.0, 0.0
         for phase in range(2):
@@ -142,9 +127,7 @@ def solve(data, tolerance, max_iterations, u, x, w):
                 for a in range(9):
                     g_knot[t, a] = knot_gradient[t, a]
             constraints.subtract_adjoint(data, t_line, t_round, g_contact, g_knot)
-            riccati.solve(
-                data, g_contact, g_knot, step_gradient, contact_hessian, spread, total, mixed, theta, gain, du, dx
-            )
+            riccati.solve(data, g_contact, g_knot, step_gradient, sweep, du, dx)
             constraints.apply(data, du, dx, ds_line, ds_round)
             for i in range(lines):
                 dz_line[i] = t_line[i] - z_line[i] - inverse[i] * ds_line[i]

@@ -6,30 +6,25 @@ averaged over a step, rbar = r + h/2 v + h^2/6 g, the rate of the angular moment
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled
+from toolkit.centroidal.kernels import compiled, riccati
+
+
+@compiled
+def advance(h, x, w, out):
+    """Fill the knot `out` (9,) after a step of length h from x (9,) under the total wrench w (6,)."""
+    riccati.forward(h, x, w, out)
+    out[2] -= 0.5 * h * h
+    out[5] -= h
 
 
 @compiled
 def rollout(data, u, x, w):
-    """Fill the states x (N + 1, 9) and the total wrenches w (N, 6) of contact wrenches u (C, 6)."""
+    """Fill the knots x (N + 1, 9) and the total wrenches w (N, 6) of contact wrenches u (C, 6)."""
     for a in range(9):
         x[0, a] = data.x0[a]
     for t in range(data.h.shape[0]):
-        h = data.h[t]
-        w[t] = 0.0
-        for j in range(data.first[t], data.first[t + 1]):
-            for a in range(6):
-                for b in range(6):
-                    w[t, a] += data.wrench[j, a, b] * u[j, b]
-        gravity = -1.0
-        for a in range(3):
-            acceleration = w[t, a] + (gravity if a == 2 else 0.0)
-            x[t + 1, a] = x[t, a] + h * x[t, 3 + a] + 0.5 * h * h * acceleration
-            x[t + 1, 3 + a] = x[t, 3 + a] + h * acceleration
-            x[t + 1, 6 + a] = x[t, 6 + a] + h * w[t, 3 + a]
-        # (h r + h^2/2 v + h^3/6 F) x g, with g = (0, 0, -1)
-        x[t + 1, 6] -= h * x[t, 1] + h * h / 2 * x[t, 4] + h**3 / 6 * w[t, 1]
-        x[t + 1, 7] += h * x[t, 0] + h * h / 2 * x[t, 3] + h**3 / 6 * w[t, 0]
+        riccati.total_wrench(data, t, u, w[t])
+        advance(data.h[t], x[t], w[t], x[t + 1])
 
 
 @compiled

@@ -7,10 +7,47 @@ sweep is over 9 states and 6 well scaled controls, however many contacts there a
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from toolkit.centroidal.kernels import compiled
+
+
+class Sweep(NamedTuple):
+    """Factors of one iteration, for N steps and C contacts.
+
+    Attributes:
+        hessian: (C, 6, 6) of the contacts; `factor_contacts` turns it into its lower factor.
+        spread: (C, 6, 6) hessian^-1/2 B'.
+        total: (N, 6, 6) K, lower.
+        mixed: (N, 6, 15) Hessian rows of w against (x, w).
+        theta: (N, 6, 6) lower factor of I + K' M_ww K.
+        gain: (N, 6, 9) theta^-1/2 K' M_wx.
+        control: (N, 6) of the last right-hand side, before feedback.
+    """
+
+    hessian: np.ndarray
+    spread: np.ndarray
+    total: np.ndarray
+    mixed: np.ndarray
+    theta: np.ndarray
+    gain: np.ndarray
+    control: np.ndarray
+
+
+@compiled
+def allocate(n, contacts):
+    """Room for the factors of n steps."""
+    return Sweep(
+        np.empty((contacts, 6, 6)),
+        np.empty((contacts, 6, 6)),
+        np.empty((n, 6, 6)),
+        np.empty((n, 6, 15)),
+        np.empty((n, 6, 6)),
+        np.empty((n, 6, 9)),
+        np.empty((n, 6)),
+    )
 
 
 @compiled
@@ -79,8 +116,9 @@ def backward(h, y, x, w):
 
 
 @compiled
-def factor_contacts(data, hessian, spread, total):
-    """Factor the contacts' Hessians (C, 6, 6) in place; fill spread (C, 6, 6) = L^-1 B', total (N, 6, 6) = K."""
+def factor_contacts(data, sweep):
+    """Factor the contacts' Hessians, and sum them up into K of each step."""
+    hessian, spread, total = sweep.hessian, sweep.spread, sweep.total
     for t in range(data.h.shape[0]):
         total[t] = 0.0
         for j in range(data.first[t], data.first[t + 1]):
@@ -103,24 +141,14 @@ def factor_contacts(data, hessian, spread, total):
 
 
 @compiled
-def factor_steps(data, knot_hessian, step_hessian, total, mixed, theta, gain):
-    """Backward sweep of the matrices.
-
-    Args:
-        data: the problem.
-        knot_hessian: (N + 1, 9, 9).
-        step_hessian: (N, 15, 15) in (x, w).
-        total: (N, 6, 6) K of `factor_contacts`.
-        mixed: (N, 6, 15), filled: Hessian rows of w against (x, w).
-        theta: (N, 6, 6), filled: factor of I + K' M_ww K.
-        gain: (N, 6, 9), filled: theta^-1 K' M_wx.
-    """
+def factor_steps(data, knot_hessian, step_hessian, sweep):
+    """Backward sweep of the matrices, with Hessians (N + 1, 9, 9) of knots and (N, 15, 15) of steps in (x, w)."""
     n = data.h.shape[0]
     value = np.empty((9, 9))
-    columns = np.empty((15, 9))  # of V [A B], as rows
     for a in range(9):
         for b in range(9):
             value[a, b] = knot_hessian[n, a, b]
+    columns = np.empty((15, 9))  # of V [A B], as rows
     row_x, row_w = np.empty(9), np.empty(6)
     product = np.empty((6, 6))
     for t in range(n - 1, -1, -1):
@@ -132,118 +160,124 @@ def factor_steps(data, knot_hessian, step_hessian, total, mixed, theta, gain):
             for a in range(6):
                 columns[9 + a, i] = row_w[a]
         # The adjoint again on the columns: [A B]' V [A B].
-        hessian, mix = step_hessian[t], mixed[t]
+        hessian, mixed = step_hessian[t], sweep.mixed[t]
         for c in range(15):
             backward(h, columns[c], row_x, row_w)
             for a in range(6):
-                mix[a, c] = row_w[a] + hessian[9 + a, c]
+                mixed[a, c] = row_w[a] + hessian[9 + a, c]
             if c < 9:
                 for a in range(9):
                     value[a, c] = row_x[a] + hessian[a, c] + knot_hessian[t, a, c]
-        lower, th, ga = total[t], theta[t], gain[t]
+        lower, theta, gain = sweep.total[t], sweep.theta[t], sweep.gain[t]
         for a in range(6):
             for b in range(6):
                 entry = 0.0
                 for k in range(b, 6):
-                    entry += mix[a, 9 + k] * lower[k, b]
+                    entry += mixed[a, 9 + k] * lower[k, b]
                 product[a, b] = entry
         for a in range(6):
             for b in range(a + 1):
                 entry = 1.0 if a == b else 0.0
                 for k in range(a, 6):
                     entry += lower[k, a] * product[k, b]
-                th[a, b] = entry
-        cholesky(th, 6)
+                theta[a, b] = entry
+        cholesky(theta, 6)
         if t == 0:
             continue
         for c in range(9):
             for a in range(6):
                 entry = 0.0
                 for k in range(a, 6):
-                    entry += lower[k, a] * mix[k, c]
+                    entry += lower[k, a] * mixed[k, c]
                 for k in range(a):
-                    entry -= th[a, k] * ga[k, c]
-                ga[a, c] = entry / th[a, a]
+                    entry -= theta[a, k] * gain[k, c]
+                gain[a, c] = entry / theta[a, a]
         for a in range(9):
             for b in range(a + 1):
                 entry = 0.5 * (value[a, b] + value[b, a])
                 for k in range(6):
-                    entry -= ga[k, a] * ga[k, b]
+                    entry -= gain[k, a] * gain[k, b]
                 value[a, b] = value[b, a] = entry
 
 
 @compiled
-def solve(data, contact_gradient, knot_gradient, step_gradient, hessian, spread, total, mixed, theta, gain, du, dx):
-    """Newton step of given gradients with the factors of `factor_contacts` and `factor_steps`.
-
-    Args:
-        data: the problem.
-        contact_gradient: (C, 6), destroyed.
-        knot_gradient: (N + 1, 9).
-        step_gradient: (N, 15) in (x, w).
-        hessian: (C, 6, 6) factored, with
-        spread: of `factor_contacts`,
-        total: of `factor_contacts`, and
-        mixed: of `factor_steps`,
-        theta: of `factor_steps`,
-        gain: of `factor_steps`.
-        du: (C, 6), filled.
-        dx: (N + 1, 9), filled.
-    """
+def sweep_back(data, contact_gradient, knot_gradient, step_gradient, sweep):
+    """Backward sweep of gradients (C, 6), (N + 1, 9) and (N, 15); the contacts' are overwritten for `step_forward`."""
     n = data.h.shape[0]
-    shift, control = np.zeros((n, 6)), np.empty((n, 6))
+    shift = np.empty(6)
     y, row_x, row_w, beta = np.empty(9), np.empty(9), np.empty(6), np.empty(6)
     for a in range(9):
         y[a] = knot_gradient[n, a]
     for t in range(n - 1, -1, -1):
+        shift[:] = 0.0
         for j in range(data.first[t], data.first[t + 1]):
             g = contact_gradient[j]
-            solve_lower(hessian[j], g, 6)
+            solve_lower(sweep.hessian[j], g, 6)
             for a in range(6):
                 for i in range(6):
-                    shift[t, a] += spread[j, i, a] * g[i]
+                    shift[a] += sweep.spread[j, i, a] * g[i]
         backward(data.h[t], y, row_x, row_w)
-        mix, lower, v = mixed[t], total[t], control[t]
+        mixed, lower, v = sweep.mixed[t], sweep.total[t], sweep.control[t]
         for a in range(6):
             beta[a] = row_w[a] + step_gradient[t, 9 + a]
             for b in range(6):
-                beta[a] -= mix[a, 9 + b] * shift[t, b]
+                beta[a] -= mixed[a, 9 + b] * shift[b]
         for a in range(6):
             v[a] = 0.0
             for k in range(a, 6):
                 v[a] -= lower[k, a] * beta[k]
-        solve_lower(theta[t], v, 6)
-        # theta^-T is left for the forward sweep; K theta^-T v is needed here for the states' gradient.
+        solve_lower(sweep.theta[t], v, 6)
+        # The rest of theta^-1 is left for `step_forward`; the state's gradient needs w at x = 0 now.
         if t > 0:
             for a in range(6):
                 beta[a] = v[a]
-            solve_upper(theta[t], beta, 6)
+            solve_upper(sweep.theta[t], beta, 6)
             for a in range(6):
-                row_w[a] = -shift[t, a]
+                row_w[a] = -shift[a]
                 for k in range(a + 1):
                     row_w[a] += lower[a, k] * beta[k]
             for c in range(9):
                 y[c] = row_x[c] + step_gradient[t, c] + knot_gradient[t, c]
                 for a in range(6):
-                    y[c] += mix[a, c] * row_w[a]
-    dx[0] = 0.0
-    for t in range(n):
-        v, lower = control[t], total[t]
-        if t > 0:
-            for a in range(6):
-                for c in range(9):
-                    v[a] -= gain[t, a, c] * dx[t, c]
-        solve_upper(theta[t], v, 6)
+                    y[c] += mixed[a, c] * row_w[a]
+
+
+@compiled
+def step_forward(data, t, contact_gradient, sweep, dx, du):
+    """Change of the wrenches of step t for a change dx (9,) of its first knot: fills du (C, 6) of its contacts."""
+    v, lower = sweep.control[t], sweep.total[t]
+    if t > 0:
         for a in range(6):
-            row_w[a] = -shift[t, a]
-            for k in range(a + 1):
-                row_w[a] += lower[a, k] * v[k]
-        forward(data.h[t], dx[t], row_w, dx[t + 1])
-        if data.first[t + 1] > data.first[t]:
-            solve_upper(lower, v, 6)
-        for j in range(data.first[t], data.first[t + 1]):
-            for i in range(6):
-                du[j, i] = -contact_gradient[j, i]
-                for a in range(6):
-                    du[j, i] += spread[j, i, a] * v[a]
-            solve_upper(hessian[j], du[j], 6)
+            for c in range(9):
+                v[a] -= sweep.gain[t, a, c] * dx[c]
+    solve_upper(sweep.theta[t], v, 6)
+    if data.first[t + 1] > data.first[t]:
+        solve_upper(lower, v, 6)
+    for j in range(data.first[t], data.first[t + 1]):
+        for i in range(6):
+            du[j, i] = -contact_gradient[j, i]
+            for a in range(6):
+                du[j, i] += sweep.spread[j, i, a] * v[a]
+        solve_upper(sweep.hessian[j], du[j], 6)
+
+
+@compiled
+def total_wrench(data, t, u, w):
+    """Fill w (6,) with the sum of the wrenches u (C, 6) of step t about the origin."""
+    w[:] = 0.0
+    for j in range(data.first[t], data.first[t + 1]):
+        for a in range(6):
+            for b in range(6):
+                w[a] += data.wrench[j, a, b] * u[j, b]
+
+
+@compiled
+def solve(data, contact_gradient, knot_gradient, step_gradient, sweep, du, dx):
+    """Newton step of given gradients, as in `sweep_back`: fills du (C, 6) and dx (N + 1, 9)."""
+    sweep_back(data, contact_gradient, knot_gradient, step_gradient, sweep)
+    dw = np.empty(6)
+    dx[0] = 0.0
+    for t in range(data.h.shape[0]):
+        step_forward(data, t, contact_gradient, sweep, dx[t], du)
+        total_wrench(data, t, du, dw)
+        forward(data.h[t], dx[t], dw, dx[t + 1])

@@ -41,6 +41,7 @@ class Data(NamedTuple):
         ball_first, ball_center, ball_radius: (N + 2,), (K, 3), (K,); knots 1 .. N.
         plane_first, plane_normal, plane_offset: (N + 2,), (P, 3), (P,).
         x0: (9,) initial state.
+        guess: (N + 1, 3) CoM to start from, above the mean of the feet.
         rest: final velocity must vanish.
         weights: (8,) scaled, in the order of `Weights`, times 2.
     """
@@ -63,6 +64,7 @@ class Data(NamedTuple):
     plane_normal: np.ndarray
     plane_offset: np.ndarray
     x0: np.ndarray
+    guess: np.ndarray
     rest: bool
     weights: np.ndarray
 
@@ -245,6 +247,13 @@ def pack(
     for a in range(3):
         x0[3 + a] = com_velocity[a] / unit
         x0[6 + a] = angular_momentum[a] / (mass * unit)
+    guess = np.zeros((n + 1, 3))
+    for knot in range(n):
+        for a in range(3):
+            for i in range(2):
+                guess[knot, a] += 0.5 * (position[knot, i, a] - position[0, i, a])
+    for a in range(3):
+        guess[n, a] = final_center[a] - com[a]
     data = Data(
         h,
         omega,
@@ -264,6 +273,7 @@ def pack(
         plane_normal[:p],
         plane_offset[:p],
         x0,
+        guess,
         rest,
         w,
     )
