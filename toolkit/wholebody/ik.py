@@ -8,8 +8,9 @@ from the last one, so the error of the linearisation stays of second order in th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import mujoco
 import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion
@@ -18,6 +19,7 @@ from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose, rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
+from toolkit.wholebody.avoidance import ArmAvoidance, AvoidanceConfig
 from toolkit.wholebody.knee import chain_to, knee_range
 from toolkit.wholebody.limb_paths import LimbPaths
 
@@ -41,6 +43,8 @@ class IKConfig:
         range_margin: rad; kept from each end of a joint's range.
         range_rate: 1/s; how fast a joint may approach the end of its range, per rad of distance.
         min_knee: rad; least knee flexion.
+        avoid: weight per squared m by which an arm comes nearer to something than its damper allows.
+        avoidance: see the class.
     """
 
     substeps: int = 2
@@ -63,20 +67,23 @@ class IKConfig:
     range_margin: float = 0.02
     range_rate: float = 25.0
     min_knee: float = 0.12
+    avoid: float = 1e3
+    avoidance: AvoidanceConfig = field(default_factory=AvoidanceConfig)
 
 
 class WholeBodyIK:
     """The solver with its tasks, tick after tick."""
 
-    def __init__(self, robot: RobotModel, config: IKConfig, tick: float):
+    def __init__(self, robot: RobotModel, config: IKConfig, tick: float, avoidance: ArmAvoidance | None = None):
         """Set up the tasks.
 
         Args:
             robot: the robot.
             config: weights.
             tick: s between two solves.
+            avoidance: what arms keep clear of; nothing where None.
         """
-        self.robot, self.config, self.tick = robot, config, tick
+        self.robot, self.config, self.tick, self.avoidance = robot, config, tick, avoidance
         self.wrapper = placo_wrapper(robot)
         self.order = pinocchio_map(robot, self.wrapper.model)
         self.solver = self.wrapper.make_solver()
@@ -123,6 +130,7 @@ class WholeBodyIK:
             self.postures.append((task, {name: self.home[name] for name in joints}, weight))
         self.momentum = solver.add_centroidal_momentum_task(np.zeros(3))
         solver.add_regularization_task(1e-6)
+        self.dampers = None
 
     def _groups(self) -> list[tuple[list[str], float]]:
         """Joint names with the weight of their posture: arms, trunk, legs."""
@@ -173,6 +181,7 @@ class WholeBodyIK:
         angle = self.tick / (self.robot.mass * self.robot.com_height**2)
         self.momentum.configure("momentum", "soft", self.config.angular_momentum * angle**2)
         self.solver.enable_velocity_limits(True)
+        self.drift = np.zeros(6)
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     def advance(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
@@ -188,7 +197,10 @@ class WholeBodyIK:
         for task, names, _ in self.postures:
             for name in names:
                 task.set_joint(name, targets[name])
+        before = self.order.qpos_from_q(self.wrapper.state.q)
+        self._set_dampers(before, angles, {palm for palm in self.palms if paths.authority(palm, time) > 0.0})
         self._solve(time)
+        self.drift = self._base_motion(before)
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     @property
@@ -220,6 +232,27 @@ class WholeBodyIK:
         self.base.R_world_frame = rotation_about_z(np.arctan2(heading[1], heading[0]))
         for palm, tasks in self.palms.items():
             self._set_palm(palm, tasks, paths.sample(palm, time).pose, paths.authority(palm, time))
+
+    def _set_dampers(self, qpos: np.ndarray, angles: np.ndarray, reaching: set[Limb]) -> None:
+        """Keep the arms clear of the world and the body."""
+        if self.dampers is not None:
+            self.solver.remove_constraint(self.dampers)
+            self.dampers = None
+        if self.avoidance is None:
+            return
+        rows, bound = self.avoidance.rows(qpos, self.drift, self.tick, reaching)
+        if len(rows):
+            matrix = np.zeros((len(rows), len(qpos)))
+            matrix[:, self.order.q_index] = rows
+            self.dampers = self.solver.add_joint_space_half_spaces_constraint(matrix, bound + rows @ angles)
+            self.dampers.configure("dampers", "soft", self.config.avoid)
+
+    def _base_motion(self, before: np.ndarray) -> np.ndarray:
+        """(6,) displacement of the base since a state (7 + n,), linear in the world and angular in the body."""
+        after = self.order.qpos_from_q(self.wrapper.state.q)
+        change = np.zeros(self.robot.mujoco_model.nv)
+        mujoco.mj_differentiatePos(self.robot.mujoco_model, change, 1.0, before, after)
+        return change[:6]
 
     def _set_ranges(self, angles: np.ndarray, free: list[Limb]) -> None:
         """Ranges of this tick: approached ever more slowly, and narrow for arms that hang free.

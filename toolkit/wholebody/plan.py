@@ -13,6 +13,7 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
+from toolkit.wholebody.avoidance import ArmAvoidance
 from toolkit.wholebody.check import CheckConfig, CheckReport, check
 from toolkit.wholebody.ik import IKConfig, WholeBodyIK, first_guess
 from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
@@ -67,7 +68,7 @@ def whole_body(
         reason = f"the centroidal motion is not feasible: {motion.status}"
         return _failed(robot, paths, times, reason, perf_counter() - begin)
     try:
-        qpos = solve_ik(robot, paths, motion, times, config.ik)
+        qpos = solve_ik(robot, paths, motion, times, config.ik, world)
     except PlanningError as error:
         return _failed(robot, paths, times, "; ".join([*reasons, str(error)]), perf_counter() - begin)
     report = check(robot, world, paths, motion, times, qpos, config.check)
@@ -75,15 +76,21 @@ def whole_body(
 
 
 def solve_ik(
-    robot: RobotModel, paths: LimbPaths, motion: CentroidalMotion, times: np.ndarray, config: IKConfig
+    robot: RobotModel,
+    paths: LimbPaths,
+    motion: CentroidalMotion,
+    times: np.ndarray,
+    config: IKConfig,
+    world: World | None = None,
 ) -> np.ndarray:
-    """(T, 7 + n) qpos on a uniform time grid.
+    """(T, 7 + n) qpos on a uniform time grid; the arms keep clear of `world` where there is one.
 
     Raises:
         PlanningError: if a quadratic program has no solution.
     """
     tick = float(times[1] - times[0]) / config.substeps
-    solver = WholeBodyIK(robot, config, tick)
+    avoid = world is not None and config.avoidance.enabled
+    solver = WholeBodyIK(robot, config, tick, ArmAvoidance(robot, world, config.avoidance) if avoid else None)
     qpos = np.empty((len(times), len(robot.home)))
     qpos[0] = solver.start(first_guess(robot, paths, motion), paths, motion)
     for index in range(1, len(times)):

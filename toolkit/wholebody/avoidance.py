@@ -1,0 +1,151 @@
+"""Velocity dampers that keep free arms off the world and off the body during inverse kinematics.
+
+For a pair of geoms at distance d with normal n (from the first to the second) at point p the damper demands, per tick,
+
+    n . (J2(p) - J1(p)) dq >= -(d - d_safe) dt / tau
+
+so that a distance shrinks ever more slowly towards d_safe and grows where it is below. Legs follow from feet and CoM and
+are left to the final collision check.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from toolkit.geometry.limb import PALMS, Limb
+from toolkit.robot.model import RobotModel
+from toolkit.wholebody.knee import chain_to
+from toolkit.world.scene import compose_scene
+from toolkit.world.world import World
+
+
+@dataclass(frozen=True)
+class AvoidanceConfig:
+    """Settings of the dampers.
+
+    Attributes:
+        enabled: whether arms avoid anything.
+        notice: m; distances below this are looked at.
+        safe_world, safe_self: m; wanted distance of an arm from the world and from the rest of the robot.
+        time: s; tau above.
+        max_rows: dampers at a time, the nearest ones.
+    """
+
+    enabled: bool = True
+    notice: float = 0.06
+    safe_world: float = 0.025
+    safe_self: float = 0.012
+    time: float = 0.15
+    max_rows: int = 12
+
+
+class ArmAvoidance:
+    """Distances of the arms in the composed scene, tick after tick."""
+
+    def __init__(self, robot: RobotModel, world: World, config: AvoidanceConfig):
+        """Compose the scene once.
+
+        Args:
+            robot: the robot; one without palms has no arms to speak of.
+            world: what to avoid.
+            config: settings.
+        """
+        self.config = config
+        self.model = compose_scene(robot, world)
+        self.data = mujoco.MjData(self.model)
+        self.static = self.model.body_weldid[self.model.geom_bodyid] == 0
+        self.arm_of = _arm_of_geoms(robot, self.model)
+        hands = {limb: self.model.body(robot.limbs[limb].body).id for limb in PALMS if limb in robot.limbs}
+        self.hand = {limb: self.model.geom_bodyid == body for limb, body in hands.items()}
+        self.model.geom_margin[:] = 0.0
+        self.model.geom_gap[:] = 0.0
+        self.model.geom_margin[self.arm_of >= 0] = config.notice
+        self.near = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        self.resting = self._pairs_below(robot.home, config.safe_self)
+
+    def rows(self, qpos: np.ndarray, drift: np.ndarray, tick: float, reaching: set[Limb]) -> tuple:
+        """Dampers `A dq <= b` over the joint displacements of one tick.
+
+        Args:
+            qpos: (7 + n,) present state.
+            drift: (6,) displacement of the base in the last tick, as MuJoCo's qvel times the tick.
+            tick: s.
+            reaching: palms that approach, hold or leave a contact; their hands may touch the world.
+
+        Returns:
+            A (k, n) and b (k,).
+        """
+        model, data, config = self.model, self.data, self.config
+        self._place(qpos)
+        found = []
+        for first, second, distance, normal, point in self._contacts():
+            if self._ignored(first, second, reaching):
+                continue
+            world = self.static[first] or self.static[second]
+            safe = config.safe_world if world else config.safe_self
+            found.append((distance - safe, first, second, normal, point))
+        found.sort(key=lambda item: item[0])
+        found = found[: config.max_rows]
+        matrix, bound = np.zeros((len(found), model.nv - 6)), np.zeros(len(found))
+        before, after = self.near
+        for row, (room, first, second, normal, point) in enumerate(found):
+            mujoco.mj_jac(model, data, before, None, point, model.geom_bodyid[first])
+            mujoco.mj_jac(model, data, after, None, point, model.geom_bodyid[second])
+            rate = normal @ (after - before)
+            matrix[row] = -rate[6:]
+            bound[row] = room * tick / config.time + rate[:6] @ drift
+        return matrix, bound
+
+    def _place(self, qpos: np.ndarray) -> None:
+        self.data.qpos[:] = qpos
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_collision(self.model, self.data)
+
+    def _contacts(self):
+        """Pairs of geoms within `notice`: the nearest point of each pair of geoms."""
+        contact = self.data.contact
+        nearest: dict[tuple[int, int], int] = {}
+        for index, (first, second) in enumerate(contact.geom.tolist()):
+            kept = nearest.get((first, second))
+            if kept is None or contact.dist[index] < contact.dist[kept]:
+                nearest[first, second] = index
+        for (first, second), index in nearest.items():
+            yield first, second, float(contact.dist[index]), contact.frame[index, :3], contact.pos[index]
+
+    def _ignored(self, first: int, second: int, reaching: set[Limb]) -> bool:
+        if self.arm_of[first] < 0 and self.arm_of[second] < 0:
+            return True
+        bodies = self.model.geom_bodyid[first], self.model.geom_bodyid[second]
+        if (min(bodies), max(bodies)) in self.resting:
+            return True
+        world = self.static[first] or self.static[second]
+        return world and any(self.hand[limb][first] or self.hand[limb][second] for limb in reaching)
+
+    def _pairs_below(self, qpos: np.ndarray, distance: float) -> set[tuple[int, int]]:
+        """Pairs of the robot's bodies nearer than a distance in a posture: neighbours, mostly."""
+        self._place(qpos)
+        pairs = set()
+        for first, second, apart, _, _ in self._contacts():
+            if apart < distance and not (self.static[first] or self.static[second]):
+                low, high = sorted((int(self.model.geom_bodyid[first]), int(self.model.geom_bodyid[second])))
+                pairs.add((low, high))
+        return pairs
+
+
+def _arm_of_geoms(robot: RobotModel, model: mujoco.MjModel) -> np.ndarray:
+    """(ngeom,) int; the palm whose arm a geom belongs to, -1 elsewhere. The trunk, below both arms, is no arm."""
+    chains = {limb: chain_to(model, robot.limbs[limb].body) for limb in robot.limbs}
+    arm = np.full(model.nbody, -1)
+    for palm in (limb for limb in PALMS if limb in chains):
+        others = {joint for limb, chain in chains.items() if limb != palm for joint in chain}
+        own = [joint for joint in chains[palm] if joint not in others]
+        if own:
+            root = int(model.jnt_bodyid[own[0]])
+            for body in range(root, model.nbody):
+                if body == root or arm[model.body_parentid[body]] == palm:
+                    arm[body] = palm
+    return arm[model.geom_bodyid]
