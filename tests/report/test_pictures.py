@@ -94,7 +94,7 @@ def test_the_camera_avoids_a_wall(run):
     for y in (1.0, -1.0):
         scene = mujoco.MjModel.from_xml_string(scene_of.format(wall.format(y)))
         view = follow(scene, qpos, times)
-        sides.append(np.sin(np.radians(view.azimuth + 180)))  # y of the camera from the robot
+        sides.append(-np.sin(np.radians(view.azimuth)))  # y of the camera from the robot
     assert sides[0] < 0 < sides[1]
 
 

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import rerun.blueprint as rrb
 
 from toolkit.report.motion_scene import TIMELINE
+from toolkit.report.views import best_direction
 
 
-def blueprint(start: np.ndarray, goal: np.ndarray, *, executed: bool, searched: bool) -> rrb.Blueprint:
+def blueprint(
+    model: mujoco.MjModel, way: np.ndarray, *, executed: bool, momenta: bool, searched: bool
+) -> rrb.Blueprint:
     """Big 3D view with the contact lanes below it on the left; curves in tabs and the text on the right.
 
     Args:
-        start: (3,) m and
-        goal: (3,) m: what the camera should have in view.
+        model: the world alone, for a camera that it does not hide the robot from.
+        way: (k, 3) m, k >= 2, points on the ground from start to goal.
         executed: whether there are measured curves.
+        momenta: whether there are planned or measured momenta.
         searched: whether there is a search to show.
 
     Returns:
@@ -23,35 +28,30 @@ def blueprint(start: np.ndarray, goal: np.ndarray, *, executed: bool, searched: 
     scene = rrb.Spatial3DView(
         origin="world",
         name="Scene",
-        eye_controls=_eye(start, goal),
+        eye_controls=_eye(model, way),
         overrides={"world/search": rrb.EntityBehavior(visible=False)},
         line_grid=False,
     )
     lanes = rrb.StateTimelineView(origin="contacts", name="Contacts, planned and measured")
-    momenta = [
-        _curves("linear_momentum", "Linear momentum [N s]"),
-        _curves("angular_momentum", "Angular momentum [N m s]"),
-    ]
+    tabs = []
     if executed:
-        tabs = [
-            rrb.Vertical(
-                _curves("tracking", "Tracking error [mm]"), _curves("slip", "Slip of each stance [mm]"), name="Tracking"
-            ),
-            rrb.Vertical(*momenta, name="Momenta"),
-            rrb.Vertical(
-                _curves("cop_margin", "CoP to the edge [mm]"), _curves("force", "Contact force [N]"), name="Contacts"
-            ),
-            rrb.Vertical(_curves("torque_ratio", "Largest torque / limit"), name="Torques"),
-        ]
-    else:
-        tabs = [rrb.Vertical(*momenta, name="Momenta")]
+        errors = _curves("tracking", "Tracking error [mm]"), _curves("slip", "Slip of each stance [mm]")
+        tabs.append(rrb.Vertical(*errors, name="Tracking"))
+    if momenta:
+        linear, angular = "Linear momentum [N s]", "Angular momentum [N m s]"
+        tabs.append(
+            rrb.Vertical(_curves("linear_momentum", linear), _curves("angular_momentum", angular), name="Momenta")
+        )
+    if executed:
+        contacts = _curves("cop_margin", "CoP to the edge [mm]"), _curves("force", "Contact force [N]")
+        tabs.append(rrb.Vertical(*contacts, name="Contacts"))
+        tabs.append(rrb.Vertical(_curves("torque_ratio", "Largest torque / limit"), name="Torques"))
     if searched:
         bars = rrb.BarChartView(origin="search/best_cost", name="Cost of the best solution over the search's seconds")
         solutions = rrb.TextDocumentView(origin="search/solutions", name="Solutions")
         tabs.append(rrb.Vertical(bars, solutions, name="Search"))
-    right = rrb.Vertical(
-        rrb.Tabs(*tabs, active_tab=0), rrb.TextDocumentView(origin="summary", name="Verdict"), row_shares=[3, 2]
-    )
+    text = rrb.TextDocumentView(origin="summary", name="Verdict")
+    right = rrb.Vertical(rrb.Tabs(*tabs, active_tab=0), text, row_shares=[3, 2]) if tabs else text
     return rrb.Blueprint(
         rrb.Horizontal(rrb.Vertical(scene, lanes, row_shares=[7, 2]), right, column_shares=[3, 2]),
         rrb.BlueprintPanel(state="collapsed"),
@@ -66,13 +66,13 @@ def _curves(entity: str, name: str) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(origin=f"series/{entity}", name=name, plot_legend=rrb.PlotLegend(visible=True))
 
 
-def _eye(start: np.ndarray, goal: np.ndarray) -> rrb.EyeControls3D:
-    """A camera to the right of the way from start to goal that has both in view."""
-    way = np.array(goal[:2]) - start[:2]
-    length = float(np.linalg.norm(way))
-    ahead = way / length if length > 0.1 else np.array([1.0, 0.0])
-    side = np.array([ahead[1], -ahead[0]])
-    middle = np.array([*(start[:2] + goal[:2]) / 2, (start[2] + goal[2]) / 2 + 0.7])
-    distance = 2.3 + 0.75 * length
-    position = middle + distance * np.array([*(0.8 * side + 0.45 * ahead), 0.38])
-    return rrb.EyeControls3D(position=position, look_target=middle, eye_up=(0.0, 0.0, 1.0))
+def _eye(model: mujoco.MjModel, way: np.ndarray) -> rrb.EyeControls3D:
+    """A camera beside the way that has all of it in view, on the side that the world hides least."""
+    ahead = way[-1, :2] - way[0, :2]
+    length = float(np.linalg.norm(ahead))
+    heading = float(np.arctan2(ahead[1], ahead[0])) if length > 0.1 else 0.0
+    middle = (way.min(0) + way.max(0)) / 2 + [0.0, 0.0, 0.7]
+    distance = 2.6 + 0.8 * length
+    seen = np.concatenate([way + [0.0, 0.0, 0.9], way + [0.0, 0.0, 0.1]])
+    direction = best_direction(model, seen, middle, heading, distance, (22.0, 40.0, 60.0))
+    return rrb.EyeControls3D(position=middle + distance * direction, look_target=middle, eye_up=(0.0, 0.0, 1.0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -10,14 +9,11 @@ import imageio_ffmpeg
 import mujoco
 import numpy as np
 
-from toolkit.report.meshes import static_bodies
 from toolkit.report.offscreen import OffscreenRenderer, Patches
+from toolkit.report.views import best_direction
 
 DISTANCE = 2.7  # m from the robot to the camera
-VIEWS = [
-    (side * angle, elevation) for elevation in (-14.0, -35.0, -60.0) for angle in (65, 110, 150, 25) for side in (-1, 1)
-]
-"""Views (degrees from the heading, elevation) in order of preference."""
+ELEVATIONS = (14.0, 35.0, 60.0)  # degrees
 
 
 def strip(
@@ -104,12 +100,13 @@ class follow:
         if np.linalg.norm(way) < 0.3:
             w, x, y, z = qpos[0, _base(scene).stop : _base(scene).stop + 4]
             way = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z)])
-        heading = np.degrees(np.arctan2(way[1], way[0]))
-        # MuJoCo's azimuth is the direction in which the camera looks.
-        views = [(heading + 180 + angle, elevation) for angle, elevation in VIEWS]
+        heading = float(np.arctan2(way[1], way[0]))
         samples = self._target[:: max(len(times) // 12, 1)]
-        hidden = [sum(_hidden(scene, samples, view)) for view in views]
-        self.azimuth, self.elevation = views[int(np.argmin(hidden))]
+        seen = np.concatenate([samples, samples - [0.0, 0.0, 0.5]])
+        way = best_direction(scene, seen, np.tile(samples, (2, 1)), heading, DISTANCE, ELEVATIONS)
+        # MuJoCo's azimuth and elevation are those of the direction in which the camera looks.
+        self.azimuth = np.degrees(np.arctan2(-way[1], -way[0]))
+        self.elevation = -np.degrees(np.arcsin(way[2]))
 
     def __getitem__(self, index: int) -> mujoco.MjvCamera:
         camera = mujoco.MjvCamera()
@@ -131,23 +128,3 @@ def _smoothed(position: np.ndarray, times: np.ndarray, span: float) -> np.ndarra
     first = np.searchsorted(times, times - span / 2)
     last = np.searchsorted(times, times + span / 2, side="right")
     return (total[last] - total[first]) / (last - first)[:, None]
-
-
-def _hidden(scene: mujoco.MjModel, targets: np.ndarray, view: tuple[float, float]) -> Iterator[float]:
-    """For each target (k, 3), the share of the way to the camera behind the first static geom."""
-    data = mujoco.MjData(scene)
-    mujoco.mj_kinematics(scene, data)
-    azimuth, elevation = np.radians(view)
-    back = -np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
-    static, hit = static_bodies(scene)[scene.geom_bodyid], np.zeros(1, np.int32)
-    for target in targets:
-        origin, length = target.copy(), DISTANCE
-        while length > 0:
-            distance = mujoco.mj_ray(scene, data, origin, back, None, True, -1, hit)
-            if distance < 0 or distance >= length:
-                length = 0.0
-            elif static[hit[0]]:
-                break
-            else:  # the robot itself: go on behind it
-                origin, length = origin + (distance + 1e-4) * back, length - distance - 1e-4
-        yield length / DISTANCE

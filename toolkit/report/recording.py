@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -76,12 +77,12 @@ def write_recording(
     if schedule is None and sequence is not None:
         schedule = ContactSchedule.of(sequence)
     executed = execution is not None and len(execution.tick_times) > 0
+    feasible = motion is not None and motion.feasible
 
     stream = start_recording(path, APPLICATION, f"{robot.name} in {world.name}")
     try:
-        stream.send_blueprint(
-            blueprint(world.start.position, world.goal.position, executed=executed, searched=search is not None)
-        )
+        shown = {"executed": executed, "momenta": executed or feasible, "searched": search is not None}
+        stream.send_blueprint(blueprint(world.mujoco_model, _way(world, sequence), **shown))
         stream.log("summary", rr.TextDocument(summary(report), media_type=rr.MediaType.MARKDOWN), static=True)
         draw_scene(stream, world.mujoco_model)
         draw_surfaces(stream, world.surfaces)
@@ -111,7 +112,7 @@ def write_recording(
         if search is not None:
             text = rr.TextDocument(search_summary(search), media_type=rr.MediaType.MARKDOWN)
             stream.log("search/solutions", text, static=True)
-            draw_search(stream, search, _ground(world, sequence))
+            draw_search(stream, search, _heights(_way(world, sequence)))
     finally:
         stream.disconnect()
 
@@ -137,18 +138,19 @@ def _draw_robot(
         draw_motion(stream, robot.mujoco_model, np.zeros(1), standing(robot, feet))
 
 
-class _ground:
-    """Height of the nearest planned contact of a foot, or of the start: where to draw points of the plane."""
+def _way(world: World, sequence: ContactSequence | None) -> np.ndarray:
+    """(k, 3) m: the mean feet of each stance and the goal, or a straight line from start to goal."""
+    goal = np.array(world.goal.position, float)
+    if sequence is not None and sequence.transitions:
+        return np.array([*(stance.mean_feet.position for stance in sequence.stances), goal])
+    return np.linspace(world.start.position, goal, 8)
 
-    def __init__(self, world: World, sequence: ContactSequence | None):
-        points = [world.start.position]
-        if sequence is not None:
-            points = [contact.pose.position for contact in sequence.start.contacts if contact.limb.is_foot]
-            made = [t.contact for t in sequence.transitions if t.contact is not None and t.limb.is_foot]
-            points += [contact.pose.position for contact in made]
-        self.points = np.array(points)
 
-    def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Heights (n,) m for points (n, 2)."""
-        distance = np.linalg.norm(points[:, None] - self.points[None, :, :2], axis=-1)
-        return self.points[distance.argmin(1), 2]
+def _heights(way: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Height in m of the point of the way nearest to each of (n, 2) points: where to draw points of the plane."""
+
+    def heights(points: np.ndarray) -> np.ndarray:
+        distance = np.linalg.norm(points[:, None] - way[None, :, :2], axis=-1)
+        return way[distance.argmin(1), 2]
+
+    return heights

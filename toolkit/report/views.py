@@ -1,0 +1,62 @@
+"""Where to look from: the camera side that the world hides least."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from toolkit.report.meshes import SHOWN_GROUPS, static_bodies
+
+ANGLES = (65.0, 110.0, 150.0, 25.0)
+"""Degrees between the heading and the direction to the camera, in order of preference; either side."""
+
+
+def best_direction(
+    model: mujoco.MjModel,
+    targets: np.ndarray,
+    pivots: np.ndarray,
+    heading: float,
+    distance: float,
+    elevations: tuple[float, ...],
+) -> np.ndarray:
+    """Direction from what is looked at to the camera.
+
+    Args:
+        model: compiled scene; only its static geoms hide anything.
+        targets: (k, 3) m, points that should be seen.
+        pivots: (k, 3) or (3,) m, what the camera turns about when it looks at each of them.
+        heading: rad, the way the robot goes.
+        distance: m from pivot to camera.
+        elevations: degrees above the horizon, in order of preference (after the least hidden).
+
+    Returns:
+        (3,) unit vector.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    directions = []
+    for elevation in np.radians(elevations):
+        for angle in np.radians(ANGLES):
+            for azimuth in (heading - angle, heading + angle):
+                flat = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
+                directions.append(np.array([*flat, np.sin(elevation)]))
+    pairs = list(zip(targets, np.broadcast_to(pivots, targets.shape), strict=True))
+    hidden = [sum(is_hidden(model, data, x, pivot + distance * way) for x, pivot in pairs) for way in directions]
+    return directions[int(np.argmin(hidden))]
+
+
+def is_hidden(model: mujoco.MjModel, data: mujoco.MjData, target: np.ndarray, camera: np.ndarray) -> bool:
+    """Whether a visible static geom is between two points (3,) m; `data` holds the geoms' poses."""
+    static = static_bodies(model)[model.geom_bodyid]
+    groups = np.isin(np.arange(mujoco.mjNGROUP), list(SHOWN_GROUPS)).astype(np.uint8)
+    hit, origin = np.zeros(1, np.int32), np.array(target, float)
+    remaining = float(np.linalg.norm(camera - target))
+    way = (camera - target) / max(remaining, 1e-9)
+    while remaining > 0:
+        distance = mujoco.mj_ray(model, data, origin, way, groups, True, -1, hit)
+        if distance < 0 or distance >= remaining:
+            return False
+        if static[hit[0]]:
+            return True
+        origin, remaining = origin + (distance + 1e-4) * way, remaining - distance - 1e-4  # on behind the robot
+    return False
