@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolkit.contacts.projection import Projected, ProjectionConfig, Projector
-from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.contacts.transition_model import TransitionModel, steps_38, steps_60, wide_steps
 from toolkit.errors import InputError, PlanningError
@@ -25,7 +25,7 @@ from toolkit.search.problem import ContactProblem, CostConfig
 from toolkit.search.result import SearchResult, Solution
 from toolkit.search.start import place_feet
 from toolkit.search.state import COM, CONTACTS, VELOCITY, unpack
-from toolkit.search.terrain_distance import TerrainDistance
+from toolkit.search.terrain_distance import TerrainDistance, resting_surfaces
 from toolkit.world.timing import Timing
 from toolkit.world.world import World
 
@@ -41,6 +41,8 @@ class PlannerConfig:
         palms: whether palms may be used.
         heuristic: "grid" or "euclidean".
         timings: of a transition, to choose from; empty: the world's.
+        rest_friction: ground steeper than this part of its friction angle's tangent holds no foot at all; None: the
+            evaluator decides.
         cost: edge costs.
         moves: kinematic limits.
         projection: how patches find their place.
@@ -54,6 +56,7 @@ class PlannerConfig:
     palms: bool = True
     heuristic: str = "grid"
     timings: tuple[Timing, ...] = ()
+    rest_friction: float | None = None
     cost: CostConfig = field(default_factory=CostConfig)
     moves: MoveConfig = field(default_factory=MoveConfig)
     projection: ProjectionConfig = field(default_factory=ProjectionConfig)
@@ -90,15 +93,19 @@ class ContactPlanner:
     ):
         self.robot, self.world, self.config = robot, world, config or PlannerConfig()
         self._evaluator, self._goal_evaluator = evaluator, goal_evaluator
-        self._projector = Projector(robot, world.surfaces, world.mujoco_model, self.config.projection)
-        self._terrain = TerrainDistance(robot, world, self._projector, self.config.grid)
+        projection, grid = self.config.projection, self.config.grid
+        self._projector = Projector(
+            robot, resting_surfaces(world.surfaces, self.config.rest_friction), world.mujoco_model, projection
+        )
+        self._terrain = TerrainDistance(robot, world, self._projector, grid)
         self._timings = self.config.timings or (world.timing,)
         self._warm_up()
 
     def _warm_up(self) -> None:
+        """Compile or load what is compiled."""
         moves, table = self._generator(wide=False)
         ground = self._projector.table
-        surface = np.flatnonzero(ground.foot)[:1]
+        surface = np.zeros(1, int)
         sole = Projected(surface, ground.origin[surface], ground.rotation[surface])
         moves.warm_up(int(table.add(Limb.RIGHT_FOOT, sole)[0]))
 
@@ -170,6 +177,9 @@ class ContactPlanner:
             self.config.palms,
             self.config.cost,
         )
+        # What an evaluator compiles or loads at its first query is not part of the search.
+        standing = ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], self._timings[0])
+        self._evaluator.evaluate(start, com, np.zeros(3), [standing])
         judge = None if self._goal_evaluator is None else _goal_judge(problem, self._goal_evaluator, self.config.cost)
         result = AnaStar(problem, rng, self.config.search, judge).run(time_limit, observer)
         expanded = problem.feet(unpack(result.expanded)[:, CONTACTS]) if result.expanded else (np.zeros((0, 3)), [])
@@ -222,6 +232,11 @@ class ContactPlanner:
             distance = self._terrain.distance(start.mean_feet, strides[choice])
             if distance is not None:
                 return distance, choice
+        if self.config.rest_friction is not None:
+            every = Projector(self.robot, self.world.surfaces, self.world.mujoco_model, self.config.projection)
+            terrain = TerrainDistance(self.robot, self.world, every, self.config.grid)
+            if terrain.distance(start.mean_feet, strides[choices[-1]]) is not None:
+                raise PlanningError(terrain.too_steep(self.config.rest_friction))
         raise PlanningError(self._terrain.obstacle(start.mean_feet, strides[choices[-1]]))
 
 

@@ -153,11 +153,13 @@ class ContactProblem:
         return (table.position[left] + table.position[right]) / 2, yaw
 
     def heuristic(self, states: Sequence[bytes]) -> np.ndarray:
-        """See `SearchProblem`; Eq. 5 of the paper."""
+        """See `SearchProblem`; Eq. 5 of the paper, with at least one transition where the goal is not reached."""
         return self._to_go(*self.feet(unpack(states)[:, CONTACTS]))
 
     def _to_go(self, centre: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        return self._distance(centre, yaw) * (1.0 + self._config.step / self._longest)
+        distance = self._distance(centre, yaw)
+        transitions = np.maximum(distance / self._longest, ~self._at_goal(centre))
+        return distance + self._config.step * transitions
 
     def is_goal(self, states: Sequence[bytes]) -> np.ndarray:
         """See `SearchProblem`."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from toolkit.contacts.projection import Projector
@@ -9,9 +12,30 @@ from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
 from toolkit.search.heuristic import GridConfig, GridDistance
 from toolkit.search.occupancy import BodyBox, Occupancy
+from toolkit.world.surface import Surface
 from toolkit.world.world import World
 
 _DETOURS = (2.0, 8.0)  # m around start and goal that the grid covers: the larger one where the smaller has no way
+
+
+def resting_surfaces(surfaces: Sequence[Surface], friction: float | None) -> tuple[Surface, ...]:
+    """Surfaces, of which those no longer serve feet that are too steep for a foot to rest on.
+
+    Args:
+        surfaces: of a world.
+        friction: part of the friction coefficients that may be used; None: nothing changes.
+    """
+    if friction is None:
+        return tuple(surfaces)
+    return tuple(
+        replace(surface, serves_foot=surface.serves_foot and _steepness(surface) <= friction * surface.friction)
+        for surface in surfaces
+    )
+
+
+def _steepness(surface: Surface) -> float:
+    """Tangent of the angle between the surface and the horizontal."""
+    return float(np.tan(np.arccos(np.clip(surface.normal[2], 1e-6, 1.0))))
 
 
 class TerrainDistance:
@@ -93,6 +117,19 @@ class TerrainDistance:
         return (
             f"{head}: the ground is interrupted by a gap wider than the longest step ({stride:.2g} m) or a rise higher "
             f"than {self._config.climb:.2g} m; bring the surfaces closer together"
+        )
+
+    def too_steep(self, friction: float) -> str:
+        """One line on why nothing leads to the goal for a robot whose feet must rest."""
+        world = self._world
+        steep = [s for s in world.surfaces if s.serves_foot and _steepness(s) > friction * s.friction]
+        worst = max(steep, key=lambda surface: _steepness(surface) / surface.friction)
+        angle, most = np.degrees(np.arctan([_steepness(worst), worst.friction]))
+        x, y = world.goal.position[:2]
+        return (
+            f"{world.path}: nothing leads to the goal at ({x:.3g}, {y:.3g}) in static balance: the ground on the way "
+            f"is steeper than its friction angle ('{worst.geom}': {angle:.3g} deg, friction {worst.friction:g} holds "
+            f"{most:.3g} deg), so that no foot can rest on it; a planner that knows dynamics may cross it"
         )
 
     def has_slippery_ground(self) -> bool:
