@@ -38,12 +38,14 @@ def main(argv: list[str] | None = None) -> int:
         InputError: the recording cannot be written.
     """
     args = arguments().parse_args(argv)
+    # The viewer's library takes a second to import: mistakes in the world are reported before.
     from toolkit.errors import InputError
-    from toolkit.report.console import make_console
-    from toolkit.report.surfaces import surface_table, write_surface_recording
     from toolkit.world.loader import load_world
 
     world = load_world(args.world)
+    from toolkit.report.console import make_console
+    from toolkit.report.surfaces import surface_table, write_surface_recording
+
     console = make_console()
     console.print(surface_table(world))
     if args.out is None:

@@ -153,7 +153,7 @@ def test_height_field(make_world, rows, columns):
 
 def test_rough_height_field_is_split_as_mujoco_splits_it(make_world):
     rng = np.random.default_rng(3)
-    height = rng.uniform(0, 1, (6, 6)).repeat(1)
+    height = rng.uniform(0, 1, 36)
     asset = (
         '<hfield name="h" nrow="6" ncol="6" size="1.5 1.5 0.4 0.1" elevation="'
         + " ".join(f"{value:.6f}" for value in height)
@@ -163,8 +163,9 @@ def test_rough_height_field_is_split_as_mujoco_splits_it(make_world):
     assert len(tops(world)) > 30
     for surface in tops(world):
         points = random_points(surface, rng, 5, inset=0.01)
-        np.testing.assert_allclose(ray_gap(world.mujoco_model, surface, points), 0, atol=1e-6)
-        np.testing.assert_allclose(ball_gap(world.mujoco_model, surface, points), 0, atol=1e-5)
+        # Triangles of a facet may lie 1.5 mm off its plane; the wrong diagonal would be off by centimetres.
+        np.testing.assert_allclose(ray_gap(world.mujoco_model, surface, points), 0, atol=1.6e-3)
+        np.testing.assert_allclose(ball_gap(world.mujoco_model, surface, points), 0, atol=1.6e-3)
 
 
 def test_box_on_the_floor_leaves_a_hole(make_world):

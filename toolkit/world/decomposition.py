@@ -12,8 +12,8 @@ from shapely.geometry import Polygon
 from toolkit.world.convex import convex_partition
 from toolkit.world.facets import Facet, find_facets
 
-FACET_ANGLE = np.radians(1.0)  # triangles of one facet: normals within this of the first triangle's
-FACET_DISTANCE = 1e-3  # m; and corners within this of its plane
+FACET_ANGLE = np.radians(3.0)  # triangles of one facet: normals within this of the first triangle's
+FACET_DISTANCE = 1.5e-3  # m; and corners within this of its plane
 
 _DEPTH = 0.06  # m; thickness of a part where the mesh is thick enough
 _LEAST_DEPTH = 2e-3  # m; and where it is not

@@ -63,9 +63,9 @@ def extract_surfaces(
     Returns:
         Surfaces that serve feet or palms, in the order of the geoms.
     """
-    faces = [
-        face for face in faces_of(source, square=square, least_area=1e-5) if any(_serves(face.frame.normal, config))
-    ]
+    least = min(config.foot_area, config.palm_area) / 3  # flush faces of several geoms may be large enough together
+    faces = faces_of(source, square=square, least_area=least)
+    faces = [face for face in faces if any(_serves(face.frame.normal, config))]
     surfaces: list[Surface] = []
     for face in _merged(faces, config):
         foot, palm = _serves(face.frame.normal, config)
@@ -104,7 +104,7 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
     As with facets, what is joined is measured against the largest face of the group: a chain of slightly raised
     tiles does not become one surface.
     """
-    if len(faces) < 2:
+    if len({face.geom for face in faces}) < 2:
         return faces
     normals = np.array([face.frame.normal for face in faces])
     friction = np.array([face.friction for face in faces])

@@ -42,7 +42,7 @@ def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) ->
     Args:
         source: the world's scene.
         square: (xmin, ymin, xmax, ymax), m; infinite planes are cut to it.
-        least_area: m^2; smaller faces of meshes and height fields are left out.
+        least_area: m^2; smaller faces are left out.
 
     Returns:
         Faces in the order of the geoms. Spheres, capsules, ellipsoids and the sides of cylinders and of height fields
@@ -59,14 +59,16 @@ def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) ->
             found = [(facet.frame, facet.polygon) for facet in source.facets[label]] if label not in done else []
             done.add(label)
         else:
-            found = _local_faces(model, data, index, pose, square)
+            found = _local_faces(model, data, index, pose, square, least_area)
         for frame, polygon in found:
             if polygon.area > least_area:
                 faces.append(Face(label, friction, frame, polygon))
     return faces
 
 
-def _local_faces(model, data, index: int, pose: Pose, square: tuple[float, ...]) -> list[tuple[Pose, Polygon]]:
+def _local_faces(
+    model, data, index: int, pose: Pose, square: tuple[float, ...], least_area: float
+) -> list[tuple[Pose, Polygon]]:
     """(world_from_face, outline) of a geom's faces."""
     types, size = mujoco.mjtGeom, model.geom_size[index]
     kind = model.geom_type[index]
@@ -90,7 +92,7 @@ def _local_faces(model, data, index: int, pose: Pose, square: tuple[float, ...])
         hull = trimesh.Trimesh(pose @ points, triangles, process=False)
     else:
         return []
-    facets = find_facets(hull, angle=FACET_ANGLE, distance=FACET_DISTANCE)
+    facets = find_facets(hull, angle=FACET_ANGLE, distance=FACET_DISTANCE, least_area=least_area)
     return [(facet.frame, facet.polygon) for facet in facets]
 
 

@@ -43,7 +43,7 @@ def plane_frame(origin: np.ndarray, normal: np.ndarray) -> Pose:
     return Pose(np.stack([x, np.cross(normal, x), normal], axis=1), np.asarray(origin, float))
 
 
-def find_facets(mesh: trimesh.Trimesh, *, angle: float, distance: float) -> list[Facet]:
+def find_facets(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_area: float = 0.0) -> list[Facet]:
     """Split a mesh into its flat facets.
 
     Each facet grows from its largest triangle over shared edges. A triangle joins if its normal is within `angle` of
@@ -54,6 +54,7 @@ def find_facets(mesh: trimesh.Trimesh, *, angle: float, distance: float) -> list
         mesh: vertices merged; degenerate triangles are left out.
         angle: rad.
         distance: m.
+        least_area: m^2; smaller facets are left out.
 
     Returns:
         Facets, ordered by their first triangle's area, largest first.
@@ -83,7 +84,8 @@ def find_facets(mesh: trimesh.Trimesh, *, angle: float, distance: float) -> list
                     free[other] = False
                     group.append(other)
                     stack.append(other)
-        facets.append(_facet(corners[group], normals[group], area[group], np.sort(np.array(group))))
+        if area[group].sum() >= least_area:
+            facets.append(_facet(corners[group], normals[group], area[group], np.sort(np.array(group))))
     return facets
 
 

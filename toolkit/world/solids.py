@@ -22,6 +22,7 @@ class Solids:
 
     Attributes:
         points: (n, 3) float, m; vertices in the world frame, solid after solid.
+        low, high: (s, 3) float, m; boxes around the solids, along the axes of the world.
         edges: (k, 2) int; pairs of vertices. All of a solid's convex edges are among them.
         edge_solid: (k,) int; solid of each edge, ascending.
         point_solid: (n,) int; solid of each vertex, ascending.
@@ -30,6 +31,8 @@ class Solids:
     """
 
     points: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
     edges: np.ndarray
     edge_solid: np.ndarray
     point_solid: np.ndarray
@@ -47,16 +50,16 @@ class Solids:
         Returns:
             (s,) object array of shapely polygons in the plane's xy, one per solid that fills an area.
         """
-        local = frame.inverse() @ self.points
-        start = np.flatnonzero(np.diff(self.point_solid, prepend=-1))
-        least, most = np.minimum.reduceat(local, start), np.maximum.reduceat(local, start)
-        near = (most[:, 2] > low) & (least[:, 2] < high)
-        near &= (most[:, 0] > bounds[0]) & (least[:, 0] < bounds[2])
-        near &= (most[:, 1] > bounds[1]) & (least[:, 1] < bounds[3])
-        chosen = near[self.edge_solid]
-        if not chosen.any():
+        x0, y0, x1, y1 = bounds
+        room = frame @ np.array([[x, y, z] for x in (x0, x1) for y in (y0, y1) for z in (low, high)])
+        near = (self.high > room.min(axis=0)).all(axis=1) & (self.low < room.max(axis=0)).all(axis=1)
+        if not near.any():
             return np.empty(0, object)
-        ends, solid = local[self.edges[chosen]], self.edge_solid[chosen]
+        points = np.flatnonzero(near[self.point_solid])
+        local = np.empty_like(self.points)
+        local[points] = frame.inverse() @ self.points[points]
+        edges = np.flatnonzero(near[self.edge_solid])
+        ends, solid = local[self.edges[edges]], self.edge_solid[edges]
         height = ends[:, :, 2]
         rise = height[:, 1] - height[:, 0]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -102,11 +105,15 @@ def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
             meshes.append((pose @ points, faces, edges))
     if not meshes:
         empty = np.zeros((0, 3))
-        return Solids(empty, np.zeros((0, 2), int), np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3), int))
+        return Solids(
+            empty, empty, empty, np.zeros((0, 2), int), np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3), int)
+        )
     counts = np.array([len(points) for points, _, _ in meshes])
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     return Solids(
         np.concatenate([points for points, _, _ in meshes]),
+        np.array([points.min(axis=0) for points, _, _ in meshes]),
+        np.array([points.max(axis=0) for points, _, _ in meshes]),
         np.concatenate([edges + at for at, (_, _, edges) in zip(first, meshes, strict=True)]),
         np.repeat(np.arange(len(meshes)), [len(edges) for _, _, edges in meshes]),
         np.repeat(np.arange(len(meshes)), counts),
