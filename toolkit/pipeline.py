@@ -101,6 +101,7 @@ class PipelineConfig:
         time_limit: s for the contact search; the search also ends after its own number of expansions, so that the
             same seed gives the same plan on any machine fast enough.
         candidates: most contact sequences to test before giving up.
+        until: last stage that tests a sequence: "dynamics" for the plan alone, "wholebody", or "execution".
         initial_rest, final_rest: s at rest before the first transition and after the last one.
         sequence, wholebody, execution: settings of the stages.
     """
@@ -108,6 +109,7 @@ class PipelineConfig:
     seed: int = 0
     time_limit: float = 30.0
     candidates: int = 6
+    until: str = "execution"
     initial_rest: float = 0.4
     final_rest: float = 1.0
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
@@ -117,19 +119,23 @@ class PipelineConfig:
 
 @dataclass(frozen=True)
 class Trial:
-    """One contact sequence and how far it came; later stages are None where an earlier one rejected it."""
+    """One contact sequence and how far it came; later stages are None where an earlier one rejected it.
+
+    Attributes:
+        solution: the contact sequence.
+        schedule: when its contacts hold.
+        passed: whether every stage that was asked for passed; of the execution, every check.
+        motion, trajectory, execution: results of the stages.
+        reason: one line where it did not pass, else "".
+    """
 
     solution: Solution
     schedule: ContactSchedule
+    passed: bool = False
     motion: CentroidalMotion | None = None
     trajectory: WholeBodyTrajectory | None = None
     execution: Execution | None = None
     reason: str = ""
-
-    @property
-    def passed(self) -> bool:
-        """Whether the execution was measured and every check of it passed."""
-        return self.execution is not None and all(check.result == Result.PASS for check in self.execution.checks)
 
     @property
     def stages_passed(self) -> int:
@@ -178,13 +184,18 @@ def test_solution(
     motion = optimise(robot, schedule, initial_com(robot, start), np.zeros(3), config=config.sequence)
     observer.finished("dynamics", motion.feasible, motion.seconds, motion.status)
     if not motion.feasible:
-        return Trial(solution, schedule, motion, reason=f"no feasible centroidal motion: {motion.status}")
+        return Trial(solution, schedule, False, motion, reason=f"no feasible centroidal motion: {motion.status}")
+    if config.until == "dynamics":
+        return Trial(solution, schedule, True, motion)
 
     observer.started("wholebody")
     trajectory = whole_body(robot, world, schedule, motion, config.wholebody)
     observer.finished("wholebody", trajectory.feasible, trajectory.seconds, trajectory.reason)
     if not trajectory.feasible:
-        return Trial(solution, schedule, motion, trajectory, reason=f"no whole-body motion: {trajectory.reason}")
+        reason = f"no whole-body motion: {trajectory.reason}"
+        return Trial(solution, schedule, False, motion, trajectory, reason=reason)
+    if config.until == "wholebody":
+        return Trial(solution, schedule, True, motion, trajectory)
 
     observer.started("execution")
     began = time.perf_counter()
@@ -199,13 +210,16 @@ def test_solution(
         rng=np.random.default_rng([config.seed, 1]),
         observer=lambda fraction, detail="": observer.progress("execution", fraction, detail),
     )
-    trial = Trial(solution, schedule, motion, trajectory, execution, failure(execution))
+    reason = failure(execution)
+    trial = Trial(solution, schedule, not reason, motion, trajectory, execution, reason)
     observer.finished("execution", trial.passed, time.perf_counter() - began, trial.reason)
     return trial
 
 
 def failure(execution: Execution) -> str:
-    """One line on the first check that did not pass, "" where all did."""
+    """One line on the first check that did not pass, "" where all were measured and did."""
+    if not execution.checks:
+        return "nothing was checked"
     if execution.fell:
         return f"the robot fell: {execution.fall_reason}"
     for check in execution.checks:

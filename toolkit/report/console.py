@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from toolkit.search.result import SearchResult, Solution
 from toolkit.simulation.check import Check, Result
 
 STYLES = {Result.PASS: "bold green", Result.FAIL: "bold red", Result.NOT_CHECKED: "yellow"}
@@ -123,4 +124,23 @@ def check_table(checks: Sequence[Check]) -> Table:
         value = "-" if check.value is None else f"{check.value:.4g}"
         result = Text(check.result.value, style=STYLES[check.result])
         table.add_row(Text(check.name), value, f"{check.limit:.4g}", check.unit, result)
+    return table
+
+
+def solution_table(search: SearchResult, chosen: Solution | None) -> Table:
+    """The sequences that a search found, oldest first, the chosen one marked."""
+    table = Table(box=box.SIMPLE, pad_edge=False)
+    for name in ("found after", "transitions", "with palms", "cost", "at most x optimal"):
+        table.add_column(name, justify="right")
+    table.add_column("")
+    for solution in search.solutions:
+        transitions = solution.sequence.transitions
+        table.add_row(
+            f"{solution.seconds:.3f} s",
+            str(len(transitions)),
+            str(sum(not transition.limb.is_foot for transition in transitions)),
+            f"{solution.cost:.2f}",
+            f"{solution.bound:.2f}",
+            "chosen" if solution is chosen else "",
+        )
     return table

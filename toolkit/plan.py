@@ -1,0 +1,74 @@
+"""Command line: the plan alone, without whole-body motion and simulation."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from toolkit import cli
+
+DESCRIPTION = """\
+Search for a contact sequence through a world and optimise its centroidal motion.
+
+The anytime search finds a first sequence quickly and improves it until its budget is spent; the sequences are then
+optimised as a whole, newest (cheapest) first, until one is dynamically feasible. To see whether the robot can carry it
+out, run python -m toolkit.validate.
+"""
+
+EPILOG = """\
+examples:
+  python -m toolkit.plan worlds/stairs.xml
+  python -m toolkit.plan my_world.xml --planner quasi-static --time-limit 5
+
+written into the output folder: report.json, plan.json, motion.npz, recording.rrd, plan.png (seen from above)
+"""
+
+
+def arguments() -> argparse.ArgumentParser:
+    """The options of this command."""
+    parser = cli.parser("plan", DESCRIPTION, EPILOG)
+    parser.add_argument("world", type=Path, help="MJCF scene with sites named start and goal")
+    cli.add_robot_options(parser)
+    cli.add_planning_options(parser)
+    parser.add_argument("--out", type=Path, help="output folder (default: runs/<world>-<robot>-<time>)")
+    parser.add_argument("--no-recording", action="store_true", help="leave the rerun recording out")
+    parser.set_defaults(pictures=True)
+    return parser
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    args = arguments().parse_args(argv)
+    # Heavy imports come after the options, so that --help and mistakes in them answer at once.
+    from toolkit import pipeline
+    from toolkit.report.console import StageConsole, solution_table
+    from toolkit.report.files import RunFolder
+    from toolkit.report.run import write_run
+    from toolkit.robot.loader import load_robot
+    from toolkit.search.options import planner_config
+    from toolkit.world.loader import load_world
+
+    began = time.perf_counter()
+    display = StageConsole()
+    world = load_world(args.world)
+    surface_seconds = time.perf_counter() - began
+    robot = load_robot(args.robot, args.robots)
+    folder = RunFolder(args.out, world.name, robot.name)
+    display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
+    planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
+    config = pipeline.PipelineConfig(
+        seed=args.seed, time_limit=args.time_limit, candidates=sys.maxsize, until="dynamics"
+    )
+    result = pipeline.run(robot, world, planner, config, display)
+    with folder:
+        write_run(folder.path, result, args, surface_seconds)
+    if result.search.solutions:
+        display.console.print(solution_table(result.search, result.trial.solution if result.trial else None))
+    display.verdict((), result.passed, result.reason, folder.target, time.perf_counter() - began)
+    return 0 if result.passed else 1
+
+
+if __name__ == "__main__":
+    cli.run(main)
