@@ -1,6 +1,8 @@
 """Pictures show something, and a machine that cannot render says what to install."""
 
+import os
 import subprocess
+import sys
 from dataclasses import replace
 
 import imageio.v3 as iio
@@ -11,7 +13,7 @@ import pytest
 
 from toolkit.errors import InputError
 from toolkit.geometry.limb import Limb
-from toolkit.report.offscreen import OffscreenRenderer, Patches, open_context, require_rendering
+from toolkit.report.offscreen import OffscreenRenderer, Patches, require_rendering, working_backend
 from toolkit.report.pictures import follow, strip, video
 from toolkit.report.plots import draw_plots
 from toolkit.report.top_view import draw_top_view
@@ -75,13 +77,30 @@ def test_the_model_is_not_changed_by_rendering_it_large(run, rendering):
     assert run.execution.scene.vis.global_.offwidth == before
 
 
-def test_osmesa_takes_over_where_egl_fails(rendering):
-    open_context(16, 16, backends=("no_such_backend", "egl")).free()
+def test_the_next_backend_takes_over_where_one_fails(rendering):
+    first = working_backend()
+    assert working_backend(("no_such_backend", first)) == first
+
+
+def test_osmesa_renders_where_egl_does_not(rendering):
+    code = """
+import mujoco
+from toolkit.report.offscreen import OffscreenRenderer
+model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><light pos='0 0 3'/><geom size='1'/></worldbody></mujoco>")
+with OffscreenRenderer(model, 32, 32) as renderer:
+    assert renderer.render(model.qpos0, mujoco.MjvCamera()).std() > 5
+"""
+    environment = {name: value for name, value in os.environ.items() if name not in ("MUJOCO_GL", "PYOPENGL_PLATFORM")}
+    environment["__EGL_VENDOR_LIBRARY_DIRS"] = "/nonexistent"
+    outcome = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    if "osmesa" in outcome.stderr and "cannot render off screen" in outcome.stderr:
+        pytest.skip("no OSMesa library here")
+    assert outcome.returncode == 0, outcome.stderr
 
 
 def test_a_machine_that_cannot_render_says_what_to_install():
     with pytest.raises(InputError, match="apt-get install -y libegl1 .* or leave pictures and video out"):
-        open_context(16, 16, backends=("no_such_backend",))
+        working_backend(("no_such_backend",))
 
 
 def test_the_camera_avoids_a_wall(run):

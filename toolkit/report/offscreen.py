@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import importlib
 import os
+import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,18 +20,22 @@ from toolkit.errors import InputError
 from toolkit.report.colors import LIMB_COLORS
 
 BACKENDS = ("egl", "osmesa")
+_PROBE = """
+import importlib, os, sys
+import mujoco
+context = importlib.import_module(f"mujoco.{sys.argv[1]}").GLContext(16, 16)
+context.make_current()
+mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
+sys.stdout.flush()
+os._exit(0)
+"""
 REMEDY = "apt-get install -y libegl1 libgl1-mesa-dri libosmesa6, or leave pictures and video out"
 
 
-def open_context(width: int, height: int, backends: Sequence[str] = BACKENDS) -> Any:
-    """An OpenGL context without a screen, made current: EGL, or else OSMesa.
+def working_backend(backends: Sequence[str] = BACKENDS) -> str:
+    """The first of MuJoCo's context modules that renders without a screen; MUJOCO_GL is tried first where it names one.
 
-    The environment's MUJOCO_GL is tried first where it names one of them.
-
-    Args:
-        width: pixels.
-        height: pixels.
-        backends: names of MuJoCo's context modules, in order.
+    Each is tried in a process of its own: once one that does not work has been loaded, no other can be.
 
     Raises:
         InputError: none works; the message says what to install.
@@ -38,22 +43,30 @@ def open_context(width: int, height: int, backends: Sequence[str] = BACKENDS) ->
     wanted = os.environ.get("MUJOCO_GL", "").lower()
     reasons = []
     for backend in sorted(backends, key=lambda name: name != wanted):
-        try:
-            context = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
-            context.make_current()
-            return context
-        except Exception as error:  # noqa: BLE001 - PyOpenGL fails in many ways, from ImportError to AttributeError
-            reasons.append(f"{backend}: {' '.join(str(error).split())[:120]}")
-            _forget(backend)
+        environment = os.environ | {"MUJOCO_GL": backend}
+        command = [sys.executable, "-c", _PROBE, backend]
+        outcome = subprocess.run(command, capture_output=True, text=True, env=environment)
+        if outcome.returncode == 0:
+            return backend
+        last = outcome.stderr.strip().splitlines()[-1:] or [f"exit code {outcome.returncode}"]
+        reasons.append(f"{backend}: {last[0][:100]}")
     raise InputError(f"cannot render off screen ({'; '.join(reasons)}): {REMEDY}")
 
 
-def _forget(backend: str) -> None:
-    """Unload a backend that failed: PyOpenGL fixes its platform on import, and the next backend needs another."""
-    os.environ.pop("PYOPENGL_PLATFORM", None)
-    for name in list(sys.modules):
-        if name.split(".")[0] == "OpenGL" or name.startswith(f"mujoco.{backend}"):
-            del sys.modules[name]
+def open_context(width: int, height: int) -> Any:
+    """An OpenGL context without a screen, made current.
+
+    Raises:
+        InputError: this machine cannot render.
+    """
+    loaded = [backend for backend in BACKENDS if f"mujoco.{backend}" in sys.modules]
+    backend = loaded[0] if loaded else working_backend()
+    try:
+        context = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
+        context.make_current()
+    except (ImportError, RuntimeError, AttributeError) as error:
+        raise InputError(f"cannot render off screen ({backend}: {error}): {REMEDY}") from error
+    return context
 
 
 def require_rendering() -> None:

@@ -14,13 +14,14 @@ LEGEND = f"""## Legend
 
 | what | looks like |
 |---|---|
-| planned contacts | filled rectangles, numbered by transition: left foot red, right foot green, left palm cyan, right palm magenta; thick while they hold |
+| limbs | left foot red, right foot green, left palm cyan, right palm magenta |
+| planned contacts | filled rectangles with the number of their transition; thick while they hold |
 | made contacts | orange outlines, from touchdown on |
 | CoM | predicted by the search violet, optimised blue, executed orange |
 | forces | arrows at the centre of pressure, 1 m = {NEWTON_PER_METRE:.0f} N: planned thin, measured thick |
 | surfaces | for feet blue, for palms brown |
-| search | states from old (blue) to new (yellow): switch on `world/search`; its own timeline is `search` |
-"""  # noqa: E501
+| search | states from old (blue) to new (yellow): make `world/search` visible |
+"""
 
 
 def summary(report: RunReport | None) -> str:
