@@ -1,0 +1,181 @@
+"""Whole sequences: feasible walks with the wanted margins, honest refusals, and the program behind them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.centroidal.walks import foot, walk
+from toolkit.centroidal.body import body_residuals
+from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_problem
+from toolkit.centroidal.problem import Margins
+from toolkit.centroidal.program import Program, Regularisers
+from toolkit.centroidal.residual import check, cop_margin, objective
+from toolkit.centroidal.sequence import WANTED, WANTED_BODY, SequenceConfig, optimise
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.stance import Stance
+from toolkit.geometry.limb import FEET
+from toolkit.robot.loader import find_robots, load_robot
+
+
+@pytest.fixture(scope="module", params=find_robots())
+def walker(request):
+    return load_robot(request.param)
+
+
+def solve(robot, steps, stride, timing, *, config=SequenceConfig(), friction=0.5, rest=1.0, warm=None):
+    start, schedule = walk(robot, steps, stride, timing, friction=friction, rest=rest)
+    return optimise(robot, schedule, initial_com(robot, start), np.zeros(3), config=config, warm=warm)
+
+
+@pytest.mark.parametrize(("timing", "stride"), [((1.0, 1.0), 0.25), ((0.4, 0.6), 0.3), ((0.1, 0.4), 0.3)])
+def test_flat_walking_keeps_the_wanted_margins(walker, timing, stride):
+    motion = solve(walker, 4, stride, timing)
+    assert motion.feasible and motion.status == "converged", motion.status
+    assert motion.problem.margins == WANTED
+    residuals = check(motion)
+    assert residuals.within(), residuals
+    # the wanted margins of the body are kept as well; the solver's own accuracy aside
+    assert body_residuals(motion, walker, WANTED_BODY).largest < 1e-5
+    assert cop_margin(motion) >= (walker.limbs[FEET[0]].half_size / 2).min() - 1e-6
+    assert motion.objective == pytest.approx(objective(motion))
+    # at rest at both ends, over the feet
+    np.testing.assert_allclose(motion.linear_momentum[-1], 0.0, atol=1e-4)
+    assert np.linalg.norm(motion.com[-1, :2] - motion.problem.final_center[:2]) < 0.03
+    _, _, first = motion.sample(0.0)
+    _, _, last = motion.sample(motion.problem.times[-1])
+    assert np.linalg.norm(first) < 1.0 and np.linalg.norm(last) < 0.3
+
+
+def test_slow_single_support_is_over_the_foot(walker):
+    """Slow gaits do not forgive a CoM near the edge of the only foot: it stays over the inner half of the sole."""
+    motion = solve(walker, 4, 0.2, (1.0, 1.0))
+    problem = motion.problem
+    for step in np.flatnonzero(problem.active.sum(1) == 1)[2:-2]:
+        limb = int(np.flatnonzero(problem.active[step])[0])
+        if problem.active[step - 1].sum() == 1 and problem.active[step + 1].sum() == 1:
+            offset = motion.com[step] - problem.position[step, limb]
+            assert abs(offset[1]) < 0.75 * walker.limbs[limb].half_size[1]
+
+
+def test_fatrop_and_ipopt_agree(walker):
+    fatrop = solve(walker, 2, 0.3, (0.3, 0.5))
+    ipopt = solve(walker, 2, 0.3, (0.3, 0.5), config=SequenceConfig(solver="ipopt"))
+    assert fatrop.feasible and ipopt.feasible
+    assert fatrop.objective == pytest.approx(ipopt.objective, rel=2e-3)  # both stop at a tolerance of 1e-4
+    np.testing.assert_allclose(fatrop.com, ipopt.com, atol=2e-3)
+
+
+def test_too_long_a_stride_is_refused_with_its_reason(walker):
+    motion = solve(walker, 3, 2.2, (0.4, 0.6))
+    assert not motion.feasible
+    assert "infeasible: " in motion.status and "in transition" in motion.status, motion.status
+    assert body_residuals(motion, walker).largest > 0.01
+
+
+def test_margins_shrink_only_where_friction_is_short(walker):
+    """Fast strides on slippery ground need more than two thirds of the friction; the motion says how much."""
+    slippery = solve(walker, 4, 0.5, (0.15, 0.4), friction=0.22)
+    assert slippery.feasible, slippery.status
+    assert WANTED.friction < slippery.problem.margins.friction <= 1.0
+    assert not check(replace(slippery, problem=replace(slippery.problem, margins=WANTED))).within()
+    ice = solve(walker, 4, 0.5, (0.15, 0.4), friction=0.05)
+    assert not ice.feasible and "friction" in ice.status
+
+
+def test_no_stand_on_a_slope_beyond_the_friction_angle(walker):
+    for degrees, holds in [(20, True), (30, False)]:
+        stance = Stance(tuple(foot(walker, limb, 0.0, slope=np.deg2rad(degrees)) for limb in FEET))
+        schedule = ContactSchedule.of(ContactSequence(stance, ()), final_rest=2.0)
+        # over the middle of the feet, where the CoM of a robot at rest has to be
+        motion = optimise(walker, schedule, initial_com(walker, stance), np.zeros(3))
+        assert motion.feasible is holds, motion.status
+        if not holds:
+            assert "friction" in motion.status
+
+
+def test_objective_does_not_depend_on_the_discretisation(walker):
+    """The objective is an integral over time: twice as many steps give the same value."""
+    values = []
+    for steps in (5, 10):
+        problem = ProblemConfig(steps=steps, max_dt=1.0, margins=WANTED)
+        values.append(solve(walker, 2, 0.25, (1.0, 1.0), config=SequenceConfig(problem=problem)).objective)
+    assert values[0] == pytest.approx(values[1], rel=0.05)  # piecewise constant wrenches, half as coarse
+
+
+def test_warm_start_finds_the_same_motion(walker):
+    cold = solve(walker, 3, 0.3, (0.3, 0.5))
+    warm = solve(walker, 3, 0.3, (0.3, 0.5), warm=cold)
+    assert warm.feasible and warm.objective == pytest.approx(cold.objective, rel=1e-3)
+    assert warm.iterations <= cold.iterations
+
+
+def test_a_broken_motion_fails_the_checks(walker):
+    motion = solve(walker, 2, 0.3, (0.4, 0.6))
+    assert check(motion).within()
+    for name, shift in [("force", 1.0), ("com", 1e-3), ("linear_momentum", 0.1), ("yaw_torque", 5.0), ("cop", 0.05)]:
+        moved = replace(motion, **{name: getattr(motion, name) + shift})
+        assert not check(moved).within(), name
+
+
+@pytest.fixture(scope="module")
+def program(walker):
+    start, schedule = walk(walker, 1, 0.3, (0.4, 0.6), rest=0.4)
+    config = ProblemConfig(steps=2, margins=WANTED, max_dt=1.0)
+    problem = sequence_problem(walker, schedule, initial_com(walker, start), np.zeros(3), config=config)
+    return Program(problem, walker, WANTED_BODY, Regularisers())
+
+
+def sample_point(program, rng):
+    """A point near standing: lifted CoM, shared weight, small random changes."""
+    layout, problem = program.layout, program.problem
+    x = np.zeros(layout.size)
+    for knot, first in enumerate(layout.offset):
+        x[first : first + 3] = problem.com - [0, 0, 0.05]
+        if knot < problem.steps:
+            for limb in np.flatnonzero(problem.active[knot]):
+                x[layout.wrench[knot, limb] + 2] = 1 / problem.active[knot].sum()
+    return x + 0.02 * rng.normal(size=len(x))
+
+
+def test_derivatives_are_those_of_finite_differences(program):
+    rng = np.random.default_rng(8)
+    x, p = sample_point(program, rng), program.assembly.parameters
+    functions = program.assembly.functions(upper_hessian=False)
+    rows, jacobian = (np.array(part) for part in functions["nlp_jac_g"](x, p))
+    gradient = np.array(functions["nlp_grad_f"](x, p)).ravel()
+    np.testing.assert_allclose(rows, np.array(functions["nlp_g"](x, p)), atol=1e-12)
+    step = 1e-6
+    for index in rng.permutation(len(x))[:60]:
+        change = np.zeros(len(x))
+        change[index] = step
+        slope = np.array(functions["nlp_g"](x + change, p) - functions["nlp_g"](x - change, p)) / (2 * step)
+        np.testing.assert_allclose(jacobian[:, [index]], slope, atol=1e-6)
+        cost = float(functions["nlp_f"](x + change, p) - functions["nlp_f"](x - change, p)) / (2 * step)
+        assert gradient[index] == pytest.approx(cost, abs=1e-5, rel=1e-6)
+
+
+def test_hessian_is_symmetric_and_convex(program):
+    """Gauss-Newton in the objective, and friction rows whose multipliers are not positive: no negative curvature."""
+    rng = np.random.default_rng(9)
+    x, p = sample_point(program, rng), program.assembly.parameters
+    functions = program.assembly.functions(upper_hessian=False)
+    multipliers = -rng.random(program.assembly.rows)
+    gradient, hessian = (np.array(part) for part in functions["nlp_hess_l"](x, p, 0.7, multipliers))
+    jacobian = np.array(functions["nlp_jac_g"](x, p)[1])
+    cost = np.array(functions["nlp_grad_f"](x, p)).ravel()
+    np.testing.assert_allclose(gradient.ravel(), 0.7 * cost + jacobian.T @ multipliers, atol=1e-9)
+    np.testing.assert_allclose(hessian, hessian.T, atol=1e-12)
+    assert np.linalg.eigvalsh(hessian)[0] > -1e-6 * np.abs(hessian).max()
+    upper = program.assembly.functions(upper_hessian=True)["nlp_hess_l"](x, p, 0.7, multipliers)
+    np.testing.assert_allclose(np.array(upper), np.triu(hessian), atol=1e-12)
+
+
+def test_program_objective_is_the_paper_s_without_regularisers(walker):
+    start, schedule = walk(walker, 1, 0.3, (0.4, 0.6))
+    none = Regularisers(*[0.0] * 7, slack=3000.0)
+    config = SequenceConfig(problem=ProblemConfig(margins=Margins()), regularisers=none)
+    motion = optimise(walker, schedule, initial_com(walker, start), np.zeros(3), config=config)
+    regular = optimise(walker, schedule, initial_com(walker, start), np.zeros(3))
+    assert motion.feasible and motion.objective < regular.objective
