@@ -1,5 +1,6 @@
 """The folder of a run appears whole or not at all, and every file in it reads back."""
 
+import errno
 import json
 from dataclasses import fields, replace
 
@@ -45,6 +46,12 @@ def test_an_exception_leaves_nothing(tmp_path, error):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path):
+    with pytest.raises(InputError, match="run: cannot be written"), RunFolder(tmp_path / "run", "w", "r"):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_exception_keeps_the_earlier_run(tmp_path):
     target = tmp_path / "run"
     target.mkdir()
@@ -73,8 +80,8 @@ def test_a_foreign_folder_is_refused_before_anything_is_done(tmp_path):
         RunFolder(tmp_path, "w", "r")
     with pytest.raises(InputError, match="is a file"):
         RunFolder(tmp_path / "thesis.txt", "w", "r")
-    with pytest.raises(InputError, match="cannot write there"), RunFolder(tmp_path / "thesis.txt" / "run", "w", "r"):
-        pass
+    with pytest.raises(InputError, match="cannot write into .*thesis.txt; give --out another folder"):
+        RunFolder(tmp_path / "thesis.txt" / "a" / "run", "w", "r")
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
 
 

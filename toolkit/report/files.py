@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -22,6 +23,8 @@ MOTION = "motion.npz"
 EXECUTION = "execution.npz"
 SCENE = "scene.mjb"
 RECORDING = "recording.rrd"
+
+_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO)
 
 
 def default_folder(world: str, robot: str) -> Path:
@@ -52,7 +55,7 @@ class RunFolder:
             robot: name of the robot.
 
         Raises:
-            InputError: `out` exists and is neither an empty folder nor an earlier run.
+            InputError: `out` cannot be written, or exists and is neither an empty folder nor an earlier run.
         """
         self.target = Path(os.path.realpath(out)) if out is not None else default_folder(world, robot).absolute()
         self._made_parents: list[Path] = []
@@ -88,6 +91,8 @@ class RunFolder:
         if kind is not None:
             shutil.rmtree(path, ignore_errors=True)
             self._remove_parents()
+            if isinstance(error, OSError) and error.errno in _UNWRITABLE:
+                raise InputError(f"{self.target}: cannot be written ({error.strerror})") from error
             return
         _replace(path, self.target)
 
@@ -101,7 +106,10 @@ class RunFolder:
 
 
 def _check_target(target: Path, shown: Path) -> None:
-    """Raise InputError unless `target` is free, an empty folder, or an earlier run."""
+    """Raise InputError unless `target` can be made, is an empty folder, or is an earlier run."""
+    parent = next(folder for folder in target.parents if folder.exists())
+    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
+        raise InputError(f"{shown}: cannot write into {parent}; give --out another folder")
     if not target.exists():
         return
     if not target.is_dir():
