@@ -101,7 +101,7 @@ def test_gap_and_slope_have_their_size(tmp_path):
 
 
 def test_mesh_terrain_is_one_mesh_of_about_a_thousand_triangles(tmp_path):
-    text = KINDS["mesh_terrain"](np.random.default_rng(0))
+    text = KINDS["mesh_patches"](np.random.default_rng(0))
     model = mujoco.MjModel.from_xml_string(text)
     assert model.nmesh == 1 and 800 < model.mesh_facenum[0] < 1200
     world = load_world(tmp_path / "mesh.xml", mjcf=text)

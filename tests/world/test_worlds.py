@@ -10,6 +10,7 @@ import pytest
 from tests.world.probe import area_of, ball_gap, random_points, ray_gap
 from toolkit.geometry.pose import Pose
 from toolkit.world.clearance import height_map
+from toolkit.world.generators import KINDS
 from toolkit.world.loader import load_world
 from toolkit.world.scene import compose_scene
 
@@ -114,3 +115,21 @@ def test_the_probes_see_a_surface_that_is_off():
     points = random_points(surface, np.random.default_rng(0), 5, inset=0.02)
     np.testing.assert_allclose(ray_gap(world.mujoco_model, raised, points), -0.003, atol=TOLERANCE)
     np.testing.assert_allclose(ball_gap(world.mujoco_model, raised, points), 0.003, atol=TOLERANCE)
+
+
+def test_readme_lists_every_world_and_says_how_it_is_made():
+    text = (WORLDS[0].parent / "README.md").read_text()
+    for path in WORLDS:
+        row = next(line for line in text.splitlines() if line.startswith(f"| `{path.name}` "))
+        command = row.split("|")[3].strip().strip("`").split()
+        if command[0] == "by":
+            continue
+        seed = int(command[command.index("--seed") + 1]) if "--seed" in command else 0
+        assert path.read_text() == KINDS[command[0]](np.random.default_rng(seed)), f"make {path.name} anew"
+
+
+def test_world_of_the_readme_loads(tmp_path):
+    text = (WORLDS[0].parent / "README.md").read_text()
+    (tmp_path / "example.xml").write_text(text.split("```xml\n")[1].split("```")[0])
+    world = load_world(tmp_path / "example.xml")
+    assert {surface.geom for surface in world.surfaces} == {"floor", "ramp"}

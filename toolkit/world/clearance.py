@@ -30,8 +30,8 @@ class HeightMap:
     def at(self, points: np.ndarray) -> np.ndarray:
         """Heights (...,) of the cells that points (..., 2) lie in; -inf outside."""
         cell = np.rint((np.asarray(points, float) - self.origin) / self.resolution).astype(int)
-        inside = ((cell >= 0) & (cell < self.height.shape)).all(axis=-1)
-        cell = np.where(inside[..., None], cell, 0)
+        inside = np.all((cell >= 0) & (cell < np.array(self.height.shape)), axis=-1)
+        cell = np.where(np.expand_dims(inside, -1), cell, 0)
         return np.where(inside, self.height[cell[..., 0], cell[..., 1]], -np.inf)
 
 

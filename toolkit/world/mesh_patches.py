@@ -12,7 +12,7 @@ _SEAM = 0.08  # m; between patches
 _DEPTH = 0.3  # m; of the block below the terrain
 
 
-def mesh_terrain(
+def mesh_patches(
     rng: np.random.Generator,
     *,
     rows: int = 8,
@@ -58,7 +58,7 @@ def mesh_terrain(
             height[first : first + _CELLS + 1, second : second + _CELLS + 1] = block
     mesh = _block(x - patch * 0.75, y - width / 2, height)
     world = WorldText(
-        "mesh_terrain",
+        "mesh_patches",
         f"one mesh of {len(mesh.faces)} triangles: {rows} x {columns} flat patches of {patch:g} m",
         friction,
         (shift, swing),

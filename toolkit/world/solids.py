@@ -73,7 +73,8 @@ class Solids:
             return np.empty(0, object)
         along = ends[:, 1, :2] - ends[:, 0, :2]
         cut = ends[:, :1, :2] + np.stack([enter, leave], axis=1)[:, :, None] * along[:, None]
-        hulls = shapely.convex_hull(shapely.multipoints(cut.reshape(-1, 2), indices=_ranks(np.repeat(solid, 2))))
+        points = shapely.multipoints(cut.reshape(-1, 2), indices=_ranks(np.repeat(solid, 2)))
+        hulls = np.asarray(shapely.convex_hull(points))
         return hulls[(shapely.get_type_id(hulls) == 3) & (shapely.area(hulls) > 1e-10)]
 
     @property
