@@ -24,8 +24,9 @@ def walker(request):
     return load_robot(request.param)
 
 
-def solve(robot, steps, stride, timing, *, config=SequenceConfig(), friction=0.5, rest=1.0, warm=None):
+def solve(robot, steps, stride, timing, *, config=None, friction=0.5, rest=1.0, warm=None):
     start, schedule = walk(robot, steps, stride, timing, friction=friction, rest=rest)
+    config = config or SequenceConfig()
     return optimise(robot, schedule, initial_com(robot, start), np.zeros(3), config=config, warm=warm)
 
 
@@ -74,22 +75,31 @@ def test_too_long_a_stride_is_refused_with_its_reason(walker):
     assert body_residuals(motion, walker).largest > 0.01
 
 
+def stand(robot, slope, friction=0.5):
+    """A robot at rest on a slope in rad for two seconds."""
+    stance = Stance(tuple(foot(robot, limb, 0.0, slope=slope, friction=friction) for limb in FEET))
+    schedule = ContactSchedule.of(ContactSequence(stance, ()), final_rest=2.0)
+    return optimise(robot, schedule, initial_com(robot, stance), np.zeros(3))
+
+
 def test_margins_shrink_only_where_friction_is_short(walker):
-    """Fast strides on slippery ground need more than two thirds of the friction; the motion says how much."""
-    slippery = solve(walker, 4, 0.5, (0.15, 0.4), friction=0.22)
-    assert slippery.feasible, slippery.status
-    assert WANTED.friction < slippery.problem.margins.friction <= 1.0
-    assert not check(replace(slippery, problem=replace(slippery.problem, margins=WANTED))).within()
+    """Standing on a slope needs tan(slope) / mu of the friction; the motion says how much of its margin is gone."""
+    for needed in (0.5, 0.8, 0.95):
+        motion = stand(walker, np.arctan(needed * 0.5))
+        assert motion.feasible, motion.status
+        assert motion.problem.margins.friction == pytest.approx(max(WANTED.friction, needed), abs=0.03)
+        if needed > WANTED.friction:
+            assert not check(replace(motion, problem=replace(motion.problem, margins=WANTED))).within()
+
+
+def test_ice_is_refused_with_its_reason(walker):
     ice = solve(walker, 4, 0.5, (0.15, 0.4), friction=0.05)
     assert not ice.feasible and "friction" in ice.status
 
 
 def test_no_stand_on_a_slope_beyond_the_friction_angle(walker):
-    for degrees, holds in [(20, True), (30, False)]:
-        stance = Stance(tuple(foot(walker, limb, 0.0, slope=np.deg2rad(degrees)) for limb in FEET))
-        schedule = ContactSchedule.of(ContactSequence(stance, ()), final_rest=2.0)
-        # over the middle of the feet, where the CoM of a robot at rest has to be
-        motion = optimise(walker, schedule, initial_com(walker, stance), np.zeros(3))
+    for degrees, holds in [(20, True), (26, True), (27.5, False), (30, False)]:
+        motion = stand(walker, np.deg2rad(degrees))
         assert motion.feasible is holds, motion.status
         if not holds:
             assert "friction" in motion.status

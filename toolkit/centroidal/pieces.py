@@ -124,11 +124,11 @@ def _contact() -> Piece:
     """Friction cone, patch and yaw moment (Caron et al., ICRA 2015) of a contact, and its objective.
 
     Parameters: mu, (2) half extents; wanted friction factor, (2) CoP margin in m, yaw factor; square roots of the
-    weights of force, lateral force, torque (in weights), CoP, early or late load.
+    weights of force, lateral force, torque (in weights), CoP, CoP times load, early or late load.
     """
     p = _Parameters()
     wrench, slack = ca.SX.sym("w", WRENCH), ca.SX.sym("s", 2)
-    mu, half, wanted, cop_margin, yaw_factor, weights = p(), p(2), p(), p(2), p(), p(5)
+    mu, half, wanted, cop_margin, yaw_factor, weights = p(), p(2), p(), p(2), p(), p(6)
     fx, fy, fz, tx, ty, tz = ca.vertsplit(wrench)
     mu = mu * (wanted + (1 - wanted) * slack[0])
     yaw = yaw_factor + (1 - yaw_factor) * slack[0]
@@ -151,7 +151,8 @@ def _contact() -> Piece:
         weights[1] * wrench[:2],
         weights[2] * (tz - cop_x * fy + cop_y * fx),
         weights[3] * ca.vertcat(cop_x, cop_y) / (2 * half),
-        weights[4] * fz,
+        weights[4] * ca.vertcat(-ty, tx) / (2 * half),
+        weights[5] * fz,
     )
     return Piece("contact", ca.vertcat(wrench, slack), p.vector, rho=rho, rows=rows, curved=curved)
 

@@ -35,6 +35,8 @@ class Regularisers:
     Attributes:
         jerk: weight of (change of CoM acceleration from step to step / dt)^2.
         height: weight of the CoM's distance from home height above the feet, m^2.
+        cop: weight of the CoP's distance from the middle of the patch over the patch's size, times the load in weights;
+            decides in slow gaits, whose momenta cost little: slow single support does not forgive a CoP near the edge.
         load: weight of the normal force (in weights) of a contact in the step after it is made or before it is broken.
         final_center: weight of the distance of the last CoM from the mean of the feet, m^2.
         final_acceleration: weight of the last CoM acceleration, m^2/s^4.
@@ -45,7 +47,8 @@ class Regularisers:
     jerk: float = 0.02
     height: float = 400.0
     load: float = 20.0
-    final_center: float = 2000.0
+    cop: float = 200.0
+    final_center: float = 20000.0
     final_acceleration: float = 20.0
     final_spin: float = 200.0
     slack: float = 3000.0
@@ -155,8 +158,9 @@ class Program:
             made = np.concatenate([[False], on[1:] & ~on[:-1]])[step]
             broken = np.concatenate([on[:-1] & ~on[1:], [False]])[step]
             edge = np.where(made | broken, reg.load, 0.0)
-            squares = [np.full(len(step), value) for value in (w.force, w.lateral_force, w.torque * weight**2, w.cop)]
-            weights = np.sqrt(duration[step, None] * np.stack([*squares, edge], 1))
+            squares = [np.full(len(step), value) for value in (w.force, w.lateral_force, w.torque * weight**2)]
+            squares += [np.full(len(step), w.cop), np.full(len(step), reg.cop), edge]
+            weights = np.sqrt(duration[step, None] * np.stack(squares, 1))
             wanted = np.array([p.margins.friction, *cop_margin[limb], p.margins.yaw])
             variables = np.concatenate(
                 [p_index(self.layout.wrench[step, limb], WRENCH), self.layout.slack[step, :2]], 1
