@@ -23,7 +23,7 @@ def path():
         Move(-up, Window(0.5, 1.0)),
         Move(aside, Window(0.05, 0.85), returns=True),
     )
-    return SwingPath(2.0, 0.7, start, end, moves, Window(0.05, 0.85))
+    return SwingPath(2.0, 0.7, start, end, moves, Window(0.05, 0.85), pitch=0.5)
 
 
 def test_path_joins_its_ends_at_rest(path):

@@ -4,8 +4,8 @@ For a pair of geoms at distance d with normal n (from the first to the second) a
 
     n . (J2(p) - J1(p)) dq >= -(d - d_safe) dt / tau
 
-so that a distance shrinks ever more slowly towards d_safe and grows where it is below. Legs follow from feet and CoM and
-are left to the final collision check.
+so that a distance shrinks ever more slowly towards d_safe and grows where it is below. Legs follow from feet and CoM
+and are left to the final collision check.
 """
 
 from __future__ import annotations

@@ -36,6 +36,7 @@ class IKConfig:
         arms, trunk, legs, rest: weights per squared rad of a tick's deviation from the eased return to the home
             posture; the trunk is what carries both arms, the rest is a head and the like.
         posture_time: s; time constant of that return.
+        inertia: weight of the last tick's displacement in that return; it smooths free joints over as many ticks.
         arm_swing: rad; a free arm's joints stay this close to the home posture, or come no farther away.
         angular_momentum: weight per squared rad of a tick's deviation from the planned angular momentum, divided by
             mass times squared CoM height; a large one makes trunk and arms swing wide.
@@ -61,8 +62,9 @@ class IKConfig:
     legs: float = 0.01
     rest: float = 50.0
     posture_time: float = 0.1
+    inertia: float = 2.0
     arm_swing: float = 0.6
-    angular_momentum: float = 1.4e4
+    angular_momentum: float = 5e3
     velocity_fraction: float = 0.95
     range_margin: float = 0.02
     range_rate: float = 25.0
@@ -181,7 +183,7 @@ class WholeBodyIK:
         angle = self.tick / (self.robot.mass * self.robot.com_height**2)
         self.momentum.configure("momentum", "soft", self.config.angular_momentum * angle**2)
         self.solver.enable_velocity_limits(True)
-        self.drift = np.zeros(6)
+        self.drift, self.last_step = np.zeros(6), np.zeros(len(self.robot.joint_names))
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     def advance(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
@@ -193,14 +195,16 @@ class WholeBodyIK:
         angles = self.joints
         self._set_targets(time, paths, motion)
         self._set_ranges(angles, [palm for palm in self.palms if paths.authority(palm, time) == 0.0])
-        targets = dict(zip(self.robot.joint_names, angles + self._ease * (self.robot.home[7:] - angles), strict=True))
+        step = self._ease * (self.robot.home[7:] - angles)
+        step = (step + self.config.inertia * self.last_step) / (1.0 + self.config.inertia)
+        targets = dict(zip(self.robot.joint_names, angles + step, strict=True))
         for task, names, _ in self.postures:
             for name in names:
                 task.set_joint(name, targets[name])
         before = self.order.qpos_from_q(self.wrapper.state.q)
         self._set_dampers(before, angles, {palm for palm in self.palms if paths.authority(palm, time) > 0.0})
         self._solve(time)
-        self.drift = self._base_motion(before)
+        self.drift, self.last_step = self._base_motion(before), self.joints - angles
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     @property

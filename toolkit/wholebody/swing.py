@@ -2,7 +2,10 @@
 
 The path is a sum of straight moves, each smoothly timed within its own window of the swing: off the old surface along
 its normal, up, across, down, and onto the new surface along its normal. A sideways bump leads a foot around the other
-one. The orientation turns about one fixed axis (slerp).
+one. The orientation turns about one fixed axis (slerp), R1(t); a foot that trails far behind pitches its toes down on
+the way by an angle phi(t) about its own y axis, as a stretched ankle could not keep it level:
+
+    R = R1 Ry(phi),  w = w1 + phi' R1 y,  dw/dt = dw1/dt + phi'' R1 y + phi' w1 x R1 y
 """
 
 from __future__ import annotations
@@ -56,6 +59,8 @@ class SwingPath:
         start, end: world_from_contact at both ends.
         moves: they lead from the start's position to the end's.
         turn: when the orientation changes.
+        pitch: rad; largest phi.
+        pitching: when the toes go down and come up again.
         clear: the swept patch keeps free of the world (decided by the planner of the path).
     """
 
@@ -65,6 +70,8 @@ class SwingPath:
     end: Pose
     moves: tuple[Move, ...]
     turn: Window
+    pitch: float = 0.0
+    pitching: Window = Window(0.0, 0.8)
     clear: bool = True
 
     @cached_property
@@ -83,7 +90,9 @@ class SwingPath:
 
     def rotations(self, u: np.ndarray) -> np.ndarray:
         """(k, 3, 3) world_from_contact rotations at (k,) fractions of the swing."""
-        return rotation_exponential(self.turn.value(u)[:, None] * self.rotation_vector) @ self.start.rotation
+        turned = rotation_exponential(self.turn.value(u)[:, None] * self.rotation_vector) @ self.start.rotation
+        step = self.pitching.value(u)
+        return turned @ _about_y(self.pitch * 4.0 * step * (1.0 - step))
 
     def sample(self, time: float) -> PathSample:
         """The patch at a time in s; at rest before and after the swing."""
@@ -101,7 +110,19 @@ class SwingPath:
         velocity[3:] = rate / self.duration * vector
         acceleration[3:] = second / self.duration**2 * vector
         rotation = rotation_exponential(value * vector) @ self.start.rotation
+        if self.pitch:
+            value, rate, second = self.pitching.bump(u)
+            axis = self.pitch * rotation[:, 1]
+            acceleration[3:] += second / self.duration**2 * axis + np.cross(velocity[3:], rate / self.duration * axis)
+            velocity[3:] += rate / self.duration * axis
+            rotation = rotation @ _about_y(np.array(value * self.pitch))
         return PathSample(Pose(rotation, position), velocity, acceleration)
+
+
+def _about_y(angle: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) rotations about y by (...,) rad."""
+    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    return np.stack([np.stack([c, zero, s], -1), np.stack([zero, one, zero], -1), np.stack([-s, zero, c], -1)], -2)
 
 
 def rotation_exponential(vector: np.ndarray) -> np.ndarray:

@@ -15,6 +15,9 @@ Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool: the box touches the world."""
 
 
+SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
+
+
 @dataclass(frozen=True)
 class SwingTiming:
     """When, as fractions of a swing, the patch leaves its surface, rises, crosses, descends and lands."""
@@ -45,7 +48,11 @@ class SwingConfig:
         easy_raise: m; paths raised by more than that are first tried with the steep timing.
         fast_across: window of the crossing for swings faster than `fast`.
         slow, fast: m/s; mean speed up to which the window of the crossing is kept, and from which it is `fast_across`.
-        samples: poses per swing that are checked.
+        pitch_gain, pitch_from, max_pitch: rad/m, m, rad; a foot that trails the standing one by more than `pitch_from`
+            pitches its toes down in proportion.
+        moderate_raise: m; higher paths come after lower ones with less margin.
+        samples: least number of poses per swing that are checked.
+        spacing: m; largest way between two of them.
     """
 
     foot_lift: float = 0.05
@@ -63,7 +70,12 @@ class SwingConfig:
     steep: SwingTiming = STEEP
     easy_raise: float = 0.04
     fast_across: Window = Window(0.0, 1.0)
+    pitch_gain: float = 1.5
+    pitch_from: float = 0.2
+    max_pitch: float = 0.6
+    moderate_raise: float = 0.12
     samples: int = 33
+    spacing: float = 0.03
 
 
 @dataclass(frozen=True)
@@ -93,19 +105,22 @@ class SwingTask:
 def plan_swing(task: SwingTask, collide: Collide, config: SwingConfig) -> SwingPath:
     """The least raised path that is clear, with `clear` False where none is.
 
-    Candidates are tried from the straightest to the highest, first with the whole margin, then with half of it, then
-    with none.
+    Candidates are tried from the straightest to the highest, moderate heights first with the whole margin, then with
+    half of it, then with none; then great heights likewise.
     """
     detour = _detour(task, config)
-    highest = None
-    for share in (1.0, 0.5, 0.0):
-        for before, after, timing in _candidates(task, config):
-            path = _path(task, before, after, timing, detour, config)
-            if not collide(*_swept_boxes(task, path, share * config.margin, config)).any():
-                return path
-            highest = path
-    assert highest is not None
-    return replace(highest, clear=False)
+    sides = _free_sides(task, collide, config)
+    candidates = list(_candidates(task, config))
+    needed = 0.0 if not task.is_foot else abs(task.end.position[2] - task.start.position[2])
+    moderate = [item for item in candidates if max(item[:2]) <= needed + config.moderate_raise]
+    great = [item for item in candidates if max(item[:2]) > needed + config.moderate_raise]
+    for group in (moderate, great):
+        for share in (1.0, 0.5, 0.0):
+            for before, after, timing in group:
+                path = _path(task, before, after, timing, detour, config)
+                if not collide(*_swept_boxes(task, path, share * config.margin, sides, config)).any():
+                    return path
+    return replace(_path(task, *candidates[-1], detour, config), clear=False)
 
 
 def _candidates(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float, SwingTiming]]:
@@ -149,8 +164,20 @@ def _path(
         Move(onto, timing.land),
         Move(detour, across, returns=True),
     ]
+    pitch = _pitch(task, config)
+    if pitch:  # about the toes, not about the middle of the sole
+        moves.append(Move(task.half_size[0] * np.sin(pitch) * task.start.normal, SwingPath.pitching, returns=True))
     moves = tuple(move for move in moves if np.any(move.vector))
-    return SwingPath(task.begin, task.duration, task.start, task.end, moves, across)
+    return SwingPath(task.begin, task.duration, task.start, task.end, moves, across, pitch)
+
+
+def _pitch(task: SwingTask, config: SwingConfig) -> float:
+    """How far (rad) the toes go down on the way: more, the farther the foot trails the standing one."""
+    if task.other is None:
+        return 0.0
+    trail = (task.other[0].position - task.start.position) @ task.start.rotation[:, 0]
+    ahead = (task.end.position - task.start.position) @ task.start.rotation[:, 0]
+    return float(np.clip(config.pitch_gain * (min(trail, ahead) - config.pitch_from), 0.0, config.max_pitch))
 
 
 def _outward(task: SwingTask) -> np.ndarray:
@@ -169,26 +196,52 @@ def _across(speed: float, slow: Window, config: SwingConfig) -> Window:
     return Window(slow.start + share * (fast.start - slow.start), slow.end + share * (fast.end - slow.end))
 
 
+def _free_sides(task: SwingTask, collide: Collide, config: SwingConfig) -> tuple[float, float]:
+    """How much (m) the patch can be padded sideways where it starts and where it ends, at most the margin."""
+    shares = np.array([1.0, 0.75, 0.5, 0.25])
+    sides = []
+    for pose, free in ((task.start, task.free_start), (task.end, task.free_end)):
+        if free:
+            sides.append(config.margin)
+            continue
+        half = np.empty((len(shares), 3))
+        half[:, :2] = task.half_size + (shares * config.margin)[:, None]
+        half[:, 2] = 0.5 * config.thickness - SKIN
+        centers = np.repeat((pose.position + (half[0, 2] + 2 * SKIN) * pose.normal)[None], len(shares), 0)
+        hit = collide(centers, np.repeat(pose.rotation[None], len(shares), 0), half)
+        sides.append(float(max(shares[~hit], default=0.0)) * config.margin)
+    return sides[0], sides[1]
+
+
 def _swept_boxes(
-    task: SwingTask, path: SwingPath, margin: float, config: SwingConfig
+    task: SwingTask, path: SwingPath, margin: float, sides: tuple[float, float], config: SwingConfig
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres (k, 3), rotations (k, 3, 3), half sizes (k, 3) of the patch, thickened and padded, along a path.
 
-    The padding fades to nothing at the surfaces that the path leaves and reaches.
+    The padding below fades to nothing at the surfaces that the path leaves and reaches; the padding at the sides is
+    what is free there, and grows with the way from there.
     """
-    u = np.linspace(0.0, 1.0, config.samples)
+    length = sum(np.linalg.norm(move.vector) for move in path.moves)
+    count = max(config.samples, int(np.ceil(2.0 * length / config.spacing)) + 1)  # twice as fast in the middle
+    u = np.linspace(0.0, 1.0, count)
     points, rotations = path.positions(u), path.rotations(u)
-    room = np.full(len(u), margin)
-    if not task.free_start:
-        room[u < 0.5] = np.minimum(room, 0.5 * (points - task.start.position) @ task.start.normal)[u < 0.5]
-    if not task.free_end:
-        room[u >= 0.5] = np.minimum(room, 0.5 * (points - task.end.position) @ task.end.normal)[u >= 0.5]
-    room = np.maximum(room, 0.0)
-    skin = 2e-3  # m; a resting patch touches its surface and may stand against a wall
-    half = np.empty((len(u), 3))
-    half[:, :2] = task.half_size + room[:, None] - np.where(room > skin, 0.0, skin)[:, None]
-    half[:, 2] = 0.5 * (config.thickness + room - skin)
-    centers = points + (0.5 * (config.thickness - room + skin))[:, None] * rotations[:, :, 2]
+    below, aside = np.full(count, margin), np.full(count, margin)
+    for pose, free, half_of_swing, side in (
+        (task.start, task.free_start, u < 0.5, sides[0]),
+        (task.end, task.free_end, u >= 0.5, sides[1]),
+    ):
+        if free:
+            continue
+        way = points - pose.position
+        height = way @ pose.normal
+        along = np.linalg.norm(way - height[:, None] * pose.normal, axis=1)
+        below[half_of_swing] = np.minimum(below, 0.5 * height)[half_of_swing]
+        aside[half_of_swing] = np.minimum(aside, side + along)[half_of_swing]
+    below = np.maximum(below, 0.0)
+    half = np.empty((count, 3))
+    half[:, :2] = task.half_size + (aside - np.where(aside > SKIN, 0.0, SKIN))[:, None]
+    half[:, 2] = 0.5 * (config.thickness + below - SKIN)
+    centers = points + (0.5 * (config.thickness - below + SKIN))[:, None] * rotations[:, :, 2]
     return centers, rotations, half
 
 
