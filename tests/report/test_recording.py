@@ -157,6 +157,13 @@ def test_forces_have_the_stated_scale_and_vanish_without_contact(run, recording)
     np.testing.assert_allclose(NEWTON_PER_METRE * vectors[row][0], force, rtol=1e-6)
 
 
+def test_slip_changes_with_the_stance(run, recording):
+    times, values = recording.columns("/series/slip", "scalars")
+    ends = [phase.end for phase in run.schedule.phases if phase.swing is not None]
+    np.testing.assert_allclose(times[:-1], [0.0, *ends], rtol=0, atol=1e-6)  # nanoseconds in the recording
+    np.testing.assert_allclose(np.ravel(values)[:-1], 1e3 * np.array(run.execution.slip), rtol=1e-9)
+
+
 def test_made_contacts_add_up(run, recording):
     times, strips = recording.columns("/world/executed/contacts", "strips")
     made = [touch for touch in run.execution.touchdowns if touch["limb"] != "left_palm"]

@@ -8,29 +8,31 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from toolkit.contacts.schedule import ContactSchedule
 from toolkit.geometry.limb import Limb
 from toolkit.report.colors import AXES, EXECUTED, LIMB_COLORS, LIMIT, OPTIMISED, unit
 from toolkit.report.series import slip_steps, thinned
 from toolkit.simulation.execution import Execution
 
 
-def draw_plots(path: Path, execution: Execution) -> None:
+def draw_plots(path: Path, execution: Execution, schedule: ContactSchedule | None = None) -> None:
     """Write a picture of six curves over time: CoM, its error, momenta, CoP margins, torque ratio, slip.
 
     Args:
         path: file; the ending gives the format (png, pdf, svg).
         execution: the run; an empty picture where it has no control tick.
+        schedule: of the planned contacts, for the slip of each stance.
     """
     figure = Figure(figsize=(11, 9), layout="constrained")
     panels = figure.subplots(3, 2, sharex=True)
     if len(execution.tick_times):
-        _draw(panels, execution)
+        _draw(panels, execution, schedule)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     FigureCanvasAgg(figure).print_figure(str(path), dpi=110)
 
 
-def _draw(panels: np.ndarray, execution: Execution) -> None:
+def _draw(panels: np.ndarray, execution: Execution, schedule: ContactSchedule | None) -> None:
     """Fill the six panels."""
     times = execution.tick_times
     (com, error), (momentum, margin), (torque, slip) = panels
@@ -54,8 +56,8 @@ def _draw(panels: np.ndarray, execution: Execution) -> None:
     torque.plot(*thinned(times, execution.torque_ratio, worst="max"), color=unit(EXECUTED), label="largest joint")
     torque.axhline(1, color=unit(LIMIT), lw=0.8, label="limit")
     torque.set(title="torque / limit", ylim=(0, 1.1))
-    if execution.slip:
-        edges, values = slip_steps(execution)
+    if execution.slip and schedule is not None:
+        edges, values = slip_steps(execution, schedule)
         slip.step(edges, 1e3 * values, where="post", color=unit(EXECUTED), label="stance")
     slip.set(title="largest slip of each stance", ylabel="[mm]", ylim=(0, None))
     for axes in panels.flat:

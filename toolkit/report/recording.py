@@ -98,7 +98,7 @@ def write_recording(
             draw_made_contacts(stream, execution, robot.half_sizes)
             draw_forces(stream, "planned", times, execution.wrench_planned[rows], pose, 0.008)
             draw_forces(stream, "measured", times, execution.wrench[rows], pose, 0.018)
-            plot_execution(stream, execution, trajectory)
+            plot_execution(stream, execution, trajectory, schedule)
             for time, text in touchdown_entries(execution):
                 stream.set_time(TIMELINE, duration=time)
                 stream.log("events", rr.TextLog(text))

@@ -192,9 +192,10 @@ def _write_pictures(folder: Path, result: ResultLike, args: Namespace) -> None:
         return
     execution = trial.execution
     if getattr(args, "pictures", False):
-        draw_top_view(folder / "plan.png", result.world, result.robot, trial.solution, trial.motion)
+        executed = execution.com if execution is not None else None
+        draw_top_view(folder / "plan.png", result.world, result.robot, trial.solution, trial.motion, executed)
         if execution is not None:
-            draw_plots(folder / "execution.png", execution)
+            draw_plots(folder / "execution.png", execution, trial.schedule)
     if execution is None or not len(execution.tick_times):
         return
     contacts = list(trial.solution.sequence.start.contacts)

@@ -12,7 +12,7 @@ from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.geometry.limb import Limb
 from toolkit.report.colors import AXES, EXECUTED, LIMB_COLORS, LIMIT, Color
-from toolkit.report.motion_scene import LEAST_FORCE, TIMELINE, at, limb_of
+from toolkit.report.motion_scene import LEAST_FORCE, TIMELINE, at, limb_of, stance_times
 from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
@@ -66,8 +66,13 @@ def plot(
     stream.send_columns(entity, at(times), scalars.partition([columns] * len(times)))
 
 
-def plot_execution(stream: rr.RecordingStream, execution: Execution, trajectory: WholeBodyTrajectory | None) -> None:
-    """Send every series of a simulated run."""
+def plot_execution(
+    stream: rr.RecordingStream,
+    execution: Execution,
+    trajectory: WholeBodyTrajectory | None,
+    schedule: ContactSchedule | None,
+) -> None:
+    """Send every series of a simulated run; what needs the trajectory or the schedule only where there is one."""
     times = execution.tick_times
     if not len(times):
         return
@@ -102,8 +107,8 @@ def plot_execution(stream: rr.RecordingStream, execution: Execution, trajectory:
         EXECUTED,
     )
     plot(stream, "series/torque_ratio/limit", times[[0, -1]], np.ones(2), "limit", LIMIT, 1.0)
-    if execution.slip:
-        edges, values = slip_steps(execution)
+    if execution.slip and schedule is not None:
+        edges, values = slip_steps(execution, schedule)
         step = rr.components.InterpolationMode.StepAfter
         plot(stream, "series/slip", edges, 1e3 * values, "slip of the stance", EXECUTED, interpolation_mode=step)
 
@@ -126,11 +131,10 @@ def limb_errors(execution: Execution, trajectory: WholeBodyTrajectory) -> dict[L
     return errors
 
 
-def slip_steps(execution: Execution) -> tuple[np.ndarray, np.ndarray]:
+def slip_steps(execution: Execution, schedule: ContactSchedule) -> tuple[np.ndarray, np.ndarray]:
     """Slip of each stance: (k + 1,) s at which it begins, and the end of the run; (k + 1,) m, the last one repeated."""
     end = float(execution.tick_times[-1])
-    touched = [float(touch["time"]) for touch in execution.touchdowns if touch.get("time") is not None]
-    edges = np.clip([0.0, *sorted(touched), end], 0.0, end)
+    edges = np.clip([*stance_times(schedule), end], 0.0, end)
     count = min(len(execution.slip), len(edges) - 1)
     return edges[: count + 1], np.array([*execution.slip[:count], execution.slip[count - 1]])
 
