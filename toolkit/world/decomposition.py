@@ -98,7 +98,7 @@ def _components(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
 
 def _is_convex(mesh: trimesh.Trimesh) -> bool:
     """Whether a mesh is closed and fills its convex hull."""
-    if not (mesh.is_watertight and mesh.is_winding_consistent):
+    if not (mesh.is_watertight and mesh.is_winding_consistent) or mesh.volume < 1e-12:
         return False
     return mesh.volume > (1.0 - 1e-4) * mesh.convex_hull.volume
 

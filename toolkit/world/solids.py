@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 from toolkit.geometry.pose import Pose
 
-_DEEP = 100.0  # m; depth of the half space under a plane
+_WIDE = 100.0  # m; how far and how deep the half space under a plane reaches
 _SIDES = 48  # sides of a prism that stands for a cylinder
 
 
@@ -86,9 +86,9 @@ class Solids:
 def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
     """Convex solids of all colliding geoms of a world.
 
-    Planes are half spaces whatever size they are drawn with, because MuJoCo collides them so; here they are cut to a
-    square and are deep. Cylinders become prisms around the circle; spheres, capsules and ellipsoids fine polyhedra;
-    a height field one prism per triangle, as MuJoCo collides it.
+    Planes are half spaces whatever size they are drawn with, because MuJoCo collides them so; here they are wide and
+    deep, and their triangles are cut to a square. Cylinders become prisms around the circle, spheres, capsules and
+    ellipsoids polyhedra around them, a height field one prism per triangle, as MuJoCo collides it.
 
     Args:
         model: the world compiled (meshes convex).
@@ -160,9 +160,14 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
     kind, size = model.geom_type[index], model.geom_size[index]
     types = mujoco.mjtGeom
     if kind == types.mjGEOM_PLANE:
-        rectangle = plane_rectangle(model, index, pose, square)
-        points, faces, edges = _hull(_extruded(rectangle, -_DEEP, 0.0))
-        return [(points, faces[(points[faces][..., 2] == 0.0).all(axis=1)], edges)]
+        # Wherever the half space reaches it buries other geoms; its triangles end with the square.
+        x0, y0, x1, y1 = square
+        wide = plane_rectangle(model, index, pose, (x0 - _WIDE, y0 - _WIDE, x1 + _WIDE, y1 + _WIDE))
+        points, _, edges = _hull(_extruded(wide, -_WIDE, 0.0))
+        shown = plane_rectangle(model, index, pose, square)
+        first = len(points)
+        faces = np.array([[0, 1, 2], [0, 2, 3]]) + first
+        return [(np.concatenate([points, np.column_stack([shown, np.zeros(4)])]), faces, edges)]
     if kind == types.mjGEOM_BOX:
         return [(_CUBE * size, _CUBE_FACES, _CUBE_EDGES)]
     if kind == types.mjGEOM_CYLINDER:
@@ -186,8 +191,10 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
 
 
 def _ball() -> np.ndarray:
-    """(642, 3) points, evenly spread, of the unit sphere."""
-    return np.asarray(trimesh.creation.icosphere(subdivisions=3).vertices)
+    """(642, 3) points whose hull just holds the unit sphere."""
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    inside = (ball.triangles[:, 0] * ball.face_normals).sum(axis=1).min()
+    return np.asarray(ball.vertices) / inside
 
 
 def _extruded(ring: np.ndarray, low: float, high: float) -> np.ndarray:

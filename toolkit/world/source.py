@@ -99,6 +99,8 @@ def _compiled(path: Path, mjcf: str | None) -> tuple[mujoco.MjSpec, mujoco.MjMod
         else:
             spec = mujoco.MjSpec.from_string(mjcf)
             spec.modelfiledir = str(path.parent)
+        for mesh in spec.meshes:
+            mesh.maxhullvert = -1  # the whole hull collides
         return spec, spec.compile()
     except ValueError as error:
         raise WorldError(f"{path}: MuJoCo cannot read this world: {one_line(error)}") from error
