@@ -10,6 +10,7 @@ the way by an angle phi(t) about its own y axis, as a stretched ankle could not 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -94,29 +95,44 @@ class SwingPath:
         step = self.pitching.value(u)
         return turned @ _about_y(self.pitch * 4.0 * step * (1.0 - step))
 
+    @cached_property
+    def _turning(self) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+        """Angle, unit axis k, and [k] R0 and [k]^2 R0 of Rodrigues' formula, R0 the start's rotation."""
+        angle = float(np.linalg.norm(self.rotation_vector))
+        axis = self.rotation_vector / angle if angle > 0.0 else np.zeros(3)
+        cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+        return angle, axis, cross @ self.start.rotation, cross @ cross @ self.start.rotation
+
+    @cached_property
+    def _vectors(self) -> np.ndarray:
+        """(3, moves) displacements side by side."""
+        return np.array([move.vector for move in self.moves]).reshape(-1, 3).T
+
     def sample(self, time: float) -> PathSample:
         """The patch at a time in s; at rest before and after the swing."""
-        u = (time - self.begin) / self.duration
+        u, pace = (time - self.begin) / self.duration, 1.0 / self.duration
+        velocity, acceleration = np.zeros(6), np.zeros(6)
         if not 0.0 <= u <= 1.0:
-            return PathSample(self.start if u < 0.0 else self.end, np.zeros(6), np.zeros(6))
-        position, velocity, acceleration = self.start.position.copy(), np.zeros(6), np.zeros(6)
-        for move in self.moves:
-            value, rate, second = move.window.bump(u) if move.returns else move.window.step(u)
-            position += value * move.vector
-            velocity[:3] += rate / self.duration * move.vector
-            acceleration[:3] += second / self.duration**2 * move.vector
+            return PathSample(self.start if u < 0.0 else self.end, velocity, acceleration)
+        shares = [move.window.bump(u) if move.returns else move.window.step(u) for move in self.moves]
+        along = self._vectors @ np.array(shares).reshape(-1, 3)  # columns: value, rate, second derivative
+        velocity[:3], acceleration[:3] = along[:, 1] * pace, along[:, 2] * pace**2
         value, rate, second = self.turn.step(u)
-        vector = self.rotation_vector
-        velocity[3:] = rate / self.duration * vector
-        acceleration[3:] = second / self.duration**2 * vector
-        rotation = rotation_exponential(value * vector) @ self.start.rotation
+        angle, axis, first_order, second_order = self._turning
+        velocity[3:], acceleration[3:] = rate * pace * angle * axis, second * pace**2 * angle * axis
+        rotation = self.start.rotation + math.sin(value * angle) * first_order
+        rotation += (1.0 - math.cos(value * angle)) * second_order
         if self.pitch:
             value, rate, second = self.pitching.bump(u)
-            axis = self.pitch * rotation[:, 1]
-            acceleration[3:] += second / self.duration**2 * axis + np.cross(velocity[3:], rate / self.duration * axis)
-            velocity[3:] += rate / self.duration * axis
-            rotation = rotation @ _about_y(np.array(value * self.pitch))
-        return PathSample(Pose(rotation, position), velocity, acceleration)
+            pitch, rate, second = self.pitch * value, self.pitch * rate * pace, self.pitch * second * pace**2
+            x, y, z = rotation.T
+            wx, wy, wz = velocity[3:]
+            turned = np.array([wy * y[2] - wz * y[1], wz * y[0] - wx * y[2], wx * y[1] - wy * y[0]])  # w x y
+            acceleration[3:] += second * y + rate * turned
+            velocity[3:] += rate * y
+            c, s = math.cos(pitch), math.sin(pitch)
+            rotation = np.array([c * x - s * z, y, s * x + c * z]).T
+        return PathSample(Pose(rotation, self.start.position + along[:, 0]), velocity, acceleration)
 
 
 def _about_y(angle: np.ndarray) -> np.ndarray:
