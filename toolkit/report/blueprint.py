@@ -72,7 +72,7 @@ def _eye(model: mujoco.MjModel, way: np.ndarray) -> rrb.EyeControls3D:
     length = float(np.linalg.norm(ahead))
     heading = float(np.arctan2(ahead[1], ahead[0])) if length > 0.1 else 0.0
     middle = (way.min(0) + way.max(0)) / 2 + [0.0, 0.0, 0.7]
-    distance = 2.6 + 0.8 * length
+    distance = 2.3 + 0.75 * length
     seen = np.concatenate([way + [0.0, 0.0, 0.9], way + [0.0, 0.0, 0.1]])
     direction = best_direction(model, seen, middle, heading, distance, (22.0, 40.0, 60.0))
     return rrb.EyeControls3D(position=middle + distance * direction, look_target=middle, eye_up=(0.0, 0.0, 1.0))

@@ -73,7 +73,7 @@ def draw_top_view(
     for contact, number in contacts:
         _draw_contact(axes, contact, robot.half_sizes[contact.limb], number)
     for name, (points, color, style) in paths.items():
-        axes.plot(points[:, 0], points[:, 1], style, color=unit(color), lw=1.5, ms=3, label=name, zorder=6)
+        axes.plot(points[:, 0], points[:, 1], style, color=unit(color), lw=1.8, ms=3, label=name, zorder=6)
     limbs = sorted({contact.limb for contact, _ in contacts})
     entries = [
         Line2D([], [], marker="s", ls="", color=unit(LIMB_COLORS[x]), label=x.label.replace("_", " ")) for x in limbs
@@ -108,7 +108,7 @@ def _centres(
         times = np.linspace(0, motion.problem.times[-1], 20 * motion.problem.steps + 1)
         paths["optimised"] = (np.array([motion.sample(float(time))[0] for time in times]), OPTIMISED, "-")
     if executed is not None:
-        paths["executed"] = (executed, EXECUTED, "-")
+        paths["executed"] = (executed, EXECUTED, ":")
     return paths
 
 
