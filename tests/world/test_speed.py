@@ -28,10 +28,10 @@ def height_field():
     ],
     ids=["mesh_of_1000_triangles", "32_m_of_rubble", "height_field_50_x_50"],
 )
-def test_seconds_to_load(text, limit, tmp_path):
+def test_processor_seconds_to_load(text, limit, tmp_path):
     seconds = []
     for _ in range(3):
-        began = time.perf_counter()
+        began = time.process_time()
         load_world(tmp_path / "world.xml", mjcf=text)
-        seconds.append(time.perf_counter() - began)
+        seconds.append(time.process_time() - began)
     assert np.median(seconds) < limit
