@@ -43,7 +43,7 @@ def add_planning_options(target: argparse.ArgumentParser) -> None:
         "--planner",
         choices=("auto", "learned", "optimiser", "kinematic", "quasi-static"),
         default="auto",
-        help="who judges the dynamics of a transition in the search: trained networks, the centroidal optimiser itself, "
+        help="who judges the dynamics of a transition in the search: trained networks, the centroidal optimiser, "
         "nobody, or the static balance of every stance; auto: networks where the robot has them, else nobody",
     )
     target.add_argument(

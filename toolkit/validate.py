@@ -47,6 +47,7 @@ def main(argv: list[str] | None = None) -> int:
     from toolkit import pipeline
     from toolkit.report.console import StageConsole
     from toolkit.report.files import RunFolder
+    from toolkit.report.offscreen import require_rendering
     from toolkit.report.run import write_run
     from toolkit.robot.loader import load_robot
     from toolkit.search.options import planner_config
@@ -58,10 +59,10 @@ def main(argv: list[str] | None = None) -> int:
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
     folder = RunFolder(args.out, world.name, robot.name)
+    if args.pictures or args.video:
+        require_rendering()
     display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
-    config = replace(
-        pipeline.PipelineConfig(), seed=args.seed, time_limit=args.time_limit, candidates=args.candidates
-    )
+    config = replace(pipeline.PipelineConfig(), seed=args.seed, time_limit=args.time_limit, candidates=args.candidates)
     planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
     result = pipeline.run(robot, world, planner, config, display)
     with folder:
