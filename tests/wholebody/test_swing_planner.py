@@ -3,8 +3,10 @@ import pytest
 
 from tests.wholebody.conftest import FIRST, RISE, stairs, world_of
 from toolkit.geometry.pose import Pose, rotation_on_surface
+from toolkit.wholebody.detour import corners, gaps
 from toolkit.wholebody.limb_paths import box_collide
-from toolkit.wholebody.swing_planner import EASY, SwingConfig, SwingTask, _corners, _gaps, plan_swing
+from toolkit.wholebody.swing_planner import plan_swing
+from toolkit.wholebody.swing_task import EASY, SwingConfig, SwingTask
 
 HALF = np.array([0.11, 0.065])
 CONFIG = SwingConfig()
@@ -19,8 +21,8 @@ def lowest_over(path, half, x_range):
     """Least height of the sole's corners while they are within a range of x."""
     u = np.linspace(0, 1, 401)
     points = path.positions(u)
-    corners = np.array([[sx * half[0], sy * half[1], 0.0] for sx in (1, -1) for sy in (1, -1)])
-    world = points[:, None] + np.einsum("kij,cj->kci", path.rotations(u), corners)
+    sole = np.array([[sx * half[0], sy * half[1], 0.0] for sx in (1, -1) for sy in (1, -1)])
+    world = points[:, None] + np.einsum("kij,cj->kci", path.rotations(u), sole)
     inside = (world[..., 0] > x_range[0]) & (world[..., 0] < x_range[1])
     return world[..., 2][inside].min()
 
@@ -94,9 +96,9 @@ def test_foot_goes_around_the_standing_foot():
     start, end = [-0.05, 0.09, 0.0], [0.5, 0.03, 0.0]
     blocked = plan_swing(task_of(start, end), free(None), CONFIG)
     path = plan_swing(task_of(start, end, other=other), free(None), CONFIG)
-    standing = _corners(other[0].position[None], other[0].rotation[None], HALF)[0]
+    standing = corners(other[0].position[None], other[0].rotation[None], HALF)[0]
     u = np.linspace(0, 1, 101)
-    gap = {name: _gaps(_corners(p.positions(u), p.rotations(u), HALF), standing).min() for name, p in
+    gap = {name: gaps(corners(p.positions(u), p.rotations(u), HALF), standing).min() for name, p in
            (("straight", blocked), ("around", path))}  # fmt: skip
     assert gap["straight"] < 0.01
     assert gap["around"] > CONFIG.gap - 2e-3

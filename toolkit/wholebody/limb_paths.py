@@ -18,7 +18,9 @@ from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.profile import Window
 from toolkit.wholebody.swing import PathSample, SwingPath
-from toolkit.wholebody.swing_planner import Collide, SwingConfig, SwingTask, plan_swing
+from toolkit.wholebody.swing_planner import Collide, plan_swing
+from toolkit.wholebody.swing_task import SwingConfig, SwingTask
+from toolkit.wholebody.toe_pitch import SwingingLeg
 from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
 
@@ -193,14 +195,30 @@ def _swing(
 
     start = old.pose if old is not None else free(index - 1 if index > 0 else index, phase.start)
     end = new.pose if new is not None else free(min(index + 1, len(phases) - 1), phase.end)
-    other = None
-    if limb.is_foot:
-        standing = _contact(phase, limb.mirrored)
-        other = None if standing is None else (standing.pose, robot.half_sizes[limb.mirrored])
-    task = SwingTask(
-        phase.start, phase.duration, start, end, robot.half_sizes[limb], limb.is_foot, old is None, new is None, other
+    other = leg = None
+    standing = _contact(phase, limb.mirrored) if limb.is_foot else None
+    if standing is not None:
+        other = standing.pose, robot.half_sizes[limb.mirrored]
+        if motion is not None:
+            u = np.linspace(0.0, 1.0, config.samples)
+            com = np.array([motion.sample(phase.start + share * phase.duration)[0] for share in u])
+            leg = SwingingLeg(robot.legs[limb], u, com, standing.pose.yaw)
+    path = plan_swing(
+        SwingTask(
+            begin=phase.start,
+            duration=phase.duration,
+            start=start,
+            end=end,
+            half_size=robot.half_sizes[limb],
+            is_foot=limb.is_foot,
+            free_start=old is None,
+            free_end=new is None,
+            other=other,
+            leg=leg,
+        ),
+        collide,
+        config,
     )
-    path = plan_swing(task, collide, config)
     return Segment(phase.start, phase.end, phase.transition, path=path, free_start=old is None, free_end=new is None)
 
 

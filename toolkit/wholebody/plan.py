@@ -15,9 +15,10 @@ from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.avoidance import ArmAvoidance
 from toolkit.wholebody.check import CheckConfig, CheckReport, check
-from toolkit.wholebody.ik import IKConfig, WholeBodyIK, first_guess
+from toolkit.wholebody.ik import WholeBodyIK, first_guess
+from toolkit.wholebody.ik_config import IKConfig
 from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
-from toolkit.wholebody.swing_planner import SwingConfig
+from toolkit.wholebody.swing_task import SwingConfig
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.world import World
 
@@ -89,8 +90,10 @@ def solve_ik(
         PlanningError: if a quadratic program has no solution.
     """
     tick = float(times[1] - times[0]) / config.substeps
-    avoid = world is not None and config.avoidance.enabled
-    solver = WholeBodyIK(robot, config, tick, ArmAvoidance(robot, world, config.avoidance) if avoid else None)
+    avoidance = None
+    if world is not None and config.avoidance.enabled:
+        avoidance = ArmAvoidance(robot, world, config.avoidance)
+    solver = WholeBodyIK(robot, config, tick, avoidance)
     qpos = np.empty((len(times), len(robot.home)))
     qpos[0] = solver.start(first_guess(robot, paths, motion), paths, motion)
     for index in range(1, len(times)):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from toolkit.geometry.pose import Pose
+from toolkit.wholebody.detour import detour
 from toolkit.wholebody.profile import Window
 from toolkit.wholebody.swing import Move, SwingPath
+from toolkit.wholebody.swing_task import SwingConfig, SwingTask, SwingTiming
 
 Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool: the box touches the world."""
@@ -18,97 +19,13 @@ Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
 
 
-@dataclass(frozen=True)
-class SwingTiming:
-    """When, as fractions of a swing, the patch leaves its surface, rises, crosses, descends and lands."""
-
-    leave: Window = Window(0.0, 0.45)
-    rise: Window = Window(0.0, 0.5)
-    across: Window = Window(0.05, 0.85)
-    descend: Window = Window(0.5, 0.95)
-    land: Window = Window(0.55, 1.0)
-
-
-EASY = SwingTiming()
-STEEP = SwingTiming(Window(0.0, 0.3), Window(0.0, 0.4), Window(0.2, 0.8), Window(0.6, 1.0), Window(0.7, 1.0))
-
-
-@dataclass(frozen=True)
-class SwingConfig:
-    """Shape of swing paths.
-
-    Attributes:
-        foot_lift, palm_lift: m; guarded motion along the surface normal at both ends.
-        margin: m; kept free around the swept patch, where the start and the end leave that much.
-        thickness: m; height of the swept box above the patch.
-        raise_step, max_raise: m; what the path is raised by until it is clear, and the most it may be.
-        gap: m; kept between the soles of the swinging and the standing foot.
-        detour_step, max_detour: m; the same for the sideways detour around the standing foot.
-        easy, steep: timing for the open, and timing that rises first, crosses then, and descends last.
-        easy_raise: m; paths raised by more than that are first tried with the steep timing.
-        fast_across: window of the crossing for swings faster than `fast`.
-        slow, fast: m/s; mean speed up to which the window of the crossing is kept, and from which it is `fast_across`.
-        pitch_gain, pitch_from, max_pitch: rad/m, m, rad; a foot that trails the standing one by more than `pitch_from`
-            pitches its toes down in proportion.
-        moderate_raise: m; higher paths come after lower ones with less margin.
-        samples: least number of poses per swing that are checked.
-        spacing: m; largest way between two of them.
-    """
-
-    foot_lift: float = 0.05
-    palm_lift: float = 0.05
-    margin: float = 0.02
-    thickness: float = 0.08
-    raise_step: float = 0.03
-    max_raise: float = 0.36
-    gap: float = 0.02
-    detour_step: float = 0.02
-    max_detour: float = 0.16
-    slow: float = 1.0
-    fast: float = 2.5
-    easy: SwingTiming = EASY
-    steep: SwingTiming = STEEP
-    easy_raise: float = 0.04
-    fast_across: Window = Window(0.0, 1.0)
-    pitch_gain: float = 1.5
-    pitch_from: float = 0.2
-    max_pitch: float = 0.6
-    moderate_raise: float = 0.12
-    samples: int = 33
-    spacing: float = 0.03
-
-
-@dataclass(frozen=True)
-class SwingTask:
-    """What a swing has to connect.
-
-    Attributes:
-        begin, duration: s.
-        start, end: world_from_contact at both ends.
-        half_size: (2,) m; half extents of the patch.
-        is_foot: feet are raised along z, palms away from the wall.
-        free_start, free_end: the palm comes from, or goes to, the arm's free posture: no surface there.
-        other: the standing sole as (pose, half size); None for palms.
-    """
-
-    begin: float
-    duration: float
-    start: Pose
-    end: Pose
-    half_size: np.ndarray
-    is_foot: bool
-    free_start: bool = False
-    free_end: bool = False
-    other: tuple[Pose, np.ndarray] | None = None
-
-
 def plan_swing(task: SwingTask, collide: Collide, config: SwingConfig) -> SwingPath:
     """The least raised path that is clear, with `clear` False where none is.
 
     Candidates are tried from the straightest to the highest, moderate heights first with the whole margin, then with
     half of it, then with none; then great heights likewise.
     """
-    detour = _detour(task, config)
+    bump = detour(task, lambda vector: _path(task, 0.0, 0.0, config.easy, vector, config), config)
     sides = _free_sides(task, collide, config)
     candidates = list(_candidates(task, config))
     needed = 0.0 if not task.is_foot else abs(task.end.position[2] - task.start.position[2])
@@ -117,10 +34,10 @@ def plan_swing(task: SwingTask, collide: Collide, config: SwingConfig) -> SwingP
     for group in (moderate, great):
         for share in (1.0, 0.5, 0.0):
             for before, after, timing in group:
-                path = _path(task, before, after, timing, detour, config)
+                path = _within_ankle_range(task, _path(task, before, after, timing, bump, config), config)
                 if not collide(*_swept_boxes(task, path, share * config.margin, sides, config)).any():
                     return path
-    return replace(_path(task, *candidates[-1], detour, config), clear=False)
+    return replace(_path(task, *candidates[-1], bump, config), clear=False)
 
 
 def _candidates(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float, SwingTiming]]:
@@ -147,9 +64,9 @@ def _raises(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float
 
 
 def _path(
-    task: SwingTask, before: float, after: float, timing: SwingTiming, detour: np.ndarray, config: SwingConfig
+    task: SwingTask, before: float, after: float, timing: SwingTiming, bump: np.ndarray, config: SwingConfig
 ) -> SwingPath:
-    """The path with given extra heights, timing and detour."""
+    """The path with given extra heights, timing and sideways bump."""
     lift = config.foot_lift if task.is_foot else config.palm_lift
     off = np.zeros(3) if task.free_start else lift * task.start.normal
     onto = np.zeros(3) if task.free_end else -lift * task.end.normal
@@ -162,13 +79,32 @@ def _path(
         Move(travel, across),
         Move(-after * up, timing.descend),
         Move(onto, timing.land),
-        Move(detour, across, returns=True),
+        Move(bump, across, returns=True),
     ]
-    pitch = _pitch(task, config)
-    if pitch:  # about the toes, not about the middle of the sole
-        moves.append(Move(task.half_size[0] * np.sin(pitch) * task.start.normal, SwingPath.pitching, returns=True))
     moves = tuple(move for move in moves if np.any(move.vector))
-    return SwingPath(task.begin, task.duration, task.start, task.end, moves, across, pitch)
+    return _pitched(
+        task, SwingPath(task.begin, task.duration, task.start, task.end, moves, across), _pitch(task, config)
+    )
+
+
+def _pitched(task: SwingTask, path: SwingPath, pitch: float) -> SwingPath:
+    """The path with its toes pitched down by a further angle (rad) on the way, about the toes; up about the heel."""
+    if abs(pitch) < 1e-3:
+        return path
+    reach = task.half_size[0]
+    rise = reach * (abs(np.sin(path.pitch + pitch)) - abs(np.sin(path.pitch)))
+    moves = (*path.moves, Move(rise * task.start.normal, path.pitching, returns=True))
+    return replace(path, moves=moves, pitch=path.pitch + pitch)
+
+
+def _within_ankle_range(task: SwingTask, path: SwingPath, config: SwingConfig) -> SwingPath:
+    """The path with as much more pitch as the ankle needs; twice, since the pitch raises the foot."""
+    if task.leg is None:
+        return path
+    for _ in range(2):
+        wanted = path.pitch + task.leg.extra_pitch(path, config.ankle_margin)
+        path = _pitched(task, path, float(np.clip(wanted, -config.max_pitch, config.max_pitch)) - path.pitch)
+    return path
 
 
 def _pitch(task: SwingTask, config: SwingConfig) -> float:
@@ -243,64 +179,3 @@ def _swept_boxes(
     half[:, 2] = 0.5 * (config.thickness + below - SKIN)
     centers = points + (0.5 * (config.thickness - below + SKIN))[:, None] * rotations[:, :, 2]
     return centers, rotations, half
-
-
-def _detour(task: SwingTask, config: SwingConfig) -> np.ndarray:
-    """(3,) m; horizontal bump that leads a foot around the standing one, zero where the straight way is free."""
-    if task.other is None:
-        return np.zeros(3)
-    pose, half_size = task.other
-    standing = _corners(pose.position[None], pose.rotation[None], half_size)[0]
-    u = np.linspace(0.0, 1.0, config.samples)
-
-    def gap(detour: np.ndarray) -> tuple[float, float]:
-        path = _path(task, 0.0, 0.0, config.easy, detour, config)
-        gaps = _gaps(_corners(path.positions(u), path.rotations(u), task.half_size), standing)
-        return float(gaps.min()), float(min(gaps[0], gaps[-1]))
-
-    free, at_ends = gap(np.zeros(3))
-    wanted = min(config.gap, at_ends)
-    if free >= wanted - 1e-6:
-        return np.zeros(3)
-    travel = (task.end.position - task.start.position)[:2]
-    aside = np.array([-travel[1], travel[0], 0.0])
-    length = np.linalg.norm(aside)
-    if length < 1e-6:
-        return np.zeros(3)
-    middle = 0.5 * (task.end.position + task.start.position) - pose.position
-    aside *= (1.0 if aside @ middle >= 0.0 else -1.0) / length
-    best, best_gap = np.zeros(3), free
-    for size in np.arange(config.detour_step, config.max_detour + 1e-9, config.detour_step):
-        reached = gap(size * aside)[0]
-        if reached > best_gap:
-            best, best_gap = size * aside, reached
-        if reached >= wanted - 1e-6:
-            break
-    return best
-
-
-def _corners(positions: np.ndarray, rotations: np.ndarray, half_size: np.ndarray) -> np.ndarray:
-    """(k, 4, 2) corners of patches seen from above, in order around."""
-    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], float)
-    local = np.concatenate([signs * half_size, np.zeros((4, 1))], 1)
-    return (positions[:, None] + np.einsum("kij,cj->kci", rotations, local))[..., :2]
-
-
-def _gaps(moving: np.ndarray, standing: np.ndarray) -> np.ndarray:
-    """(k,) m; largest separation of convex quadrilaterals along any edge normal, negative where they overlap.
-
-    Args:
-        moving: (k, 4, 2) m; corners in order around.
-        standing: (4, 2) m.
-    """
-    standing = np.broadcast_to(standing, moving.shape)
-    gaps = np.full(len(moving), -np.inf)
-    for shape in (moving, standing):
-        edges = np.roll(shape, -1, axis=1) - shape
-        normals = np.stack([edges[..., 1], -edges[..., 0]], -1)
-        normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
-        first = np.einsum("kni,kci->knc", normals, moving)
-        second = np.einsum("kni,kci->knc", normals, standing)
-        apart = np.maximum(first.min(-1) - second.max(-1), second.min(-1) - first.max(-1))
-        gaps = np.maximum(gaps, apart.max(-1))
-    return gaps

@@ -1,0 +1,80 @@
+"""The way of a swinging foot around the standing one, seen from above."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from toolkit.wholebody.swing import SwingPath
+from toolkit.wholebody.swing_task import SwingConfig, SwingTask
+
+
+def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath], config: SwingConfig) -> np.ndarray:
+    """Horizontal bump that leads a foot around the standing one.
+
+    Args:
+        task: the swing.
+        path_of: path with a given bump (3,) in m.
+        config: how far to keep away.
+
+    Returns:
+        (3,) m; zero where the straight way is free.
+    """
+    if task.other is None:
+        return np.zeros(3)
+    pose, half_size = task.other
+    standing = corners(pose.position[None], pose.rotation[None], half_size)[0]
+    u = np.linspace(0.0, 1.0, config.samples)
+
+    def gap(bump: np.ndarray) -> tuple[float, float]:
+        path = path_of(bump)
+        apart = gaps(corners(path.positions(u), path.rotations(u), task.half_size), standing)
+        return float(apart.min()), float(min(apart[0], apart[-1]))
+
+    free, at_ends = gap(np.zeros(3))
+    wanted = min(config.gap, at_ends)
+    if free >= wanted - 1e-6:
+        return np.zeros(3)
+    travel = (task.end.position - task.start.position)[:2]
+    aside = np.array([-travel[1], travel[0], 0.0])
+    length = np.linalg.norm(aside)
+    if length < 1e-6:
+        return np.zeros(3)
+    middle = 0.5 * (task.end.position + task.start.position) - pose.position
+    aside *= (1.0 if aside @ middle >= 0.0 else -1.0) / length
+    best, best_gap = np.zeros(3), free
+    for size in np.arange(config.detour_step, config.max_detour + 1e-9, config.detour_step):
+        reached = gap(size * aside)[0]
+        if reached > best_gap:
+            best, best_gap = size * aside, reached
+        if reached >= wanted - 1e-6:
+            break
+    return best
+
+
+def corners(positions: np.ndarray, rotations: np.ndarray, half_size: np.ndarray) -> np.ndarray:
+    """(k, 4, 2) corners of patches seen from above, in order around."""
+    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], float)
+    local = np.concatenate([signs * half_size, np.zeros((4, 1))], 1)
+    return (positions[:, None] + np.einsum("kij,cj->kci", rotations, local))[..., :2]
+
+
+def gaps(moving: np.ndarray, standing: np.ndarray) -> np.ndarray:
+    """(k,) m; largest separation of convex quadrilaterals along any edge normal, negative where they overlap.
+
+    Args:
+        moving: (k, 4, 2) m; corners in order around.
+        standing: (4, 2) m.
+    """
+    standing = np.broadcast_to(standing, moving.shape)
+    gaps = np.full(len(moving), -np.inf)
+    for shape in (moving, standing):
+        edges = np.roll(shape, -1, axis=1) - shape
+        normals = np.stack([edges[..., 1], -edges[..., 0]], -1)
+        normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+        first = np.einsum("kni,kci->knc", normals, moving)
+        second = np.einsum("kni,kci->knc", normals, standing)
+        apart = np.maximum(first.min(-1) - second.max(-1), second.min(-1) - first.max(-1))
+        gaps = np.maximum(gaps, apart.max(-1))
+    return gaps
