@@ -38,14 +38,17 @@ class Graph:
     def is_goal(self, states):
         return [state in self.goals for state in states]
 
+    def crowd(self, states):
+        return [state % 7 for state in states]
+
 
 @pytest.mark.parametrize("epsilon", [0.0, 0.1, 0.7])
-@pytest.mark.parametrize("initial_cost", [math.inf, 5.0])
+@pytest.mark.parametrize(("initial_cost", "crowding"), [(math.inf, 0.0), (5.0, 0.0), (math.inf, 0.5), (5.0, 2.0)])
 @pytest.mark.parametrize("consistent", [True, False])
-def test_exhaustion_equals_dijkstra(epsilon, initial_cost, consistent):
-    for seed in range(25):
+def test_exhaustion_equals_dijkstra(epsilon, initial_cost, crowding, consistent):
+    for seed in range(15):
         graph = Graph(np.random.default_rng(seed), consistent=consistent)
-        config = AnaStarConfig(epsilon=epsilon, initial_cost=initial_cost)
+        config = AnaStarConfig(epsilon=epsilon, initial_cost=initial_cost, crowding=crowding)
         result = AnaStar(graph, np.random.default_rng(seed), config).run()
         assert result.stopped_by == "exhausted"
         if graph.least == math.inf:

@@ -9,6 +9,10 @@ costly as the best one. With probability epsilon a random open state is expanded
 alone and helps out of cul-de-sacs. States reopen when a cheaper path to them is found, so that the search, run to
 exhaustion, ends with the cheapest path whether or not h is consistent.
 
+Beyond the paper, states that are alike can be made to wait for each other (`AnaStarConfig.crowding`): each expansion
+in a crowd adds to the h by which the others in it are ordered, as if the valley there filled up. Pruning and bounds
+keep the true h.
+
 Reference:
     van den Berg, Shah, Huang, Goldberg: ANA*: Anytime Nonparametric A*, AAAI 2011; the paper, Sec. V.
 """
@@ -43,8 +47,11 @@ class SearchProblem(Protocol):
         """The state in which the search begins."""
         ...
 
-    def expand(self, state: State, slack: float) -> Sequence[Edge]:
-        """Edges out of a state; those with cost + heuristic >= slack cannot improve and may be left out."""
+    def expand(self, state: State, slack: float) -> Sequence[Edge] | None:
+        """Edges out of a state; None where there is no time left to find them.
+
+        Edges with cost + heuristic >= slack cannot improve and may be left out.
+        """
         ...
 
     def heuristic(self, states: Sequence[State]) -> Sequence[float]:
@@ -53,6 +60,10 @@ class SearchProblem(Protocol):
 
     def is_goal(self, states: Sequence[State]) -> Sequence[bool]:
         """Whether each state is a goal."""
+        ...
+
+    def crowd(self, states: Sequence[State]) -> Sequence[Hashable]:
+        """What each state has in common with those like it."""
         ...
 
 
@@ -115,6 +126,7 @@ class AnaStarConfig:
         epsilon: probability of expanding a random open state.
         initial_cost: stands for G before there is a solution, for the order of expansion only: inf expands the least
             h (depth first, fastest), a smaller value weighs the cost so far as well. Nothing is pruned by it.
+        crowding: added to h for the order of expansion, per state already expanded in the same crowd.
         max_expansions: ends the search; None for no limit.
         max_states: ends the search, to bound memory.
         report_interval: s between calls of the observer, solutions apart.
@@ -122,6 +134,7 @@ class AnaStarConfig:
 
     epsilon: float = 0.1
     initial_cost: float = math.inf
+    crowding: float = 0.0
     max_expansions: int | None = None
     max_states: int = 1_000_000
     report_interval: float = 0.1
@@ -176,6 +189,8 @@ class AnaStar:
         self._parent: list[int] = []
         self._edge_cost: list[float] = []  # from the parent
         self._payload: list[Any] = []
+        self._crowd: list[Hashable] = []
+        self._expanded_in: dict[Hashable, int] = {}
         self._open: list[int] = []  # in no order, for random draws
         self._place: list[int] = []  # of each node in _open, -1 where it is not open
         self._heap: list[tuple[float, int, int, float]] = []
@@ -197,7 +212,8 @@ class AnaStar:
             paths.append(Path((start,), (), 0.0, 1.0, 0.0, 0))
             self._best = 0.0
         else:
-            self._improve(Edge(start, 0.0), 0.0, float(self._problem.heuristic([start])[0]), -1)
+            h = float(self._problem.heuristic([start])[0])
+            self._improve(Edge(start, 0.0), 0.0, h, -1, self._problem.crowd([start])[0])
         stopped_by = "exhausted"
         while self._open:
             now = time.perf_counter() - began
@@ -211,8 +227,14 @@ class AnaStar:
                 break
             node = self._next()
             self._close(node)
-            expanded.append(self._state[node])
             goals = self._expand(node)
+            if goals is None:
+                self._reopen(node)
+                stopped_by = "time"
+                break
+            expanded.append(self._state[node])
+            crowd = self._crowd[node]
+            self._expanded_in[crowd] = self._expanded_in.get(crowd, 0) + 1
             for edge in sorted(goals, key=lambda goal: goal.cost):
                 path = self._reach(node, edge, time.perf_counter() - began, len(expanded))
                 if path is not None:
@@ -227,22 +249,28 @@ class AnaStar:
             tuple(paths), stopped_by, self._lower_bound(), seconds, len(expanded), len(self._state), tuple(expanded)
         )
 
-    def _expand(self, node: int) -> list[Edge]:
-        """Open the children of a node that may improve; returns the edges to goals instead of opening them."""
+    def _expand(self, node: int) -> list[Edge] | None:
+        """Open the children of a node that may improve; returns the edges to goals instead of opening them.
+
+        None where the problem had no time left.
+        """
         g, state = self._g[node], self._state[node]
         edges = self._problem.expand(state, self._best - g)
         if not edges:
-            return []
+            return None if edges is None else []
         states = [edge.state for edge in edges]
         goals = []
-        for edge, h, is_goal in zip(edges, self._problem.heuristic(states), self._problem.is_goal(states), strict=True):
+        problem = self._problem
+        for edge, h, is_goal, crowd in zip(
+            edges, problem.heuristic(states), problem.is_goal(states), problem.crowd(states), strict=True
+        ):
             if is_goal:
                 goals.append(edge)
             else:
-                self._improve(edge, g + edge.cost, float(h), node)
+                self._improve(edge, g + edge.cost, float(h), node, crowd)
         return goals
 
-    def _improve(self, edge: Edge, g: float, h: float, parent: int) -> None:
+    def _improve(self, edge: Edge, g: float, h: float, parent: int, crowd: Hashable) -> None:
         """Open a state, or reopen it, where the path to it is the cheapest so far and may lead to a better solution."""
         if not g + h < self._best or h == math.inf:
             return
@@ -256,25 +284,31 @@ class AnaStar:
             self._parent.append(parent)
             self._edge_cost.append(edge.cost)
             self._payload.append(edge.payload)
+            self._crowd.append(crowd)
             self._place.append(-1)
         elif g < self._g[node]:
             self._g[node], self._parent[node] = g, parent
             self._edge_cost[node], self._payload[node] = edge.cost, edge.payload
         else:
             return
+        self._reopen(node)
+
+    def _reopen(self, node: int) -> None:
         if self._place[node] < 0:
             self._place[node] = len(self._open)
             self._open.append(node)
         self._push(node)
 
     def _push(self, node: int) -> None:
-        g, h = self._g[node], self._h[node]
         self._pushes += 1
         # Equal priorities: the newest first, which keeps the search going in depth.
-        heapq.heappush(self._heap, (self._priority(g, h), -self._pushes, node, g))
+        heapq.heappush(self._heap, (self._priority(node), -self._pushes, node, self._g[node]))
 
-    def _priority(self, g: float, h: float) -> float:
+    def _priority(self, node: int) -> float:
         """Falls as e(s) rises."""
+        g, h = self._g[node], self._h[node]
+        if self._config.crowding > 0:
+            h += self._config.crowding * self._expanded_in.get(self._crowd[node], 0)
         target = self._best if self._best < math.inf else self._config.initial_cost
         if target == math.inf:
             return h
@@ -285,9 +319,14 @@ class AnaStar:
         if self._config.epsilon > 0 and self._rng.random() < self._config.epsilon:
             return self._open[int(self._rng.integers(len(self._open)))]
         while True:  # entries of closed nodes and of older paths are stale; every open node has a fresh one
-            _, _, node, g = heapq.heappop(self._heap)
-            if self._place[node] >= 0 and g == self._g[node]:
-                return node
+            priority, order, node, g = heapq.heappop(self._heap)
+            if self._place[node] < 0 or g != self._g[node]:
+                continue
+            now = self._priority(node)
+            if now > priority:  # its crowd has grown since: back with it
+                heapq.heappush(self._heap, (now, order, node, g))
+                continue
+            return node
 
     def _close(self, node: int) -> None:
         place, last = self._place[node], self._open[-1]
@@ -339,5 +378,5 @@ class AnaStar:
         self._heap = []
         for node in sorted(kept):
             self._pushes += 1
-            self._heap.append((self._priority(self._g[node], self._h[node]), -self._pushes, node, self._g[node]))
+            self._heap.append((self._priority(node), -self._pushes, node, self._g[node]))
         heapq.heapify(self._heap)

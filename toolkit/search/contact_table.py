@@ -9,7 +9,8 @@ from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, yaw_of
 
-_KEPT = 20_000  # Contact objects kept for reuse
+_KEPT = 50_000  # Contact objects kept for reuse
+_LIMBS = tuple(Limb)
 
 
 class ContactTable:
@@ -75,7 +76,7 @@ class ContactTable:
                 self._objects.clear()
             surface = int(self.surface[number])
             pose = Pose(self.rotation[number].copy(), self.position[number].copy())
-            found = Contact(Limb(int(self.limb[number])), pose, float(self._friction[surface]), surface)
+            found = Contact(_LIMBS[self.limb[number]], pose, float(self._friction[surface]), surface)
             self._objects[number] = found
         return found
 

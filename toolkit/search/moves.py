@@ -40,7 +40,7 @@ class MoveConfig:
     """
 
     apart: float = 0.02
-    climb: float = 0.45
+    climb: float = 0.55
     margins: ReachMargins = ReachMargins(length=0.005, ankle=0.05, hip=-0.1)
     drop: float = 0.25
     palm_side: float = 0.15

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -47,6 +47,9 @@ class PlannerConfig:
         moves: kinematic limits.
         projection: how patches find their place.
         grid: of the heuristic.
+        acceptable_cost: per m of way; order of magnitude of the first solution's cost, where `search.initial_cost`
+            leaves it open: the lower, the more the cost so far counts before there is a solution; inf: the search goes
+            straight for the goal.
         search: of ANA*. Time decides when a search stops, so the same seed gives the same plan only as long as the
             machine gets through the same expansions; `search.max_expansions` makes it exact.
     """
@@ -61,7 +64,8 @@ class PlannerConfig:
     moves: MoveConfig = field(default_factory=MoveConfig)
     projection: ProjectionConfig = field(default_factory=ProjectionConfig)
     grid: GridConfig = field(default_factory=GridConfig)
-    search: AnaStarConfig = field(default_factory=lambda: AnaStarConfig(max_expansions=20_000))
+    acceptable_cost: float = 2500.0
+    search: AnaStarConfig = field(default_factory=lambda: AnaStarConfig(max_expansions=20_000, crowding=0.3))
 
     def __post_init__(self):
         for name, allowed in (("steps", (60, 38)), ("wide_steps", ("auto", "on", "off"))):
@@ -181,7 +185,12 @@ class ContactPlanner:
         standing = ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], self._timings[0])
         self._evaluator.evaluate(start, com, np.zeros(3), [standing])
         judge = None if self._goal_evaluator is None else _goal_judge(problem, self._goal_evaluator, self.config.cost)
-        result = AnaStar(problem, rng, self.config.search, judge).run(time_limit, observer)
+        settings = self.config.search
+        if settings.initial_cost == np.inf:
+            way = float(distance(start.mean_feet.position[None], np.array([start.mean_feet.yaw]))[0])
+            settings = replace(settings, initial_cost=self.config.acceptable_cost * max(way, 1.0))
+        problem.deadline = time.perf_counter() + time_limit
+        result = AnaStar(problem, rng, settings, judge).run(time_limit, observer)
         expanded = problem.feet(unpack(result.expanded)[:, CONTACTS]) if result.expanded else (np.zeros((0, 3)), [])
         return SearchResult(
             solutions=tuple(_solution(problem, path) for path in result.paths),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,7 +11,6 @@ import numpy as np
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.geometry.limb import FEET, PALMS, Limb
-from toolkit.geometry.pose import rotation_about_z
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
@@ -24,6 +24,7 @@ from toolkit.world.timing import Timing
 from toolkit.world.world import Goal
 
 _LIMBS = tuple(Limb)
+_CROWD = 0.1  # m
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class CostConfig:
     dynamics: float = 0.1
     time: float = 5.0
     stagger: float = 5.0
-    swing_speed: float = 3.0
+    swing_speed: float = 4.0
     com_drops: tuple[float, ...] = (0.0, 0.03, 0.06, 0.1)
     lift_off: tuple[float, ...] = (1.0, 0.5)
     arm_slack: float = 0.03
@@ -97,6 +98,7 @@ class ContactProblem:
 
     Attributes:
         rejected: (len(REASONS),) int; candidates that fell, by reason.
+        deadline: s on the clock of `time.perf_counter`; no query that would end later is begun.
     """
 
     def __init__(
@@ -125,6 +127,8 @@ class ContactProblem:
         self._start = pack(numbers, np.array([-1]), com[None], np.zeros((1, 3)))[0]
         self._drops = np.array(config.com_drops)
         self.rejected = np.zeros(len(screen.REASONS), np.int64)
+        self.deadline = np.inf
+        self._pace = 0.0  # s per transition of the last query
 
     def start(self) -> bytes:
         """See `SearchProblem`."""
@@ -168,7 +172,12 @@ class ContactProblem:
     def _at_goal(self, centre: np.ndarray) -> np.ndarray:
         return np.hypot(*(centre[:, :2] - self._goal.position[:2]).T) <= self._goal.radius
 
-    def expand(self, state: bytes, slack: float) -> list[Edge]:
+    def crowd(self, states: Sequence[bytes]) -> list[tuple[int, int]]:
+        """See `SearchProblem`: states with the mean of the feet in the same square of 0.1 m."""
+        centre = self.feet(unpack(states)[:, CONTACTS])[0]
+        return list(map(tuple, np.floor(centre[:, :2] / _CROWD).astype(int).tolist()))
+
+    def expand(self, state: bytes, slack: float) -> list[Edge] | None:
         """See `SearchProblem`: screens, then one query of the evaluator for all children together."""
         row = unpack([state])[0]
         candidates = self._candidates(row)
@@ -191,7 +200,11 @@ class ContactProblem:
                 candidates.limb.tolist(), candidates.number.tolist(), timing.tolist(), strict=True
             )
         ]
+        began = time.perf_counter()
+        if began + self._pace * len(transitions) > self.deadline:
+            return None
         batch = self._evaluator.evaluate(stance, com, velocity, transitions)
+        self._pace = (time.perf_counter() - began) / len(transitions)
         codes = np.where(batch.feasible, 0, screen.DYNAMICS)
         rows = np.flatnonzero(batch.feasible)
         if len(rows):
@@ -294,7 +307,9 @@ class ContactProblem:
             held = np.flatnonzero(after[:, palm] >= 0)
             if len(held):
                 arm = self._robot.arms[palm]
-                shoulder = end[held] + rotation_about_z(candidates.yaw[held]) @ arm.shoulder_in_com
+                c, s = np.cos(candidates.yaw[held]), np.sin(candidates.yaw[held])
+                x, y, z = arm.shoulder_in_com
+                shoulder = end[held] + np.stack([c * x - s * y, s * x + c * y, np.full(len(held), z)], axis=-1)
                 distance = np.linalg.norm(table.position[after[held, palm]] - shoulder, axis=1)
                 slack = self._config.arm_slack
                 codes[held[(distance < arm.min_reach - slack) | (distance > arm.max_reach + slack)]] = screen.ARM
