@@ -113,14 +113,14 @@ def _tracking(
         data.qpos[:] = state
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        error = np.linalg.norm(data.subtree_com[0] - motion.sample(time)[0])
+        error = float(np.linalg.norm(data.subtree_com[0] - motion.sample(time)[0]))
         position = max(position, note("the CoM", "m", error, config.com, time))
         for limb, item in robot.limbs.items():
             sample = paths.sample(limb, time)
             if sample.pose is None or not (limb.is_foot or sample.in_contact):
                 continue
             site = data.site(item.site)
-            error = np.linalg.norm(site.xpos - sample.pose.position)
+            error = float(np.linalg.norm(site.xpos - sample.pose.position))
             if not sample.in_contact:
                 note(f"{limb.label} in the air", "m", error, config.swing, time)
                 continue

@@ -190,7 +190,7 @@ class WholeBodyIK:
     def _set_dampers(self, qpos: np.ndarray, angles: np.ndarray, reaching: set[Limb]) -> None:
         """Keep the arms clear of the world and the body."""
         if self.dampers is not None:
-            self.solver.remove_constraint(self.dampers)
+            self.solver.remove_constraint(self.dampers)  # pyright: ignore[reportArgumentType]
             self.dampers = None
         if self.avoidance is None:
             return

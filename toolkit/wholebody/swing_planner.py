@@ -51,14 +51,14 @@ def _candidates(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, f
 
 def _raises(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float]]:
     """Extra height (m) before and after the crossing, from the least to the most."""
-    steps = np.arange(0.0, config.max_raise + 1e-9, config.raise_step)
+    steps = np.arange(0.0, config.max_raise + 1e-9, config.raise_step).tolist()
     if not task.is_foot:
         yield from ((0.0 if task.free_start else step, 0.0 if task.free_end else step) for step in steps)
         return
-    climb = task.end.position[2] - task.start.position[2]
-    climb += config.foot_lift * (task.end.normal[2] - task.start.normal[2])
+    climb = float(task.end.position[2] - task.start.position[2])
+    climb += config.foot_lift * float(task.end.normal[2] - task.start.normal[2])
     up, down = max(climb, 0.0), max(-climb, 0.0)
-    shares = np.linspace(0.0, 1.0, 1 + min(4, int(np.ceil(abs(climb) / config.raise_step))))
+    shares = np.linspace(0.0, 1.0, 1 + min(4, int(np.ceil(abs(climb) / config.raise_step)))).tolist()
     yield from ((share * up, share * down) for share in shares)
     yield from ((up + step, down + step) for step in steps[1:])
 

@@ -1,0 +1,78 @@
+import mujoco
+import numpy as np
+import pytest
+
+from tests.wholebody.conftest import world_of
+from toolkit.geometry.limb import PALMS, Limb
+from toolkit.wholebody.avoidance import ArmAvoidance, AvoidanceConfig
+from toolkit.wholebody.collision import CollisionConfig, first_collision
+from toolkit.wholebody.ik_config import IKConfig
+from toolkit.wholebody.limb_paths import limb_paths
+from toolkit.wholebody.plan import solve_ik
+
+CONFIG = AvoidanceConfig()
+
+
+@pytest.fixture
+def hand(robot):
+    if Limb.LEFT_PALM not in robot.limbs:
+        pytest.skip("a robot without palms")
+    data = mujoco.MjData(robot.mujoco_model)
+    data.qpos[:] = robot.home
+    mujoco.mj_forward(robot.mujoco_model, data)
+    return data.site(robot.limbs[Limb.LEFT_PALM].site).xpos.copy()
+
+
+def side_wall(y):
+    return world_of(f'<geom name="wall" type="box" size="3 0.05 1.5" pos="0 {y + 0.05} 1.5"/>')
+
+
+def outermost(robot, qpos):
+    """Largest y of the left arm's geoms in a posture, by their bounding spheres' centres."""
+    model, data = robot.mujoco_model, mujoco.MjData(robot.mujoco_model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    return data.geom_xpos[:, 1].max()
+
+
+def test_nothing_pushes_in_the_open(robot, hand):
+    """At home some links are near others, none so near that its damper asks for a motion."""
+    avoidance = ArmAvoidance(robot, world_of(""), CONFIG)
+    rows, bound = avoidance.rows(robot.home, np.zeros(6), 0.01, set())
+    assert rows.shape == (len(bound), len(robot.joint_names))
+    assert (bound > 0.0).all()
+
+
+def test_rows_are_derivatives_of_the_distance(robot, hand):
+    """Moving the joints changes each distance as the row says, by finite differences on MuJoCo's distances."""
+    world = side_wall(hand[1] + 0.08)
+    avoidance, tick, h = ArmAvoidance(robot, world, CONFIG), 0.01, 1e-5
+    rows, bound = avoidance.rows(robot.home, np.zeros(6), tick, set())
+    assert len(rows) > 0
+    rng = np.random.default_rng(0)
+    direction = rng.normal(size=len(robot.joint_names))
+    moved = robot.home.copy()
+    moved[7:] += h * direction
+    _, bound_after = avoidance.rows(moved, np.zeros(6), tick, set())
+    # bound = (distance - safe) tick / time, and a row is minus the distance's gradient; sorted by distance both times
+    change = (bound_after - bound) * CONFIG.time / tick / h
+    nearest = np.argmin(bound)
+    np.testing.assert_allclose(change[nearest], -rows[nearest] @ direction, rtol=0.05, atol=1e-3)
+
+
+def test_a_reaching_hand_may_touch(robot, hand):
+    avoidance = ArmAvoidance(robot, side_wall(hand[1] + 0.03), CONFIG)
+    free, _ = avoidance.rows(robot.home, np.zeros(6), 0.01, set())
+    reaching, _ = avoidance.rows(robot.home, np.zeros(6), 0.01, set(PALMS))
+    assert len(reaching) < len(free)
+
+
+def test_arms_are_drawn_in_beside_a_wall(robot, flat_walk, hand):
+    """A wall that the home posture would touch: with dampers the walk is free, without them it collides."""
+    paths = limb_paths(robot, flat_walk.world, flat_walk.schedule, flat_walk.motion)
+    times = np.linspace(0.0, flat_walk.schedule.duration, int(50 * flat_walk.schedule.duration) + 1)
+    free = solve_ik(robot, paths, flat_walk.motion, times, IKConfig())
+    world = side_wall(max(outermost(robot, qpos) for qpos in free) + 0.02)
+    assert "world/wall" in first_collision(robot, world, times, free, CollisionConfig())
+    drawn_in = solve_ik(robot, paths, flat_walk.motion, times, IKConfig(), world)
+    assert first_collision(robot, world, times, drawn_in, CollisionConfig()) == ""
