@@ -16,10 +16,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from toolkit import cli
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError, InputError
-from toolkit.learning.collect import CollectConfig, collect
+from toolkit.learning.collect import Progress as Collected
+from toolkit.learning.collect import collect
 from toolkit.learning.dataset import read_dataset
 from toolkit.learning.evaluate import Score, balanced, score
 from toolkit.learning.query import query_seconds
+from toolkit.learning.shard import CollectConfig
 from toolkit.prediction.networks import load_networks
 from toolkit.report.console import make_console
 from toolkit.report.scores import score_table
@@ -78,20 +80,22 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
         robots=str(robot.folder.parent.resolve()),
         seed=args.seed,
         samples_per_category=args.samples,
-        default_share=args.default_share,
     )
     with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
-        task = progress.add_task("transitions", total=config.shards * config.shard_total)
+        task = progress.add_task("shards", total=config.shards)
 
-        def tick(labelled: int, seconds: float) -> None:
-            progress.update(task, completed=labelled)
+        def tick(state: Collected) -> None:
+            progress.update(task, completed=state.shards, description=f"shards ({state.labelled} transitions)")
             if not console.is_terminal:
-                console.print(f"{labelled} transitions, {seconds:.0f} s")
+                console.print(
+                    f"{state.shards} of {config.shards} shards, {state.labelled} transitions, {state.seconds:.0f} s"
+                )
 
         summary = collect(args.out, robot, config, pool, tick)
     console.print(
         f"{summary.labelled} transitions in {summary.seconds:.0f} s ({summary.rate:.0f} per s, {summary.resumed} found "
-        f"from before), feasible: {summary.feasible_share:.0%}\n{args.out}"
+        f"from before), feasible: {summary.feasible_share:.0%}; fewest of a category: "
+        f"{min(total for _, total in summary.counts.values())}\n{args.out}"
     )
     return 0
 
@@ -168,12 +172,6 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument("--samples", type=cli.positive(int), default=100_000, help="per category (default: %(default)s)")
     sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
     sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
-    sub.add_argument(
-        "--default-share",
-        type=float,
-        default=0.4,
-        help="share of the terrains with 1 s + 1 s and friction 0.5; the others draw both (default: %(default)s)",
-    )
     sub.set_defaults(run=run_collect)
 
     sub = add("fit", "train a classifier and a regressor per category")

@@ -23,6 +23,7 @@ from toolkit.centroidal.residual import confirmed
 
 FIRST_KNOT_TOLERANCE = 1e-7
 """m; how far the given first knot may violate reach or height."""
+Arrays = tuple[np.ndarray, ...]
 STATUS = {
     interior_point.SOLVED: "solved",
     interior_point.INFEASIBLE: "infeasible: proved by multipliers",
@@ -51,7 +52,40 @@ def solve(problem: CentroidalProblem, *, config: FastConfig | None = None) -> Ce
         The motion, checked by `toolkit.centroidal.residual`. Where `status` says infeasible, that has been proved.
     """
     start = perf_counter()
-    config = config or FastConfig()
+    code, iterations, (com, linear, angular, force, cop, torque) = _run(problem, config or FastConfig())
+    motion = CentroidalMotion(
+        problem=problem,
+        feasible=False,
+        status=STATUS[code],
+        com=com,
+        linear_momentum=linear,
+        angular_momentum=angular,
+        force=force,
+        cop=cop,
+        yaw_torque=torque,
+        objective=np.inf,
+        seconds=perf_counter() - start,
+        iterations=iterations,
+    )
+    if code in (interior_point.SOLVED, interior_point.UNDECIDED):
+        motion = confirmed(motion)
+        object.__setattr__(motion, "seconds", perf_counter() - start)
+    return motion
+
+
+def wrenches(problem: CentroidalProblem, *, config: FastConfig | None = None) -> Arrays | None:
+    """The motion of a problem as bare arrays, for labelling in bulk; nothing is checked.
+
+    Returns:
+        com, linear and angular momentum, force, cop and yaw torque as in `CentroidalMotion`; None where the solver says
+        infeasible.
+    """
+    code, _, motion = _run(problem, config or FastConfig())
+    return motion if code in (interior_point.SOLVED, interior_point.UNDECIDED) else None
+
+
+def _run(problem: CentroidalProblem, config: FastConfig) -> tuple[int, int, Arrays]:
+    """Status, iterations and the arrays of the motion."""
     p, w = problem, problem.weights
     weights = np.array(
         [
@@ -66,7 +100,7 @@ def solve(problem: CentroidalProblem, *, config: FastConfig | None = None) -> Ce
         ]
     )
     landing = p.landing_limb >= 0
-    code, iterations, com, linear, angular, force, cop, torque = _kernel()(
+    code, iterations, *motion = _kernel()(
         config.tolerance,
         config.max_iterations,
         p.mass,
@@ -96,24 +130,7 @@ def solve(problem: CentroidalProblem, *, config: FastConfig | None = None) -> Ce
         p.landing_position if landing else np.zeros(3),
         p.landing_rotation if landing else np.eye(3),
     )
-    motion = CentroidalMotion(
-        problem=p,
-        feasible=False,
-        status=STATUS[code],
-        com=com,
-        linear_momentum=linear,
-        angular_momentum=angular,
-        force=force,
-        cop=cop,
-        yaw_torque=torque,
-        objective=np.inf,
-        seconds=perf_counter() - start,
-        iterations=iterations,
-    )
-    if code in (interior_point.SOLVED, interior_point.UNDECIDED):
-        motion = confirmed(motion)
-        object.__setattr__(motion, "seconds", perf_counter() - start)
-    return motion
+    return code, iterations, tuple(motion)
 
 
 def solve_many(problems: Iterable[CentroidalProblem], *, config: FastConfig | None = None) -> list[CentroidalMotion]:

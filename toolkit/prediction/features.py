@@ -97,8 +97,8 @@ def encode(
 
     Args:
         stance: the parent's stance.
-        com: (3,) m, world.
-        com_velocity: (3,) m/s, world.
+        com: (3,) m, world, or (n, 3) for each transition its own.
+        com_velocity: (3,) or (n, 3) m/s, world.
         transitions: n transitions, all of one category and limb.
 
     Returns:

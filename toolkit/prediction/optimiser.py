@@ -9,6 +9,7 @@ from toolkit.centroidal.build import ProblemConfig, transition_problem
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.prediction.reach import within_reach
 from toolkit.robot.model import RobotModel
 
 
@@ -36,10 +37,15 @@ class OptimiserEvaluator:
     def evaluate(
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
     ) -> TransitionBatch:
-        """Judge transitions; see `TransitionEvaluator`. An infeasible one has an infinite objective and no motion."""
+        """Judge transitions; see `TransitionEvaluator`.
+
+        An infeasible one has an infinite objective and no motion. A CoM that is out of reach by no more than rounding
+        and prediction err (`within_reach`) is moved to where it is within reach first.
+        """
         n = len(transitions)
         feasible, objective = np.zeros(n, bool), np.full(n, np.inf)
         final_com, velocity = np.tile(np.asarray(com, float), (n, 1)), np.zeros((n, 3))
+        com = within_reach(self._robot, stance, np.asarray(com, float)[None], self._config)[0]
         for index, transition in enumerate(transitions):
             problem = transition_problem(
                 self._robot,

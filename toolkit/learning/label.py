@@ -1,0 +1,52 @@
+"""Labels in bulk: what `OptimiserEvaluator` says of transitions, for less than half of its time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.centroidal import fast
+from toolkit.centroidal.build import ProblemConfig, transition_problem
+from toolkit.centroidal.bulk_check import residual_and_objective
+from toolkit.centroidal.residual import TOLERANCE
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Stance
+from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.prediction.reach import within_reach
+from toolkit.robot.model import RobotModel
+
+
+def label(
+    robot: RobotModel,
+    stance: Stance,
+    com: np.ndarray,
+    com_velocity: np.ndarray,
+    transitions: list[ContactTransition],
+    config: ProblemConfig | None = None,
+) -> TransitionBatch:
+    """Solve every transition; each "feasible" is confirmed by the compiled residual check.
+
+    Args:
+        robot: the robot.
+        stance: the parent's.
+        com: (n, 3) m, initial CoM of each transition, world.
+        com_velocity: (n, 3) m/s.
+        transitions: n out of the stance.
+        config: of the problems.
+
+    Returns:
+        As `OptimiserEvaluator.evaluate`: infinite objective where infeasible.
+    """
+    n = len(transitions)
+    feasible, objective = np.zeros(n, bool), np.full(n, np.inf)
+    final_com, velocity = np.array(com, float), np.zeros((n, 3))
+    start = within_reach(robot, stance, com, config)
+    for row, transition in enumerate(transitions):
+        problem = transition_problem(robot, stance, start[row], com_velocity[row], transition, config=config)
+        motion = fast.wrenches(problem)
+        if motion is None:
+            continue
+        worst, value = residual_and_objective(problem, motion)
+        if worst <= TOLERANCE:
+            feasible[row], objective[row] = True, value
+            final_com[row], velocity[row] = motion[0][-1], motion[1][-1] / problem.mass
+    return TransitionBatch(feasible, objective, final_com, velocity)

@@ -1,0 +1,339 @@
+"""One shard of labelled transitions: the planner runs in random terrain and the optimiser labels what it considers.
+
+The planner walks at random through tilted tiles with one or two walls (paper, Sec. VI). Of the transitions out of a
+state some are labelled, preferring categories of which the shard still lacks samples, and the search goes on from
+those that are feasible. What a planner meets is mostly feasible, and the networks must know where that ends: so many
+initial states are disturbed, each by its own amount, that the wanted share of the labels is "infeasible".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from toolkit.contacts.category import Category, category_of
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.errors import PlanningError
+from toolkit.geometry.limb import PALMS
+from toolkit.learning.dataset import Samples
+from toolkit.learning.label import label
+from toolkit.learning.terrain import TerrainConfig, random_terrain
+from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.prediction.features import LAYOUT, TARGETS, encode, feature_size
+from toolkit.robot.loader import load_robot
+from toolkit.robot.model import RobotModel
+from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.planner import ContactPlanner, PlannerConfig
+from toolkit.world.loader import load_world
+from toolkit.world.timing import Timing
+from toolkit.world.world import Goal
+
+# Palms in contact before a transition of each category.
+PALMS_BEFORE = {category: len(limbs) - 2 for category, (limbs, _) in LAYOUT.items()}
+_NOWHERE = Goal(np.array([20.0, 0.0, 0.0]), 0.1)  # a search that finds its goal goes no further
+_REPEATS = 4  # times that one transition is labelled, from as many states
+_TO_GO_ON = 4  # labelled per state where no category lacks samples
+
+
+@dataclass(frozen=True)
+class CollectConfig:
+    """What to collect.
+
+    Attributes:
+        robot: name of the robot.
+        robots: folder that holds it, None for the default one.
+        seed: of everything random.
+        samples_per_category: at least so many.
+        per_shard: of each category in a shard, at least.
+        default_share: of terrains with the paper's timing (1 s + 1 s), friction (0.5) and tiles; the others draw all.
+        shift, swing: s, ranges that timings are drawn from (uniformly in their logarithm), one for each transition.
+        friction: range of the coefficient, drawn for each state.
+        tilt: deg, and
+        rise: m; ranges from which the largest tilt and height of the tiles of a terrain are drawn.
+        two_walls: share of the terrains with walls on both sides.
+        considered: transitions of a state that are labelled, and
+        children: of them that the search goes on from.
+        expansions: states of a terrain that are expanded.
+        infeasible: share of this label that is aimed at in every category, apart for default and other terrains.
+        com_spread: (3,) m; velocity_spread: (3,) m/s; standard deviations of a disturbance of the initial state in the
+            frame of the feet, before it is scaled.
+        far: range of the scale of large disturbances, as many as make `infeasible` true.
+        near: share of small disturbances, scaled by a number drawn from [0, 1], among the other states.
+        objective_limit: feasible transitions with a larger objective are left out, as in the original;
+        disturbed_limit: the same where the initial state was disturbed: what can just be recovered, at any price, is
+            of no use to a planner.
+    """
+
+    robot: str
+    robots: str | None = None
+    seed: int = 0
+    samples_per_category: int = 100_000
+    per_shard: int = 500
+    default_share: float = 0.45
+    shift: tuple[float, float] = (0.05, 1.0)
+    swing: tuple[float, float] = (0.3, 1.0)
+    friction: tuple[float, float] = (0.3, 0.9)
+    tilt: tuple[float, float] = (10.0, 32.0)
+    rise: tuple[float, float] = (0.02, 0.15)
+    two_walls: float = 0.8
+    considered: int = 24
+    children: int = 4
+    expansions: int = 40
+    infeasible: float = 0.33
+    com_spread: tuple[float, float, float] = (0.05, 0.045, 0.025)
+    velocity_spread: tuple[float, float, float] = (0.2, 0.16, 0.08)
+    far: tuple[float, float] = (3.5, 9.0)
+    near: float = 0.35
+    objective_limit: float = 5e4
+    disturbed_limit: float = 5e3
+
+    @property
+    def shards(self) -> int:
+        """Number of shards."""
+        return -(-self.samples_per_category // self.per_shard)
+
+    @property
+    def shard_total(self) -> int:
+        """Fewest transitions in a shard of a robot with arms."""
+        return self.per_shard * len(Category)
+
+
+@dataclass
+class Quota:
+    """Samples of one shard as they come in.
+
+    Attributes:
+        wanted: of each category.
+        categories: that the robot can perform.
+    """
+
+    wanted: int
+    categories: list[Category]
+    features: dict[Category, list[np.ndarray]] = field(default_factory=dict)
+    feasible: dict[Category, list[np.ndarray]] = field(default_factory=dict)
+    targets: dict[Category, list[np.ndarray]] = field(default_factory=dict)
+    counts: dict[Category, int] = field(default_factory=dict)
+
+    def __post_init__(self):
+        for category in self.categories:
+            self.features[category], self.feasible[category], self.targets[category] = [], [], []
+            self.counts[category] = 0
+
+    def lack(self, category: Category) -> int:
+        """Samples still wanted."""
+        return max(self.wanted - self.counts[category], 0)
+
+    @property
+    def full(self) -> bool:
+        """Whether nothing is wanted any more."""
+        return all(count >= self.wanted for count in self.counts.values())
+
+    def add(self, category: Category, features: np.ndarray, feasible: np.ndarray, targets: np.ndarray) -> None:
+        """Enter samples (n, d), (n,), (n, 7)."""
+        self.features[category].append(features.astype(np.float32))
+        self.feasible[category].append(feasible)
+        self.targets[category].append(targets.astype(np.float32))
+        self.counts[category] += len(feasible)
+
+    def samples(self) -> dict[Category, Samples]:
+        """All samples by category, in the order of their coming."""
+        return {
+            category: Samples(
+                np.concatenate([np.zeros((0, feature_size(category)), np.float32), *self.features[category]]),
+                np.concatenate([np.zeros(0, bool), *self.feasible[category]]),
+                np.concatenate([np.zeros((0, TARGETS), np.float32), *self.targets[category]]),
+            )
+            for category in self.categories
+        }
+
+
+@dataclass
+class _Balance:
+    """Decides which initial states to disturb, so that the label "infeasible" reaches its share."""
+
+    wanted: float
+    counts: dict[tuple[Category, bool], list[int]] = field(default_factory=dict)
+
+    def probability(self, category: Category, is_default: bool) -> float:
+        infeasible, total = self.counts.get((category, is_default), (0, 0))
+        share = (infeasible + 1.0) / (total + 1.0 / self.wanted)
+        return float(np.clip(0.4 + 4.0 * (self.wanted - share), 0.02, 0.9))
+
+    def count(self, category: Category, is_default: bool, feasible: np.ndarray) -> None:
+        pair = self.counts.setdefault((category, is_default), [0, 0])
+        pair[0] += int((~feasible).sum())
+        pair[1] += len(feasible)
+
+
+class _Recorder:
+    """A judge that labels some of the transitions it is asked for, keeps them, and calls the others infeasible."""
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        quota: Quota,
+        balance: _Balance,
+        config: CollectConfig,
+        rng: np.random.Generator,
+        is_default: bool,
+    ):
+        self._robot, self._quota, self._balance, self._config, self._rng = robot, quota, balance, config, rng
+        self._is_default = is_default
+
+    def evaluate(
+        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+    ) -> TransitionBatch:
+        """See `TransitionEvaluator`."""
+        n = len(transitions)
+        result = TransitionBatch(np.zeros(n, bool), np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)))
+        if self._quota.full:
+            return result
+        groups: dict[tuple[int, bool], list[int]] = {}
+        for index, item in enumerate(transitions):
+            groups.setdefault((item.limb, item.contact is None), []).append(index)
+        categories = [category_of(stance, transitions[rows[0]]) for rows in groups.values()]
+        chosen = self._choose([np.array(rows) for rows in groups.values()], categories)
+        friction = None if self._is_default else float(self._rng.uniform(*self._config.friction))
+        old = _with_friction(stance, friction)
+        for rows, category in zip(chosen, categories, strict=True):
+            if len(rows):
+                items = [self._vary(transitions[row], friction) for row in rows]
+                self._label(old, com, com_velocity, items, category, rows, result)
+        self._pass_on(stance, transitions, result)
+        return result
+
+    def _label(
+        self,
+        stance: Stance,
+        com: np.ndarray,
+        com_velocity: np.ndarray,
+        items: list[ContactTransition],
+        category: Category,
+        rows: np.ndarray,
+        result: TransitionBatch,
+    ) -> None:
+        """Label transitions of one category and limb from disturbed states; enter them in the quota and the result."""
+        n, rng, config = len(items), self._rng, self._config
+        again = np.concatenate([[False], rows[1:] == rows[:-1]])  # the same transition from another state
+        near = rng.random(n) * (again | (rng.random(n) < config.near))
+        is_far = rng.random(n) < self._balance.probability(category, self._is_default)
+        scale = np.where(is_far, rng.uniform(*config.far, n), near)
+        turn = scale[:, None] * (rng.normal(size=(2, n, 3)))
+        forward = stance.mean_feet.rotation.T
+        start = com + (turn[0] * config.com_spread) @ forward
+        velocity = com_velocity + (turn[1] * config.velocity_spread) @ forward
+        batch = label(self._robot, stance, start, velocity, items)
+        limit = np.where(scale > 0.0, config.disturbed_limit, config.objective_limit)
+        kept = ~batch.feasible | (batch.objective <= limit)
+        frame, features = encode(stance, start, velocity, items)
+        targets = np.zeros((n, TARGETS))
+        good = np.flatnonzero(batch.feasible & kept)
+        targets[good, 0] = batch.objective[good]
+        targets[good, 1:4] = frame.point(batch.com[good])
+        targets[good, 4:7] = frame.vector(batch.com_velocity[good])
+        self._quota.add(category, features[kept], batch.feasible[kept], targets[kept])
+        self._balance.count(category, self._is_default, batch.feasible[kept])
+        result.feasible[rows[good]], result.objective[rows[good]] = True, batch.objective[good]
+        result.com[rows[good]], result.com_velocity[rows[good]] = batch.com[good], batch.com_velocity[good]
+
+    def _pass_on(self, stance: Stance, transitions: list[ContactTransition], result: TransitionBatch) -> None:
+        """Keep a few of the feasible transitions, most of those into stances from which samples are lacking."""
+        rows = np.flatnonzero(result.feasible)
+        if len(rows) <= self._config.children:
+            return
+        lack = [
+            max(self._quota.lack(category) for category in self._quota.categories if PALMS_BEFORE[category] == count)
+            for count in range(3)
+        ]
+        palms = len(stance.palms)
+        after = [
+            palms
+            + (transitions[row].limb in PALMS and transitions[row].limb not in stance.palms)
+            - (transitions[row].contact is None)
+            for row in rows
+        ]
+        weight = np.array([lack[count] + 1.0 for count in after]) / np.bincount(after, minlength=3)[after]
+        kept = self._rng.choice(rows, self._config.children, replace=False, p=weight / weight.sum())
+        result.feasible[np.setdiff1d(rows, kept)] = False
+
+    def _vary(self, transition: ContactTransition, friction: float | None) -> ContactTransition:
+        """The transition with a drawn timing and the given friction; as it is where that is None."""
+        if friction is None:
+            return transition
+        config, contact = self._config, transition.contact
+        shift, swing = (float(np.exp(self._rng.uniform(*np.log(bounds)))) for bounds in (config.shift, config.swing))
+        new = None if contact is None else replace(contact, friction=friction)
+        return ContactTransition(transition.limb, new, Timing(shift, swing))
+
+    def _choose(self, groups: list[np.ndarray], categories: list[Category]) -> list[np.ndarray]:
+        """Rows of each group to label: most of the categories that lack most; a few to go on where none lacks any."""
+        rng, lack = self._rng, np.array([float(self._quota.lack(category)) for category in categories])
+        budget = self._config.considered if lack.any() else _TO_GO_ON
+        weight = lack if lack.any() else np.ones(len(lack))
+        sizes = rng.multinomial(budget, weight / weight.sum())
+        chosen = []
+        for rows, size in zip(groups, sizes, strict=True):
+            times = min(-(-size // len(rows)), _REPEATS)  # few ways to break a palm: each from several states
+            copies = np.repeat(rows, times)
+            chosen.append(np.sort(rng.choice(copies, min(size, len(copies)), replace=False)))
+        return chosen
+
+
+def _with_friction(stance: Stance, friction: float | None) -> Stance:
+    if friction is None:
+        return stance
+    contacts: list[Contact] = [replace(contact, friction=friction) for contact in stance.contacts]
+    return Stance(tuple(contacts))
+
+
+@lru_cache(maxsize=2)
+def _robot(name: str, robots: str | None) -> RobotModel:
+    """The robot, loaded once per process."""
+    return load_robot(name, Path(robots) if robots else None)
+
+
+def categories_of(robot: RobotModel) -> list[Category]:
+    """Categories that a robot can perform: without arms only the first."""
+    count = {0: 1, 1: 6}.get(len(robot.arms), len(Category))
+    return list(Category)[:count]
+
+
+def collect_shard(config: CollectConfig, index: int) -> dict[Category, Samples]:
+    """Label the transitions of one shard; a pure function of its arguments.
+
+    Args:
+        config: what to collect.
+        index: number of the shard.
+
+    Returns:
+        At least `config.per_shard` samples of every category that the robot can perform.
+    """
+    rng = np.random.default_rng([config.seed, index])
+    robot = _robot(config.robot, config.robots)
+    quota, balance = Quota(config.per_shard, categories_of(robot)), _Balance(config.infeasible)
+    while not quota.full:
+        is_default = bool(rng.random() < config.default_share)
+        walls = 1 + int(rng.random() < config.two_walls)
+        terrain = TerrainConfig(walls=walls)
+        if not is_default:
+            tilt, rise = rng.uniform(*config.tilt), rng.uniform(*config.rise)
+            terrain = TerrainConfig(tilt=tilt, rise=rise, walls=walls)
+        planner = ContactPlanner(
+            robot,
+            replace(load_world("training.xml", mjcf=random_terrain(rng, terrain)), goal=_NOWHERE),
+            _Recorder(robot, quota, balance, config, rng, is_default),
+            PlannerConfig(
+                heuristic="euclidean",
+                wide_steps="on",
+                search=AnaStarConfig(epsilon=0.9, max_expansions=config.expansions),
+            ),
+        )
+        try:
+            planner.search(rng, np.inf)
+        except PlanningError:  # the tile at the start is too steep to stand on: another terrain
+            continue
+    return quota.samples()

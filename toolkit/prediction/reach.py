@@ -1,0 +1,75 @@
+"""CoMs that are out of reach by rounding only.
+
+The optimiser likes to end a transition with an arm or a leg stretched to its limit. The search rounds that CoM to
+1 mm, and networks predict it within some millimetres, so that the next transition would begin just out of reach, for
+no reason of dynamics. Such a CoM is moved back to where all limbs reach their contacts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.centroidal.build import ProblemConfig
+from toolkit.contacts.stance import Stance
+from toolkit.geometry.pose import rotation_about_z
+from toolkit.robot.model import RobotModel
+
+SLACK = 0.01
+"""m; about what networks err in the CoM. Further out is out of reach."""
+_INSIDE = 1e-6  # m; by so much a moved CoM is within reach
+_ROUNDS = 20
+
+
+def within_reach(
+    robot: RobotModel, stance: Stance, com: np.ndarray, config: ProblemConfig | None = None, *, slack: float = SLACK
+) -> np.ndarray:
+    """CoMs moved by little so that every limb reaches its contact and none is too low.
+
+    Args:
+        robot: reach of its limbs.
+        stance: contacts.
+        com: (n, 3) m, world.
+        config: of the problems, for the least height.
+        slack: m; a CoM that violates a bound by more stays as it is.
+
+    Returns:
+        (n, 3) m; unchanged rows where nothing is violated, or where no such place was found.
+    """
+    com = np.asarray(com, float)
+    feet = stance.mean_feet
+    turn = rotation_about_z(feet.yaw)
+    centres, radii = [], []
+    for contact in stance.contacts:
+        limb = contact.limb
+        if limb.is_foot:
+            leg = robot.legs[limb]
+            centres.append(contact.pose @ leg.ankle_in_sole - turn @ leg.hip_in_com)
+            radii.append(leg.max_length)
+        else:
+            arm = robot.arms[limb]
+            centres.append(contact.pose.position - turn @ arm.shoulder_in_com)
+            radii.append(arm.max_reach)
+    least = min(contact.pose.position[2] for contact in stance.contacts[:2])
+    least += (config or ProblemConfig()).min_height * robot.com_height
+
+    def violation(points: np.ndarray) -> np.ndarray:
+        distances = np.linalg.norm(points[:, None] - np.array(centres), axis=2) - np.array(radii)
+        return np.maximum(distances.max(1), least - points[:, 2])
+
+    before = violation(com)
+    rows = np.flatnonzero((before > 0.0) & (before <= slack))
+    if not len(rows):
+        return com
+    moved = com[rows]
+    for _ in range(_ROUNDS):
+        for centre, radius in zip(centres, radii, strict=True):
+            arm = moved - centre
+            distance = np.linalg.norm(arm, axis=1)
+            moved = centre + arm * np.minimum(1.0, (radius - _INSIDE) / distance)[:, None]
+        moved[:, 2] = np.maximum(moved[:, 2], least + _INSIDE)
+        if (violation(moved) <= 0.0).all():
+            break
+    found = violation(moved) <= 0.0
+    result = com.copy()
+    result[rows[found]] = moved[found]
+    return result
