@@ -65,8 +65,18 @@ def divide_twice(w, eta, x, out):
 
 
 @compiled
+def jordan_multiply(x, y, out):
+    """Out = x o y, the Jordan product (x'y, x_0 y_1 + y_0 x_1)."""
+    first = x[0] * y[0]
+    for i in range(1, 4):
+        first += x[i] * y[i]
+        out[i] = x[0] * y[i] + y[0] * x[i]
+    out[0] = first
+
+
+@compiled
 def jordan_divide(lam, d, out):
-    """Out with lam o out = d, for the Jordan product (x o y) = (x'y, x_0 y_1 + y_0 x_1)."""
+    """Out with lam o out = d."""
     dot = lam[1] * d[1] + lam[2] * d[2] + lam[3] * d[3]
     first = (lam[0] * d[0] - dot) / max(norm_squared(lam), 1e-300)
     for i in range(1, 4):

@@ -4,6 +4,7 @@ Half lines: 13 rows per contact, then the planes. Cones: the friction cone of ea
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,9 +12,95 @@ from toolkit.centroidal.kernels import compiled, cone
 from toolkit.centroidal.kernels.setup import ROWS
 
 
+class Point(NamedTuple):
+    """A point of the product: slacks, multipliers or a change of them.
+
+    Attributes:
+        line: (13 C + P,) half lines.
+        round: (C + K, 4) second-order cones.
+    """
+
+    line: np.ndarray
+    round: np.ndarray
+
+
 @compiled
-def constants(data, line, round):
-    """Fill line (13 C + P,) and round (C + K, 4) with c."""
+def room(lines, rounds):
+    """A point with undefined entries."""
+    return Point(np.empty(lines), np.empty((rounds, 4)))
+
+
+@compiled
+def add(point, factor, change):
+    """Point += factor change."""
+    for i in range(point.line.shape[0]):
+        point.line[i] += factor * change.line[i]
+    for i in range(point.round.shape[0]):
+        for a in range(4):
+            point.round[i, a] += factor * change.round[i, a]
+
+
+@compiled
+def copy(point, out):
+    """Out = point."""
+    for i in range(point.line.shape[0]):
+        out.line[i] = point.line[i]
+    for i in range(point.round.shape[0]):
+        for a in range(4):
+            out.round[i, a] = point.round[i, a]
+
+
+@compiled
+def largest(point):
+    """Largest absolute entry."""
+    value = 0.0
+    for i in range(point.line.shape[0]):
+        value = max(value, abs(point.line[i]))
+    for i in range(point.round.shape[0]):
+        for a in range(4):
+            value = max(value, abs(point.round[i, a]))
+    return value
+
+
+@compiled
+def dot(x, y):
+    """Inner product of two points."""
+    value = 0.0
+    for i in range(x.line.shape[0]):
+        value += x.line[i] * y.line[i]
+    for i in range(x.round.shape[0]):
+        for a in range(4):
+            value += x.round[i, a] * y.round[i, a]
+    return value
+
+
+@compiled
+def invert(s, mu, z):
+    """Z = mu s^-1: the multipliers that are central with the slacks s."""
+    for i in range(s.line.shape[0]):
+        z.line[i] = mu / s.line[i]
+    for i in range(s.round.shape[0]):
+        factor = mu / cone.norm_squared(s.round[i])
+        z.round[i, 0] = factor * s.round[i, 0]
+        for a in range(1, 4):
+            z.round[i, a] = -factor * s.round[i, a]
+
+
+@compiled
+def barrier(s):
+    """Sum of log s of the half lines and of half the log s_0^2 - |s_1|^2 of the cones."""
+    value = 0.0
+    for i in range(s.line.shape[0]):
+        value += math.log(max(s.line[i], 1e-300))
+    for i in range(s.round.shape[0]):
+        value += 0.5 * math.log(max(cone.norm_squared(s.round[i]), 1e-300))
+    return value
+
+
+@compiled
+def constants(data, out):
+    """Fill a point with c."""
+    line, round = out.line, out.round
     contacts = data.mu.shape[0]
     for j in range(contacts):
         for i in range(ROWS):
@@ -28,8 +115,9 @@ def constants(data, line, round):
 
 
 @compiled
-def apply(data, u, x, line, round):
-    """Fill line and round with A (u, x)."""
+def apply(data, u, x, out):
+    """Fill a point with A (u, x)."""
+    line, round = out.line, out.round
     contacts = data.mu.shape[0]
     for j in range(contacts):
         for i in range(ROWS):
@@ -49,8 +137,9 @@ def apply(data, u, x, line, round):
 
 
 @compiled
-def subtract_adjoint(data, line, round, contact_gradient, knot_gradient):
-    """Subtract A' (line, round) from the gradients of contacts (C, 6) and knots (N + 1, 9)."""
+def subtract_adjoint(data, point, contact_gradient, knot_gradient):
+    """Subtract A' of a point from the gradients of contacts (C, 6) and knots (N + 1, 9)."""
+    line, round = point.line, point.round
     contacts = data.mu.shape[0]
     for j in range(contacts):
         g = contact_gradient[j]
@@ -109,19 +198,19 @@ def add_hessian(data, weight, w, eta, contact_hessian, knot_hessian):
 
 
 @compiled
-def longest_step(line, d_line, round, d_round):
-    """Largest step that keeps (line, round) + step (d_line, d_round) in the cones."""
+def longest_step(point, change):
+    """Largest step <= 1e10 with point + step change in the cones."""
     step = 1e10
-    for i in range(line.shape[0]):
-        if d_line[i] < 0.0:
-            step = min(step, -line[i] / d_line[i])
-    for i in range(round.shape[0]):
-        step = min(step, cone.longest_step(round[i], d_round[i]))
+    for i in range(point.line.shape[0]):
+        if change.line[i] < 0.0:
+            step = min(step, -point.line[i] / change.line[i])
+    for i in range(point.round.shape[0]):
+        step = min(step, cone.longest_step(point.round[i], change.round[i]))
     return step
 
 
 @compiled
-def refutes(data, z_line, z_round, y_rest):
+def refutes(data, multipliers, y_rest):
     """Whether multipliers of the knots' constraints prove that no motion exists.
 
     With z in the dual cone, every motion has z's + y'v_N >= 0 for the knots' slacks s, which are linear in the forces:
@@ -130,10 +219,10 @@ def refutes(data, z_line, z_round, y_rest):
 
     Args:
         data: the problem.
-        z_line: (13 C + P,) and
-        z_round: (C + K, 4) multipliers inside the dual cones; those of the contacts are not needed.
+        multipliers: a point of the dual cones; those of the contacts are not needed.
         y_rest: (3,) of the final velocity, any sign; zero if it is free.
     """
+    z_line, z_round = multipliers.line, multipliers.round
     n, contacts = data.h.shape[0], data.mu.shape[0]
     constant, size = 0.0, 0.0
     on_r, on_v = np.zeros(3), y_rest.copy()

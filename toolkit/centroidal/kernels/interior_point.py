@@ -1,12 +1,14 @@
 """Primal-dual interior-point method with Gauss-Newton Hessians that follow the iterates.
 
 Mehrotra's predictor and corrector on the cone program whose objective is linearised anew in every iteration; slacks
-start inside their cones, so the start need not be feasible. The answer "infeasible" is a proof (`constraints.refutes`).
+start inside their cones, so the start need not be feasible. Steps near feasibility must lower the barrier function.
+The answer "infeasible" is a proof (`constraints.refutes`).
 
 Reference: L. Vandenberghe, The CVXOPT linear and quadratic cone program solvers (2010), Sec. 5.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,172 +17,284 @@ from toolkit.centroidal.kernels.setup import ROWS
 
 SOLVED, INFEASIBLE, UNDECIDED = 0, 1, 2
 REST_STIFFNESS = 1e7
-"""Of the proximal term that carries the final rest; the multiplier makes it exact."""
+"""Of the proximal term that carries the final rest; its multiplier makes the rest exact."""
+FEASIBLE = 1e-9
+"""Largest residual of the constraints at a solution."""
+NEARLY_FEASIBLE = 1e-1
+"""Residual below which steps must lower the barrier function."""
+INITIAL_GAP = 0.3
+"""Complementarity at the start, relative to the objective there."""
+SMALL = 1e-4
+"""Objective (scaled) below which accuracy is absolute."""
+
+
+class Model(NamedTuple):
+    """Quadratic model of the objective: gradients and Hessians of contacts, knots and steps; see `riccati`.
+
+    The Hessians of the contacts are in `riccati.Sweep`.
+    """
+
+    contact_gradient: np.ndarray
+    knot_gradient: np.ndarray
+    knot_hessian: np.ndarray
+    step_gradient: np.ndarray
+    step_hessian: np.ndarray
+
+
+@compiled
+def linearise(data, u, x, w, y_rest, model, sweep):
+    """Fill the model at a motion; returns the objective."""
+    n = data.h.shape[0]
+    value = 0.0
+    model.knot_gradient[:] = 0.0
+    model.knot_hessian[:] = 0.0
+    for t in range(n):
+        h, omega = data.h[t], data.omega[t]
+        for j in range(data.first[t], data.first[t + 1]):
+            value += objective.contact_terms(data, t, j, u[j], model.contact_gradient[j], sweep.hessian[j])
+        gradient, hessian = model.step_gradient[t], model.step_hessian[t]
+        value += objective.step_terms(h, omega, data.weights, x[t], w[t], gradient, hessian)
+        gradient, hessian = model.knot_gradient[t + 1], model.knot_hessian[t + 1]
+        value += objective.knot_terms(omega, data.weights, x[t + 1], gradient, hessian)
+    if data.rest:
+        for a in range(3, 6):
+            model.knot_gradient[n, a] += y_rest[a - 3] + REST_STIFFNESS * x[n, a]
+            model.knot_hessian[n, a, a] += REST_STIFFNESS
+    return value
+
+
+@compiled
+def rest_terms(data, x, y_rest):
+    """What the final rest adds to the barrier function."""
+    total = 0.0
+    if data.rest:
+        for a in range(3):
+            v = x[data.h.shape[0], 3 + a]
+            total += y_rest[a] * v + 0.5 * REST_STIFFNESS * v * v
+    return total
+
+
+@compiled
+def slope(data, model, du, dx):
+    """Derivative of the objective along a direction."""
+    total = 0.0
+    dw = np.empty(6)
+    for t in range(data.h.shape[0]):
+        for j in range(data.first[t], data.first[t + 1]):
+            for a in range(6):
+                total += model.contact_gradient[j, a] * du[j, a]
+        riccati.total_wrench(data, t, du, dw)
+        for a in range(9):
+            total += model.knot_gradient[t + 1, a] * dx[t + 1, a] + model.step_gradient[t, a] * dx[t, a]
+        for a in range(6):
+            total += model.step_gradient[t, 9 + a] * dw[a]
+    return total
+
+
+class Scaling(NamedTuple):
+    """Nesterov-Todd scaling: W^-2 of the half lines; w, eta and lambda of the cones (see `cone`)."""
+
+    inverse: np.ndarray
+    w: np.ndarray
+    eta: np.ndarray
+    lam: np.ndarray
+
+
+@compiled
+def scale(s, z, scaling):
+    """Fill the scaling of (s, z); returns s'z."""
+    gap = 0.0
+    for i in range(s.line.shape[0]):
+        scaling.inverse[i] = z.line[i] / s.line[i]
+        gap += s.line[i] * z.line[i]
+    for i in range(s.round.shape[0]):
+        scaling.eta[i] = cone.scale(s.round[i], z.round[i], scaling.w[i], scaling.lam[i])
+        for a in range(4):
+            gap += s.round[i, a] * z.round[i, a]
+    return gap
+
+
+@compiled
+def enter_cones(residual, s):
+    """Fill s with a point well inside the cones, equal to `residual` where that lies inside."""
+    for i in range(s.line.shape[0]):
+        s.line[i] = max(residual.line[i], 0.1, -residual.line[i])
+    for i in range(s.round.shape[0]):
+        here, there = residual.round[i], s.round[i]
+        tail = math.sqrt(here[1] ** 2 + here[2] ** 2 + here[3] ** 2)
+        there[0] = max(here[0], tail + max(0.1, tail - here[0]))
+        for a in range(1, 4):
+            there[a] = here[a]
+
+
+@compiled
+def direction(data, model, sweep, scaling, residual, s, z, gap, correct, targets, scratch, du, dx, ds, dz):
+    """Fill the step that aims at complementarity `gap`.
+
+    Args:
+        data: the problem.
+        model: of the objective.
+        sweep: the factors of this iteration.
+        scaling: of the cones.
+        residual: A (u, x) + c - s.
+        s: slacks, and
+        z: multipliers.
+        gap: sigma mu.
+        correct: whether (ds, dz) hold the predictor, whose second-order term is then corrected.
+        targets: room for a point.
+        scratch: room for the gradients of the contacts and of the knots.
+        du: filled; with
+        dx: and
+        ds: and
+        dz: the step.
+    """
+    p, q = np.empty(4), np.empty(4)
+    # The multipliers that the step leads to, before the change of the slacks is known.
+    for i in range(s.line.shape[0]):
+        targets.line[i] = -scaling.inverse[i] * residual.line[i] + gap / s.line[i]
+        if correct:
+            targets.line[i] -= ds.line[i] * dz.line[i] / s.line[i]
+    for i in range(s.round.shape[0]):
+        w, eta, target = scaling.w[i], scaling.eta[i], targets.round[i]
+        for a in range(4):
+            target[a] = 0.0
+        if correct:
+            cone.divide(w, eta, ds.round[i], p)
+            cone.multiply(w, eta, dz.round[i], q)
+            cone.jordan_multiply(p, q, target)
+        for a in range(4):
+            target[a] = -target[a]
+        target[0] += gap
+        cone.jordan_divide(scaling.lam[i], target, p)
+        cone.divide(w, eta, p, target)
+        cone.divide_twice(w, eta, residual.round[i], p)
+        for a in range(4):
+            target[a] -= p[a]
+    for j in range(du.shape[0]):
+        for a in range(6):
+            scratch[0][j, a] = model.contact_gradient[j, a]
+    for t in range(dx.shape[0]):
+        for a in range(9):
+            scratch[1][t, a] = model.knot_gradient[t, a]
+    constraints.subtract_adjoint(data, targets, scratch[0], scratch[1])
+    riccati.solve(data, scratch[0], scratch[1], model.step_gradient, sweep, du, dx)
+    constraints.apply(data, du, dx, ds)
+    for i in range(s.line.shape[0]):
+        dz.line[i] = targets.line[i] - z.line[i] - scaling.inverse[i] * ds.line[i]
+        ds.line[i] += residual.line[i]
+    for i in range(s.round.shape[0]):
+        cone.divide_twice(scaling.w[i], scaling.eta[i], ds.round[i], p)
+        for a in range(4):
+            dz.round[i, a] = targets.round[i, a] - z.round[i, a] - p[a]
+            ds.round[i, a] += residual.round[i, a]
 
 
 @compiled
 def solve(data, tolerance, max_iterations, u, x, w):
-    """Solve; fills u (C, 6), x (N + 1, 9) and w (N, 6), returns (status, iterations)."""
-    n, contacts, balls = data.h.shape[0], data.mu.shape[0], data.ball_radius.shape[0]
-    lines, rounds = contacts * ROWS + data.plane_offset.shape[0], contacts + balls
-    c_line, c_round = np.empty(lines), np.empty((rounds, 4))
-    s_line, s_round = np.empty(lines), np.empty((rounds, 4))
-    z_line, z_round = np.empty(lines), np.empty((rounds, 4))
-    r_line, r_round = np.empty(lines), np.empty((rounds, 4))
-    ds_line, ds_round = np.empty(lines), np.empty((rounds, 4))
-    dz_line, dz_round = np.empty(lines), np.empty((rounds, 4))
-    t_line, t_round = np.empty(lines), np.empty((rounds, 4))
-    inverse, eta, scaling, lam = np.empty(lines), np.empty(rounds), np.empty((rounds, 4)), np.empty((rounds, 4))
-    contact_gradient = np.empty((contacts, 6))
-    knot_gradient, knot_hessian = np.empty((n + 1, 9)), np.empty((n + 1, 9, 9))
-    step_gradient, step_hessian = np.empty((n, 15)), np.empty((n, 15, 15))
-    g_contact, g_knot = np.empty((contacts, 6)), np.empty((n + 1, 9))
-    sweep = riccati.allocate(n, contacts)
-    du, dx = np.empty((contacts, 6)), np.empty((n + 1, 9))
-    y_rest, y_next = np.zeros(3), np.zeros(3)
-    p4, q4 = np.empty(4), np.empty(4)
-    degree = float(lines + rounds)
+    """Solve a problem.
 
-    constraints.constants(data, c_line, c_round)
+    Args:
+        data: the problem.
+        tolerance: accepted suboptimality relative to the objective.
+        max_iterations: bound.
+        u: (C, 6) contact wrenches, filled.
+        x: (N + 1, 9) states, filled.
+        w: (N, 6) total wrenches, filled.
+
+    Returns:
+        Status and number of iterations.
+    """
+    n, contacts = data.h.shape[0], data.mu.shape[0]
+    lines, rounds = contacts * ROWS + data.plane_offset.shape[0], contacts + data.ball_radius.shape[0]
+    degree = float(lines + rounds)
+    s, z, ds = constraints.room(lines, rounds), constraints.room(lines, rounds), constraints.room(lines, rounds)
+    dz, targets, trial = (
+        constraints.room(lines, rounds),
+        constraints.room(lines, rounds),
+        constraints.room(lines, rounds),
+    )
+    constant, residual = constraints.room(lines, rounds), constraints.room(lines, rounds)
+    scaling = Scaling(np.empty(lines), np.empty((rounds, 4)), np.empty(rounds), np.empty((rounds, 4)))
+    model = Model(
+        np.empty((contacts, 6)), np.empty((n + 1, 9)), np.empty((n + 1, 9, 9)), np.empty((n, 15)), np.empty((n, 15, 15))
+    )
+    sweep = riccati.allocate(n, contacts)
+    scratch = (np.empty((contacts, 6)), np.empty((n + 1, 9)))
+    du, dx, u_trial = np.empty((contacts, 6)), np.empty((n + 1, 9)), np.empty((contacts, 6))
+    y_rest, y_refuting = np.zeros(3), np.zeros(3)
+
+    constraints.constants(data, constant)
     start.follow(data, sweep, u, x, w)
-    constraints.apply(data, u, x, s_line, s_round)
-    mu = 0.0
-    for i in range(lines):
-        r_line[i] = s_line[i] + c_line[i]
-        s_line[i] = max(r_line[i], 0.05)
-    for i in range(rounds):
-        for a in range(4):
-            s_round[i, a] += c_round[i, a]
-            r_round[i, a] = s_round[i, a]
-        tail = math.sqrt(s_round[i, 1] ** 2 + s_round[i, 2] ** 2 + s_round[i, 3] ** 2)
-        s_round[i, 0] = max(s_round[i, 0], tail + 0.05)
-    mu = 0.01
-    for i in range(lines):
-        z_line[i] = mu / s_line[i]
-    for i in range(rounds):
-        norm = mu / cone.norm_squared(s_round[i])
-        z_round[i, 0] = norm * s_round[i, 0]
-        for a in range(1, 4):
-            z_round[i, a] = -norm * s_round[i, a]
+    constraints.apply(data, u, x, residual)
+    constraints.add(residual, 1.0, constant)
+    enter_cones(residual, s)
+    constraints.invert(s, max(0.01, INITIAL_GAP * objective.value(data, u, x, w) / degree), z)
 
     for iteration in range(max_iterations):
-        # Where we are: residual of the slacks, scaling, objective.
-        constraints.apply(data, u, x, r_line, r_round)
-        worst, gap = 0.0, 0.0
-        for i in range(lines):
-            r_line[i] += c_line[i] - s_line[i]
-            worst = max(worst, abs(r_line[i]))
-            inverse[i] = z_line[i] / s_line[i]
-            gap += s_line[i] * z_line[i]
-        for i in range(rounds):
-            for a in range(4):
-                r_round[i, a] += c_round[i, a] - s_round[i, a]
-                worst = max(worst, abs(r_round[i, a]))
-                gap += s_round[i, a] * z_round[i, a]
-            eta[i] = cone.scale(s_round[i], z_round[i], scaling[i], lam[i])
-        mu = gap / degree
-        value = 0.0
-        knot_gradient[:], knot_hessian[:] = 0.0, 0.0
-        for t in range(n):
-            omega = data.omega[t]
-            for j in range(data.first[t], data.first[t + 1]):
-                value += objective.contact_terms(data, t, j, u[j], contact_gradient[j], sweep.hessian[j])
-            value += objective.step_terms(data.h[t], omega, data.weights, x[t], w[t], step_gradient[t], step_hessian[t])
-            value += objective.knot_terms(omega, data.weights, x[t + 1], knot_gradient[t + 1], knot_hessian[t + 1])
+        constraints.apply(data, u, x, residual)
+        constraints.add(residual, 1.0, constant)
+        constraints.add(residual, -1.0, s)
+        worst = constraints.largest(residual)
         if data.rest:
             for a in range(3):
                 worst = max(worst, abs(x[n, 3 + a]))
-                knot_gradient[n, 3 + a] += y_rest[a] + REST_STIFFNESS * x[n, 3 + a]
-                knot_hessian[n, 3 + a, 3 + a] += REST_STIFFNESS
-        constraints.add_hessian(data, inverse, scaling, eta, sweep.hessian, knot_hessian)
+        gap = scale(s, z, scaling)
+        mu = gap / degree
+        value = linearise(data, u, x, w, y_rest, model, sweep)
+        constraints.add_hessian(data, scaling.inverse, scaling.w, scaling.eta, sweep.hessian, model.knot_hessian)
         riccati.factor_contacts(data, sweep)
-        riccati.factor_steps(data, knot_hessian, step_hessian, sweep)
+        riccati.factor_steps(data, model.knot_hessian, model.step_hessian, sweep)
 
-        step, sigma, decrement = 0.0, 0.0, 0.0
-        for phase in range(2):
-            # What z + dz is before the new slack is known: z + W^-1 (lambda \ d) - W^-2 r.
-            for i in range(lines):
-                t_line[i] = -inverse[i] * r_line[i]
-                if phase == 1:
-                    t_line[i] += (sigma * mu - ds_line[i] * dz_line[i]) / s_line[i]
-            for i in range(rounds):
-                cone.divide_twice(scaling[i], eta[i], r_round[i], t_round[i])
-                for a in range(4):
-                    t_round[i, a] = -t_round[i, a]
-                if phase == 1:
-                    cone.divide(scaling[i], eta[i], ds_round[i], p4)
-                    cone.multiply(scaling[i], eta[i], dz_round[i], q4)
-                    first = sigma * mu
-                    for a in range(4):
-                        first -= p4[a] * q4[a]
-                    for a in range(1, 4):
-                        ds_round[i, a] = -(p4[0] * q4[a] + q4[0] * p4[a])
-                    ds_round[i, 0] = first
-                    cone.jordan_divide(lam[i], ds_round[i], p4)
-                    cone.divide(scaling[i], eta[i], p4, q4)
-                    for a in range(4):
-                        t_round[i, a] += q4[a]
-            for j in range(contacts):
-                for a in range(6):
-                    g_contact[j, a] = contact_gradient[j, a]
-            for t in range(n + 1):
-                for a in range(9):
-                    g_knot[t, a] = knot_gradient[t, a]
-            constraints.subtract_adjoint(data, t_line, t_round, g_contact, g_knot)
-            riccati.solve(data, g_contact, g_knot, step_gradient, sweep, du, dx)
-            constraints.apply(data, du, dx, ds_line, ds_round)
-            for i in range(lines):
-                dz_line[i] = t_line[i] - z_line[i] - inverse[i] * ds_line[i]
-                ds_line[i] += r_line[i]
-            for i in range(rounds):
-                cone.divide_twice(scaling[i], eta[i], ds_round[i], p4)
-                for a in range(4):
-                    dz_round[i, a] = t_round[i, a] - z_round[i, a] - p4[a]
-                    ds_round[i, a] += r_round[i, a]
-            step = min(
-                constraints.longest_step(s_line, ds_line, s_round, ds_round),
-                constraints.longest_step(z_line, dz_line, z_round, dz_round),
-            )
-            if phase == 0:
-                step = min(1.0, step)
-                # Below the floor the objective gains nothing more, and unloaded contacts would lose their CoP's digits.
-                floor = 0.2 * tolerance * (value + 1e-4) / degree
-                sigma = max((1.0 - step) ** 3, floor / mu)
-                # How much the objective can still fall, to first order.
-                decrement = 0.0
+        # Predictor.
+        direction(data, model, sweep, scaling, residual, s, z, 0.0, False, targets, scratch, du, dx, ds, dz)
+        accepted = tolerance * (value + SMALL)
+        if worst < FEASIBLE and gap < accepted and abs(slope(data, model, du, dx)) < accepted:
+            return SOLVED, iteration
+        step = min(1.0, constraints.longest_step(s, ds), constraints.longest_step(z, dz))
+        # Far below the accepted gap the objective gains nothing, and unloaded contacts lose the digits of their CoP.
+        goal = mu * min(1.0, max((1.0 - step) ** 3, 0.2 * accepted / gap))
+
+        # Corrector, or a plain step where its second-order term does not lower the barrier function.
+        before = value + rest_terms(data, x, y_rest) - goal * constraints.barrier(s)
+        for attempt in range(2):
+            correct = attempt == 0
+            direction(data, model, sweep, scaling, residual, s, z, goal, correct, targets, scratch, du, dx, ds, dz)
+            step = min(1.0, 0.99 * min(constraints.longest_step(s, ds), constraints.longest_step(z, dz)))
+            if data.rest and attempt == 0:
+                for a in range(3):
+                    y_refuting[a] = x[n, 3 + a]
+            # What full steps would change the Lagrangian by through the residual of the slacks.
+            owed = constraints.dot(z, residual) + constraints.dot(dz, residual)
+            lower = False
+            for trials in range(1 if correct else 5):
+                step *= 0.5 if trials > 0 else 1.0
                 for j in range(contacts):
                     for a in range(6):
-                        decrement -= contact_gradient[j, a] * du[j, a]
-                for t in range(n):
-                    for a in range(9):
-                        decrement -= knot_gradient[t + 1, a] * dx[t + 1, a]
-                        decrement -= step_gradient[t, a] * dx[t, a]
-                    # the part of w follows from the contacts
-                    for j in range(data.first[t], data.first[t + 1]):
-                        for a in range(6):
-                            for b in range(6):
-                                decrement -= step_gradient[t, 9 + a] * data.wrench[j, a, b] * du[j, b]
-        step = min(1.0, 0.99 * step)
-        done = worst < 1e-9 and abs(decrement) < tolerance * (value + 1e-4) and gap < tolerance * (value + 1e-4)
-        if done:
-            return SOLVED, iteration
+                        u_trial[j, a] = u[j, a] + step * du[j, a]
+                objective.rollout(data, u_trial, x, w)
+                lower = worst > NEARLY_FEASIBLE
+                if lower:
+                    break
+                constraints.copy(s, trial)
+                constraints.add(trial, step, ds)
+                after = objective.value(data, u_trial, x, w) + rest_terms(data, x, y_rest)
+                lower = after - goal * constraints.barrier(trial) <= before - step * owed + 0.1 * accepted
+                if lower:
+                    break
+            if lower:
+                break
 
-        if data.rest:
-            for a in range(3):
-                y_rest[a] += step * REST_STIFFNESS * (x[n, 3 + a] + dx[n, 3 + a])
         for j in range(contacts):
             for a in range(6):
-                u[j, a] += step * du[j, a]
-        objective.rollout(data, u, x, w)
-        for i in range(lines):
-            s_line[i] += step * ds_line[i]
-            z_line[i] += step * dz_line[i]
-        for i in range(rounds):
-            for a in range(4):
-                s_round[i, a] += step * ds_round[i, a]
-                z_round[i, a] += step * dz_round[i, a]
+                u[j, a] = u_trial[j, a]
+        if data.rest:
+            for a in range(3):
+                # The velocity that the full step leads to.
+                y_rest[a] += step * REST_STIFFNESS * (y_refuting[a] + dx[n, 3 + a])
+        constraints.add(s, step, ds)
+        constraints.add(z, step, dz)
         for a in range(3):
-            y_next[a] = -y_rest[a]
-        if constraints.refutes(data, z_line, z_round, y_next):
+            y_refuting[a] = -y_rest[a]
+        if constraints.refutes(data, z, y_refuting):
             return INFEASIBLE, iteration + 1
     return UNDECIDED, max_iterations

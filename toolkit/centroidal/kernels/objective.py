@@ -131,3 +131,30 @@ def step_terms(h, omega, weights, x, w, gradient, hessian):
         gradient[9 + c] += wl * linear
         hessian[9 + c, 9 + c] += wl
     return 0.5 * value
+
+
+@compiled
+def value(data, u, x, w):
+    """The objective alone."""
+    total = 0.0
+    weights = data.weights
+    for t in range(data.h.shape[0]):
+        step = 0.0
+        for j in range(data.first[t], data.first[t + 1]):
+            fx, fy, fz, tx, ty, tz = u[j, 0], u[j, 1], u[j, 2], u[j, 3], u[j, 4], u[j, 5]
+            twist = tz + (ty * fy + tx * fx) / fz
+            step += weights[4] * (fx * fx + fy * fy + fz * fz) + weights[6] * (fx * fx + fy * fy)
+            step += weights[5] * twist * twist
+            step += (data.cop_weight[j, 0] * ty * ty + data.cop_weight[j, 1] * tx * tx) / (fz * fz)
+        h, after = data.h[t], x[t + 1]
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            mean_b = x[t, b] + 0.5 * h * x[t, 3 + b] - (h * h / 6 if b == 2 else 0.0)
+            mean_c = x[t, c] + 0.5 * h * x[t, 3 + c] - (h * h / 6 if c == 2 else 0.0)
+            rate = w[t, 3 + a] - (mean_b * w[t, c] - mean_c * w[t, b])
+            linear = w[t, a] - (1.0 if a == 2 else 0.0)
+            k = after[6 + a] - (after[b] * after[3 + c] - after[c] * after[3 + b])
+            step += weights[0] * after[3 + a] * after[3 + a] + weights[1] * linear * linear
+            step += weights[2] * k * k + weights[3] * rate * rate
+        total += 0.5 * data.omega[t] * step
+    return total
