@@ -35,14 +35,19 @@ class ControllerConfig:
         leg_posture: factor on the posture's weight for joints that carry a foot.
         angular_momentum: `weight |(dk/dt - dk_ref/dt - kp (k_ref - k)) / angular_momentum_scale|^2`; kd is unused.
         angular_momentum_scale: kg m^2/s per unit of the task.
+        divergence_scale: m; divergence of the CoM at which the weights of angular momentum and base orientation are halved.
+        divergence_rate: 1/s; frequency of the pendulum in `(c - c_ref) + (v - v_ref) / rate`.
         force: weight on squared N of deviation from the planned force.
         moment: weight on squared N m of deviation from the planned moment.
         acceleration: weight on squared joint accelerations (regularisation).
         nesting: where the controller's margins lie between the plan's (1) and the simulation's (0).
+        urgent_nesting: the same once the CoM diverges by `divergence_scale`.
         min_foot_force, min_palm_force: N; wanted in every settled contact.
         foot_ramp, palm_ramp: s; the bound on the normal force rises after contact is made.
         release_ramp: s; it falls before contact is broken.
         settle_force, release_force: N; where those bounds start and end.
+        loose_force: N; a limb in contact that is measured to bear less bounced off...
+        rest_speed: m/s; ... and goes back along the inward normal.
         torque_fraction: fraction of the joint torque limits that may be used.
         velocity_fraction: fraction of the joint velocity limits that may be used.
         range_margin: rad; kept from each end of a joint's range.
@@ -61,10 +66,13 @@ class ControllerConfig:
     leg_posture: float = 0.05
     angular_momentum: TaskGains = TaskGains(40.0, 5.0, 0.0)
     angular_momentum_scale: float = 10.0
+    divergence_scale: float = 0.03
+    divergence_rate: float = 3.4
     force: float = 1e-5
     moment: float = 2e-4
     acceleration: float = 1e-4
     nesting: float = 0.5
+    urgent_nesting: float = 0.15
     min_foot_force: float = 10.0
     min_palm_force: float = 2.0
     foot_ramp: float = 0.06
@@ -72,6 +80,8 @@ class ControllerConfig:
     release_ramp: float = 0.06
     settle_force: float = 30.0
     release_force: float = 5.0
+    loose_force: float = 15.0
+    rest_speed: float = 0.05
     torque_fraction: float = 0.98
     velocity_fraction: float = 0.95
     range_margin: float = 0.01
@@ -117,6 +127,7 @@ class StepAdjustmentConfig:
         slew: m/s; of the landing point.
         fraction: of the swing, after which the landing point is kept.
         margin: m; distance of the sole from the edge of its surface.
+        gap: m; distance of the sole from the other one, seen from above.
     """
 
     enabled: bool = True
@@ -127,6 +138,7 @@ class StepAdjustmentConfig:
     slew: float = 1.0
     fraction: float = 0.75
     margin: float = 0.01
+    gap: float = 0.02
 
 
 @dataclass(frozen=True)

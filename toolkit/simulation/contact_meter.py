@@ -15,6 +15,7 @@ class ContactMeter:
         wrench: (4, 6) N and N m; contact force and moment about each patch's centre, world frame, of the last step.
         normal_force: (4,) N; its part along the patch's z axis.
         unplanned: (robot geom, world geom) pairs that touched outside the patches, since the start.
+        unplanned_time: s; when the first of them happened, None before.
         trunk_touched: name of a trunk geom that touched the world, "" if none did.
         friction_mismatches: contacts whose friction was not the world geom's, since the start.
     """
@@ -23,6 +24,7 @@ class ContactMeter:
         self._index = index
         self.wrench, self.normal_force = np.zeros((4, 6)), np.zeros(4)
         self.unplanned: set[tuple[int, int]] = set()
+        self.unplanned_time: float | None = None
         self.trunk_touched = ""
         self.friction_mismatches = 0
         self._force = np.zeros(6)
@@ -51,7 +53,7 @@ class ContactMeter:
         for k, number in enumerate(touching):
             limb = limbs[k]
             if limb < 0:
-                self._note(int(robot_geom[k]), int(world_geom[k]))
+                self._note(int(robot_geom[k]), int(world_geom[k]), data.time)
                 continue
             mujoco.mj_contactForce(scene, data, int(number), self._force)
             # The force acts on the second geom, in rows of the contact's frame (normal first).
@@ -66,9 +68,10 @@ class ContactMeter:
         for limb, site in index.sites.items():
             self.normal_force[limb] = self.wrench[limb, :3] @ data.site_xmat[site, 2::3]
 
-    def _note(self, robot_geom: int, world_geom: int) -> None:
+    def _note(self, robot_geom: int, world_geom: int, time: float) -> None:
         """Keep an unplanned contact."""
         self.unplanned.add((robot_geom, world_geom))
+        self.unplanned_time = time if self.unplanned_time is None else self.unplanned_time
         if self._index.trunk_geom[robot_geom] and not self.trunk_touched:
             self.trunk_touched = self._index.geom_name(robot_geom)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from toolkit.centroidal.problem import Margins
@@ -13,7 +15,26 @@ from toolkit.simulation.joint_box import JointBox
 from toolkit.simulation.limb_target import LimbTargets
 from toolkit.simulation.qp import FORCE_UNIT, ContactQP
 from toolkit.simulation.reference import Reference
+from toolkit.simulation.step_adjustment import StepAdjuster
 from toolkit.simulation.touchdown import ContactTracker, LimbState
+
+
+@dataclass(frozen=True)
+class _ConeLimits:
+    """Factors on friction and yaw moment, and (4, 2) m half extents of the patches, that wrench cones are made of."""
+
+    friction: float
+    yaw: float
+    half_size: np.ndarray
+
+    @classmethod
+    def between(cls, margins: Margins, half_size: np.ndarray, nesting: float) -> _ConeLimits:
+        """Limits between the simulation's (nesting 0) and the plan's (nesting 1)."""
+        return cls(
+            1.0 + nesting * (margins.friction - 1.0),
+            1.0 + nesting * (margins.yaw - 1.0),
+            half_size - nesting * np.minimum(margins.cop, half_size / 2.0),
+        )
 
 
 class Controller:
@@ -29,7 +50,14 @@ class Controller:
         wrench: (4, 6) wanted wrenches in the contact frames at the last tick.
     """
 
-    def __init__(self, robot: RobotModel, reference: Reference, margins: Margins, config: ExecutionConfig):
+    def __init__(
+        self,
+        robot: RobotModel,
+        reference: Reference,
+        margins: Margins,
+        config: ExecutionConfig,
+        adjuster: StepAdjuster | None = None,
+    ):
         """Prepare for a run.
 
         Args:
@@ -37,7 +65,9 @@ class Controller:
             reference: the plan at the control ticks.
             margins: the plan's margins; the controller's lie between them and none.
             config: settings.
+            adjuster: moves landing points; they stay as planned where None.
         """
+        self._adjuster, self._com, self._com_velocity = adjuster, np.zeros(3), np.zeros(3)
         self._robot, self._reference, self._config = robot, reference, config.controller
         self._period = config.control_period
         self.dynamics = RobotDynamics(robot)
@@ -47,13 +77,14 @@ class Controller:
         for limb, model in robot.limbs.items():
             limit[limb] = model.max_normal_force
         self.tracker = ContactTracker(reference, self.limbs, weight, limit, config.controller, config.touchdown)
-        self.targets = LimbTargets(reference, self.tracker, config.touchdown)
+        self.targets = LimbTargets(reference, self.tracker, config.controller)
         self._box = JointBox(robot, config.controller)
         self._torque_limit = config.controller.torque_fraction * robot.torque_limit
-        nesting, half_sizes = config.controller.nesting, robot.half_sizes
-        self._friction_factor = 1.0 + nesting * (margins.friction - 1.0)
-        self._yaw_factor = 1.0 + nesting * (margins.yaw - 1.0)
-        self._half_size = half_sizes - nesting * np.minimum(margins.cop, half_sizes / 2.0)
+        self._limits = {
+            urgent: _ConeLimits.between(margins, robot.half_sizes, nesting)
+            for urgent, nesting in ((False, config.controller.nesting), (True, config.controller.urgent_nesting))
+        }
+        self._urgent, self._calm = False, 1.0
         legs = np.zeros(len(robot.joint_names), bool)
         for limb in self.limbs:
             if limb.is_foot:
@@ -85,11 +116,17 @@ class Controller:
         """
         self.dynamics.update(qpos, qvel)
         self.tracker.update(float(self._reference.times[index]), self._period, normal_force)
+        self._com[:], self._com_velocity[:] = self._reference.com[index], self._reference.com_velocity[index]
+        if self._adjuster is not None:
+            self._adjuster.update(index, self._period, self.dynamics, self.tracker, self.targets)
+            self._com += self._adjuster.com_offset
+            self._com_velocity += self._adjuster.com_offset_velocity
         self.targets.update(index, self.dynamics)
         limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
         qp = self._qps.get(limbs)
         if qp is None:
             qp = self._qps[limbs] = ContactQP(limbs, self.dynamics.nv)
+        self._sense_urgency()
         self._constrain(qp, index, qpos, qvel)
         self._pursue(qp, index, qpos, qvel)
         x = qp.solve()
@@ -109,12 +146,12 @@ class Controller:
     def _constrain(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in dynamics, cones and boxes."""
         dynamics, tracker = self.dynamics, self.tracker
-        friction = self._reference.friction[index]
+        friction, limits = self._reference.friction[index], self._limits[self._urgent]
         qp.set_dynamics(
             dynamics.mass_matrix, dynamics.bias, dynamics.jacobian, dynamics.limb_rotation, self._torque_limit
         )
         for limb in qp.limbs:
-            qp.set_cone(limb, friction[limb] * self._friction_factor, self._half_size[limb], self._yaw_factor)
+            qp.set_cone(limb, friction[limb] * limits.friction, limits.half_size[limb], limits.yaw)
             qp.set_normal_force(limb, tracker.min_force[limb], tracker.max_force[limb])
         self._box.update(qpos[7:], qvel[6:])
         qp.set_acceleration(self._box.lower, self._box.upper)
@@ -125,10 +162,10 @@ class Controller:
         tasks, wanted, target = self._tasks, self._wanted, self._target
         root = gains.com.weight**0.5
         np.multiply(dynamics.com_jacobian, root, out=tasks[:3])
-        error = gains.com.kp * (reference.com[index] - dynamics.com)
-        error += gains.com.kd * (reference.com_velocity[index] - dynamics.com_velocity)
+        error = gains.com.kp * (self._com - dynamics.com)
+        error += gains.com.kd * (self._com_velocity - dynamics.com_velocity)
         wanted[:3] = root * (error + reference.com_acceleration[index] - dynamics.com_drift)
-        root = gains.angular_momentum.weight**0.5 / gains.angular_momentum_scale
+        root = (gains.angular_momentum.weight * self._calm) ** 0.5 / gains.angular_momentum_scale
         np.multiply(dynamics.momentum_jacobian, root, out=tasks[3:6])
         error = gains.angular_momentum.kp * (reference.angular_momentum[index] - dynamics.angular_momentum)
         wanted[3:6] = root * (error + reference.angular_momentum_rate[index] - dynamics.momentum_drift)
@@ -148,6 +185,19 @@ class Controller:
             diagonal[moments] = gains.moment * FORCE_UNIT**2
             target[slot] = reference.wrench[index, limb, : slot.stop - slot.start] / FORCE_UNIT
         qp.set_objective(tasks[:rows], wanted[:rows], diagonal, target[: qp.size])
+
+    def _sense_urgency(self) -> None:
+        """See how far the CoM diverges from its plan.
+
+        A robot about to fall uses its feet to their edges and swings its body: the margins of the wrench cones shrink,
+        and so do the weights of angular momentum and of the base's orientation.
+        """
+        gains, dynamics = self._config, self.dynamics
+        x, y = (dynamics.com - self._com + (dynamics.com_velocity - self._com_velocity) / gains.divergence_rate)[:2]
+        squared = (x * x + y * y) / gains.divergence_scale**2
+        self._calm = 1.0 / (1.0 + squared)
+        self._urgent = squared > (0.25 if self._urgent else 1.0)
+        self._diagonal[3:6] = gains.acceleration + gains.base.weight * self._calm
 
     def _pursue_limb(self, limb: Limb, rows: int) -> int:
         """Append a limb's task rows after the first `rows`; returns their new number."""
@@ -187,7 +237,7 @@ class Controller:
         error = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
         acceleration = reference.base_acceleration[index] + task.kp * error
         acceleration += task.kd * (reference.base_velocity[index] - qvel[3:6])
-        target[3:6] = acceleration * (task.weight / self._diagonal[3:6])
+        target[3:6] = acceleration * (self._calm * task.weight / self._diagonal[3:6])
 
     def _hold(self, index: int, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
         """Last resort of a tick: gravity and Coriolis forces, and joint gains to the planned posture."""

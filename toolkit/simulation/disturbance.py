@@ -78,6 +78,8 @@ class Disturbance:
         if self.friction_error:
             scene.geom_friction[~robot_geom, 0] *= 1.0 + self.friction_error
         if self.terrain_offset or self.terrain_tilt:
+            # The compiled tree of bounding boxes knows static geoms only where they were.
+            scene.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
             for geom in np.flatnonzero(~robot_geom & ~kept):
                 self._displace(scene, int(geom), rng)
 

@@ -39,6 +39,7 @@ class Execution:
         tick_seconds: (C,) wall-clock of each control tick.
         simulated_seconds, real_time_factor: of the whole loop.
         checks: every check of the verdict that execution decides.
+        failure_time: s; the fall, the first unplanned contact or the stance that slipped too far; None without any.
         replayable: the controls alone reproduce the run; False where it was pushed.
     """
 
@@ -80,3 +81,4 @@ class Execution:
     real_time_factor: float
     checks: tuple[Check, ...]
     replayable: bool = True
+    failure_time: float | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.geometry.limb import Limb
-from toolkit.simulation.config import TouchdownConfig
+from toolkit.simulation.config import ControllerConfig
 from toolkit.simulation.dynamics import RobotDynamics
 from toolkit.simulation.reference import Reference
 from toolkit.simulation.touchdown import ContactTracker, LimbState
@@ -26,8 +26,8 @@ class LimbTargets:
 
     fade = 0.7  # fraction of a swing over which the initial offset is lost
 
-    def __init__(self, reference: Reference, tracker: ContactTracker, config: TouchdownConfig):
-        self._reference, self._tracker, self._config = reference, tracker, config
+    def __init__(self, reference: Reference, tracker: ContactTracker, config: ControllerConfig):
+        self._reference, self._tracker, self._rest_speed = reference, tracker, config.rest_speed
         self.error, self.velocity, self.acceleration = np.zeros((4, 6)), np.zeros((4, 6)), np.zeros((4, 6))
         self.authority = np.ones(4)
         self.shift, self.shift_velocity = np.zeros((4, 3)), np.zeros((4, 3))
@@ -40,6 +40,8 @@ class LimbTargets:
             state = tracker.state[limb]
             self.error[limb] = self.velocity[limb] = self.acceleration[limb] = 0.0
             self.authority[limb] = reference.authority[index, limb]
+            if state is LimbState.REST and tracker.loose[limb]:
+                self.velocity[limb, :3] = -self._rest_speed * dynamics.limb_rotation[limb, :, 2]
             if state in (LimbState.REST, LimbState.FREE):
                 continue
             if tracker.begun[limb]:

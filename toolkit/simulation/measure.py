@@ -133,7 +133,27 @@ def measure(
         real_time_factor=simulated / log.wall_seconds,
         checks=execution_checks(measured, config),
         replayable=config.disturbance.replayable,
+        failure_time=_failure_time(fell, recorder, slip, times, reference, config),
     )
+
+
+def _failure_time(
+    fell: bool,
+    recorder: Recorder,
+    slip: tuple[float, ...],
+    times: np.ndarray,
+    reference: Reference,
+    config: ExecutionConfig,
+) -> float | None:
+    """When the run went wrong, for whoever plans again: fall, unplanned contact, or the swing of the worst slip."""
+    if fell:
+        return float(times[-1])
+    if recorder.meter.unplanned_time is not None:
+        return recorder.meter.unplanned_time
+    if slip and max(slip) > config.slip_limit:
+        worst = int(np.argmax(slip))
+        return next((swing.start for swing in reference.swings if swing.transition == worst), float(times[-1]))
+    return None
 
 
 def _intervals(recorder: Recorder, robot: RobotModel, config: ExecutionConfig) -> list[ContactInterval]:

@@ -53,7 +53,7 @@ class ContactQP:
         self.upper[self.size + nv :] = 0.0
         self._sense = np.zeros(self.size + rows, np.int32)
         self._sense[self.size : self.size + 6] = 5
-        self._friction: dict[Limb, float] = {}
+        self._cones: dict[Limb, tuple[float, ...]] = {}
         self._model: daqp.Model | None = None
         self._diagonal = np.diag_indices(self.size)
 
@@ -66,9 +66,10 @@ class ContactQP:
             half_size: (2,) m, margins applied.
             yaw: factor on the yaw moment.
         """
-        if self._friction.get(limb) == friction:
+        key = (friction, yaw, *half_size)
+        if self._cones.get(limb) == key:
             return
-        self._friction[limb] = friction
+        self._cones[limb] = key
         cone = sole_rows(friction, half_size, yaw) if limb.is_foot else friction_rows(friction)
         self.rows[self._cone_rows[limb], self.slots[limb]] = cone
 

@@ -21,6 +21,7 @@ from toolkit.simulation.measure import RunLog, measure
 from toolkit.simulation.recorder import Recorder
 from toolkit.simulation.reference import LimbPathSampler, sample_reference
 from toolkit.simulation.scene_index import SceneIndex
+from toolkit.simulation.step_adjustment import StepAdjuster
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.scene import compose_scene
@@ -81,7 +82,10 @@ def execute(
     reference = sample_reference(
         period * np.arange(ticks), sequence, schedule, motion, trajectory, paths, index.limbs()
     )
-    controller = Controller(robot, reference, motion.problem.margins, config)
+    adjuster = None
+    if config.step_adjustment.enabled:
+        adjuster = StepAdjuster(reference, world.surfaces, robot, config.step_adjustment)
+    controller = Controller(robot, reference, motion.problem.margins, config, adjuster)
     recorder = Recorder(ticks, scene, robot, index, config)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(schedule.duration, rng)

@@ -33,6 +33,7 @@ class ContactTracker:
         min_force, max_force: (4,) N; range of the normal force at the current tick.
         depth: (4,) m; how far a searching limb has gone beyond the planned surface.
         begun, made: (4,) bool; swings that began, contacts that were made at this very tick.
+        loose: (4,) bool; limbs that should be in contact but are measured to bear next to nothing.
         current: by limb, the swing under way or the last one; None before the first.
     """
 
@@ -65,6 +66,7 @@ class ContactTracker:
         self.in_contact = np.zeros(4, bool)
         self.min_force, self.max_force, self.depth = np.zeros(4), np.zeros(4), np.zeros(4)
         self.begun, self.made = np.zeros(4, bool), np.zeros(4, bool)
+        self.loose = np.zeros(4, bool)
 
     def update(self, time: float, period: float, normal_force: np.ndarray) -> None:
         """Advance to a tick.
@@ -87,6 +89,7 @@ class ContactTracker:
             if swing is not None and self.state[limb] in (LimbState.SWING, LimbState.SEARCH):
                 self._advance(limb, swing, time, period, normal_force[limb])
             self.in_contact[limb] = self.state[limb] is LimbState.REST
+            self.loose[limb] = self.in_contact[limb] and normal_force[limb] < self._config.loose_force
             self._bound(limb, time)
 
     def _advance(self, limb: Limb, swing: Swing, time: float, period: float, force: float) -> None:
