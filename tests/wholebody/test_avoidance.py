@@ -73,6 +73,7 @@ def test_arms_are_drawn_in_beside_a_wall(robot, flat_walk, hand):
     times = np.linspace(0.0, flat_walk.schedule.duration, int(50 * flat_walk.schedule.duration) + 1)
     free = solve_ik(robot, paths, flat_walk.motion, times, IKConfig())
     world = side_wall(max(outermost(robot, qpos) for qpos in free) + 0.02)
-    assert "world/wall" in first_collision(robot, world, times, free, CollisionConfig())
+    hit = first_collision(robot, world, times, free, CollisionConfig())
+    assert hit is not None and "world/wall" in hit.text
     drawn_in = solve_ik(robot, paths, flat_walk.motion, times, IKConfig(), world)
-    assert first_collision(robot, world, times, drawn_in, CollisionConfig()) == ""
+    assert first_collision(robot, world, times, drawn_in, CollisionConfig()) is None

@@ -94,8 +94,8 @@ def test_soles_may_rest_but_not_sink(robot, flat_walk, good):
     for depth, expected in ((0.003, ""), (0.006, "world/floor")):
         qpos = states.copy()
         qpos[:, 2] -= depth
-        text = first_collision(robot, flat_walk.world, times, qpos, config)
-        assert (text == "") if expected == "" else (expected in text)
+        hit = first_collision(robot, flat_walk.world, times, qpos, config)
+        assert (hit is None) if expected == "" else (hit is not None and expected in hit.text and hit.time == 0.0)
 
 
 def test_folding_the_body_into_itself_collides(robot, flat_walk, good):
@@ -104,7 +104,8 @@ def test_folding_the_body_into_itself_collides(robot, flat_walk, good):
     rng, qpos = np.random.default_rng(0), states.copy()
     qpos[:, 2] += 2.0  # off the ground
     qpos[:, 7:] = rng.uniform(robot.lower, robot.upper, size=qpos[:, 7:].shape)
-    assert "collide at" in first_collision(robot, flat_walk.world, times, qpos, CollisionConfig())
+    hit = first_collision(robot, flat_walk.world, times, qpos, CollisionConfig())
+    assert hit is not None and "collide at" in hit.text
 
 
 def test_not_a_number_fails(robot, flat_walk, good):

@@ -21,6 +21,10 @@ from toolkit.wholebody.avoidance import ArmAvoidance
 from toolkit.wholebody.ik_config import IKConfig
 from toolkit.wholebody.knee import chain_to, knee_range
 from toolkit.wholebody.limb_paths import LimbPaths
+from toolkit.wholebody.profile import Window
+from toolkit.wholebody.swing import rotation_exponential, rotation_vector
+
+OFFSET = Window(0.0, 0.6)  # of a palm's swing, over which it joins its path
 
 
 class WholeBodyIK:
@@ -62,7 +66,7 @@ class WholeBodyIK:
         robot, config, solver = self.robot, self.config, self.solver
         self.com = solver.add_com_task(np.zeros(3))
         self.com.configure("com", "soft", config.com)
-        self.feet, self.palms = {}, {}
+        self.feet, self.palms, self.offsets = {}, {}, {}
         for foot in FEET:
             task = solver.add_frame_task(robot.limbs[foot].site, np.eye(4))
             task.configure(foot.label, "soft", config.foot_position, config.foot_orientation)
@@ -185,7 +189,7 @@ class WholeBodyIK:
             heading += np.array([np.cos(pose.yaw), np.sin(pose.yaw)])
         self.base.R_world_frame = rotation_about_z(np.arctan2(heading[1], heading[0]))
         for palm, tasks in self.palms.items():
-            self._set_palm(palm, tasks, paths.sample(palm, time).pose, paths.authority(palm, time))
+            self._set_palm(palm, tasks, time, paths)
 
     def _set_dampers(self, qpos: np.ndarray, angles: np.ndarray, reaching: set[Limb]) -> None:
         """Keep the arms clear of the world and the body."""
@@ -225,15 +229,34 @@ class WholeBodyIK:
         for name, low, high in zip(self.robot.joint_names, lower.tolist(), upper.tolist(), strict=True):
             self.wrapper.set_joint_limits(name, low, high)
 
-    def _set_palm(self, palm: Limb, tasks: tuple, pose: Pose | None, authority: float) -> None:
+    def _set_palm(self, palm: Limb, tasks: tuple, time: float, paths: LimbPaths) -> None:
+        """Targets of a palm: its path, and at first the distance from there to where the free arm happened to be."""
         position, normal, twist = tasks
+        pose, authority = paths.sample(palm, time).pose, paths.authority(palm, time)
         if pose is not None:
+            pose = self._from_free(palm, pose, time, paths)
             position.target_world = pose.position
             normal.targetAxis_world = pose.normal
             twist.R_world_frame = pose.rotation
-        position.configure(f"{palm.label}_position", "soft", authority * self.config.palm_position)
-        normal.configure(f"{palm.label}_normal", "soft", authority * self.config.palm_normal)
-        twist.configure(f"{palm.label}_twist", "soft", authority * self.config.palm_twist)
+        # Weights span many orders of magnitude, so they grow geometrically with the authority.
+        share = 10.0 ** (-7.0 * (1.0 - authority)) if authority > 0.0 else 0.0
+        position.configure(f"{palm.label}_position", "soft", share * self.config.palm_position)
+        normal.configure(f"{palm.label}_normal", "soft", share * self.config.palm_normal)
+        twist.configure(f"{palm.label}_twist", "soft", share * self.config.palm_twist)
+
+    def _from_free(self, palm: Limb, pose: Pose, time: float, paths: LimbPaths) -> Pose:
+        """A path that comes from the free posture starts where the palm is, and the difference fades."""
+        segment = paths.segment(palm, time)
+        if not segment.free_start or segment.path is None:
+            return pose
+        if self.offsets.get(palm, (None,))[0] is not segment:
+            actual = self.wrapper.get_T_world_frame(self.robot.limbs[palm].site)
+            start = segment.path.start
+            turn = rotation_vector(actual[:3, :3] @ start.rotation.T)
+            self.offsets[palm] = segment, actual[:3, 3] - start.position, turn
+        _, shift, turn = self.offsets[palm]
+        left = 1.0 - OFFSET.step((time - segment.begin) / (segment.end - segment.begin))[0]
+        return Pose(rotation_exponential(left * turn) @ pose.rotation, pose.position + left * shift)
 
 
 def momentum_at(motion: CentroidalMotion, time: float) -> np.ndarray:
