@@ -3,7 +3,8 @@
     world -> surfaces -> contact sequence -> centroidal motion -> whole-body trajectory -> execution -> verdict
 
 The search proposes contact sequences; each is tested from the newest (cheapest) to the oldest by the centroidal
-optimiser, by inverse kinematics and by the simulation, and the first that passes everything is the plan.
+optimiser, by inverse kinematics and by the simulation, and the first that passes everything is the plan. Where all
+fail, the search starts again without the transitions at which they failed.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.prediction.networks import NetworkEvaluator, load_networks
 from toolkit.robot.model import RobotModel
+from toolkit.search.exclusion import Exclusion, excluded
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult, Solution
 from toolkit.simulation.check import Check, Result
@@ -127,6 +129,7 @@ class Trial:
         passed: whether every stage that was asked for passed; of the execution, every check.
         motion, trajectory, execution: results of the stages.
         reason: one line where it did not pass, else "".
+        failure_time: s; when it failed, None where unknown or where it passed.
     """
 
     solution: Solution
@@ -136,6 +139,12 @@ class Trial:
     trajectory: WholeBodyTrajectory | None = None
     execution: Execution | None = None
     reason: str = ""
+    failure_time: float | None = None
+
+    @property
+    def failed_transition(self) -> int | None:
+        """Index of the transition in which it failed; None where unknown or where it passed."""
+        return None if self.failure_time is None else self.schedule.phase_at(self.failure_time).transition
 
     @property
     def stages_passed(self) -> int:
@@ -184,7 +193,8 @@ def test_solution(
     motion = optimise(robot, schedule, initial_com(robot, start), np.zeros(3), config=config.sequence)
     observer.finished("dynamics", motion.feasible, motion.seconds, motion.status)
     if not motion.feasible:
-        return Trial(solution, schedule, False, motion, reason=f"no feasible centroidal motion: {motion.status}")
+        reason = f"no feasible centroidal motion: {motion.status}"
+        return Trial(solution, schedule, False, motion, reason=reason, failure_time=motion.failure_time)
     if config.until == "dynamics":
         return Trial(solution, schedule, True, motion)
 
@@ -193,7 +203,7 @@ def test_solution(
     observer.finished("wholebody", trajectory.feasible, trajectory.seconds, trajectory.reason)
     if not trajectory.feasible:
         reason = f"no whole-body motion: {trajectory.reason}"
-        return Trial(solution, schedule, False, motion, trajectory, reason=reason)
+        return Trial(solution, schedule, False, motion, trajectory, None, reason, trajectory.failure_time)
     if config.until == "wholebody":
         return Trial(solution, schedule, True, motion, trajectory)
 
@@ -211,7 +221,8 @@ def test_solution(
         observer=lambda fraction, detail="": observer.progress("execution", fraction, detail),
     )
     reason = failure(execution)
-    trial = Trial(solution, schedule, not reason, motion, trajectory, execution, reason)
+    when = execution.failure_time if reason else None
+    trial = Trial(solution, schedule, not reason, motion, trajectory, execution, reason, when)
     observer.finished("execution", trial.passed, time.perf_counter() - began, trial.reason)
     return trial
 
@@ -253,25 +264,63 @@ def run(
         ToolkitError: the input cannot be used at all (no start stance, nothing leads to the goal).
     """
     observer = observer or SilentObserver()
+    search = _search(planner, config, observer, 0, [])
+    best: Trial | None = None
+    chosen = search
+    exclusions: list[Exclusion] = []
+    tested = attempt = 0
+    while search.solutions:
+        for solution in reversed(search.solutions):  # newest, cheapest first
+            if tested == config.candidates or _meets(solution, exclusions):
+                continue
+            tested += 1
+            trial = test_solution(robot, world, solution, config, observer)
+            if best is None or trial.passed or trial.stages_passed > best.stages_passed:
+                best, chosen = trial, search
+            if trial.passed:
+                return PipelineResult(robot, world, chosen, best, tested, "")
+            exclusions += _blamed(trial)
+        if tested == config.candidates or not exclusions:
+            break
+        attempt += 1
+        search = _search(planner, config, observer, attempt, exclusions)
+    return PipelineResult(robot, world, chosen, best, tested, best.reason if best else search.reason)
+
+
+def _search(
+    planner: ContactPlanner, config: PipelineConfig, observer: Observer, attempt: int, exclusions: list[Exclusion]
+) -> SearchResult:
+    """One contact search; the first attempt uses the seed itself."""
     observer.started("planning")
     search = planner.search(
-        np.random.default_rng(config.seed),
+        np.random.default_rng([config.seed, attempt]),
         config.time_limit,
         observer=lambda progress: observer.progress("planning", None, str(progress)),
+        exclusions=exclusions,
     )
     found = len(search.solutions)
-    observer.finished("planning", found > 0, search.seconds, search.reason or f"{found} sequences")
+    detail = search.reason or f"{found} sequence{'s' if found > 1 else ''}"
+    if exclusions:
+        detail += f" without {len(exclusions)} transition{'s' if len(exclusions) > 1 else ''} that failed"
+    observer.finished("planning", found > 0, search.seconds, detail)
+    return search
 
-    best: Trial | None = None
-    tested = 0
-    for solution in reversed(search.solutions):  # newest, cheapest first
-        if tested == config.candidates:
-            break
-        tested += 1
-        trial = test_solution(robot, world, solution, config, observer)
-        if best is None or trial.passed or trial.stages_passed > best.stages_passed:
-            best = trial
-        if trial.passed:
-            break
-    reason = search.reason if best is None else best.reason
-    return PipelineResult(robot, world, search, best, tested, reason)
+
+def _blamed(trial: Trial) -> list[Exclusion]:
+    """The transition at which a trial failed, to keep the next search away from it; empty where none can be blamed."""
+    index = trial.failed_transition
+    transitions = trial.solution.sequence.transitions
+    if index is None or not transitions:
+        return []
+    index = min(index, len(transitions) - 1)
+    return [Exclusion.of(trial.solution.sequence.stances[index], transitions[index])]
+
+
+def _meets(solution: Solution, exclusions: list[Exclusion]) -> bool:
+    """Whether a solution contains an excluded transition."""
+    sequence = solution.sequence
+    for stance, transition in zip(sequence.stances, sequence.transitions, strict=False):
+        own = Exclusion.of(stance, transition)
+        if excluded(exclusions, own.before, np.array([own.limb]), own.target[None])[0]:
+            return True
+    return False

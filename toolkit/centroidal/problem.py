@@ -150,6 +150,7 @@ class CentroidalMotion:
         objective: value of the paper's objective, recomputed in NumPy.
         seconds: wall-clock time, everything counted.
         iterations: of the solver.
+        failure_time: s; when a constraint is violated most, None where feasible or unknown.
     """
 
     problem: CentroidalProblem
@@ -164,6 +165,7 @@ class CentroidalMotion:
     objective: float
     seconds: float
     iterations: int
+    failure_time: float | None = None
 
     def sample(self, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """CoM position, velocity and acceleration (3,) at a time in s, exact between knots, clamped at the ends."""

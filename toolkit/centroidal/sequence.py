@@ -47,7 +47,7 @@ class SequenceConfig:
     body: BodyMargins = WANTED_BODY
     regularisers: Regularisers = field(default_factory=Regularisers)
     solver: str = "fatrop"
-    max_iterations: int = 100
+    max_iterations: int = 70
     tolerance: float = 1e-4
 
 
@@ -187,10 +187,13 @@ def _guess(program: Program, warm: CentroidalMotion | None) -> np.ndarray:
     com[0], velocity[0] = p.com, p.com_velocity
     x[p_index(layout.offset, 3)] = com
     x[p_index(layout.offset + 3, 3)] = velocity
-    share = np.array([0.0, 0.0, 1.0]) / p.active.sum(1)[:, None, None]
-    local = np.einsum("tlji,tlj->tli", p.rotation, np.broadcast_to(share, (n, 4, 3)))
+    # The weight is shared, as far as it is inside the cones: a palm on a wall starts with a light touch.
+    up = p.rotation[..., 2, :] / np.maximum(p.active[:, :2].sum(1), 1)[:, None, None]
+    normal = np.maximum(up[..., 2], 0.02)
+    lateral = np.linalg.norm(up[..., :2], axis=-1)
+    inside = np.minimum(1.0, 0.5 * p.friction * normal / np.maximum(lateral, 1e-9))
+    local = np.concatenate([up[..., :2] * inside[..., None], normal[..., None]], -1)
     step, limb = np.nonzero(p.active)
-    local[..., 2] = np.maximum(local[..., 2], 0.01)
     x[p_index(layout.wrench[step, limb], 3)] = local[step, limb]
     x[layout.slack] = 0.01
     return x
@@ -237,13 +240,16 @@ def _judged(motion: CentroidalMotion, program: Program, robot: RobotModel, x: np
     body = body_residuals(judged, robot)
     if judged.feasible and body.largest <= BODY_TOLERANCE:
         return judged
-    return replace(judged, feasible=False, status=f"{motion.status}; {_reason(judged, body, slack)}")
+    reason, knot = _reason(judged, body, slack)
+    time = None if knot is None else float(judged.problem.times[knot])
+    return replace(judged, feasible=False, status=f"{motion.status}; {reason}", failure_time=time)
 
 
 def _margins(problem: CentroidalProblem, used: np.ndarray) -> list[Margins]:
     """Margins that a motion may keep, the wanted ones first.
 
-    A relaxed yaw factor is no looser where lateral forces and CoP alone demand a yaw moment: both are tried.
+    Where lateral forces and CoP alone demand a yaw moment, a larger yaw factor is no looser: several are tried. All is
+    within 1, the physical limit.
 
     Args:
         problem: with the wanted margins.
@@ -253,14 +259,14 @@ def _margins(problem: CentroidalProblem, used: np.ndarray) -> list[Margins]:
     cop = (problem.half_size - problem.reduced_half_size)[problem.active.any(0)].min(0) * (1 - used[1])
     friction, yaw = (float(factor + (1 - factor) * used[0]) for factor in (wanted.friction, wanted.yaw))
     kept = (float(cop[0]), float(cop[1]))
-    return [wanted, *[Margins(friction, kept, factor) for factor in (yaw, wanted.yaw, (yaw + wanted.yaw) / 2, 1.0)]]
+    return [wanted, *[Margins(friction, kept, factor) for factor in (yaw, wanted.yaw, (yaw + 1) / 2, 1.0)]]
 
 
-def _reason(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) -> str:
-    """Which constraint is violated most, by how much, and where."""
+def _reason(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) -> tuple[str, int | None]:
+    """Which constraint is violated most, by how much, and where; and the knot, None where unknown."""
     name, knot, limb = body.worst
     if body.largest > BODY_TOLERANCE and slack[:, 2].max() >= slack[:-1, :2].max():
-        return f"infeasible: {name} of {limb.label} beyond its limit by {body.largest:.3g} at knot {knot}"
+        return f"infeasible: {name} of {limb.label} beyond its limit by {body.largest:.3g} at knot {knot}", int(knot)
     step, kind = np.unravel_index(int(np.argmax(slack[:-1, :2])), slack[:-1, :2].shape)
     if slack[step, kind] > 1.0 + 1e-4:
         p = motion.problem
@@ -271,8 +277,8 @@ def _reason(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) ->
             excess = (np.abs(motion.cop[step]) - p.half_size).max(-1)
         limb = Limb(int(np.argmax(np.where(loaded, excess, -np.inf))))
         what = ("friction", "centre of pressure")[kind]
-        return f"infeasible: {what} of {limb.label} beyond the physical limit at knot {step}"
+        return f"infeasible: {what} of {limb.label} beyond the physical limit at knot {step}", int(step)
     if body.largest > BODY_TOLERANCE:
-        return f"infeasible: {name} of {limb.label} beyond its limit by {body.largest:.3g} at knot {knot}"
+        return f"infeasible: {name} of {limb.label} beyond its limit by {body.largest:.3g} at knot {knot}", int(knot)
     residuals = check(motion)
-    return f"unsolved: {residuals.worst.replace('_', ' ')} is violated by {residuals.largest:.2g}"
+    return f"unsolved: {residuals.worst.replace('_', ' ')} is violated by {residuals.largest:.2g}", None

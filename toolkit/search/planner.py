@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.search import screen
 from toolkit.search.ana_star import AnaStar, AnaStarConfig, AnaStarResult, Edge, Path, Progress
 from toolkit.search.contact_table import ContactTable
+from toolkit.search.exclusion import Exclusion
 from toolkit.search.heuristic import Distance, EuclideanDistance, GridConfig
 from toolkit.search.moves import MoveConfig, MoveGenerator
 from toolkit.search.problem import ContactProblem, CostConfig
@@ -147,6 +148,7 @@ class ContactPlanner:
         rng: np.random.Generator,
         time_limit: float,
         observer: Callable[[Progress], None] | None = None,
+        exclusions: Sequence[Exclusion] = (),
     ) -> SearchResult:
         """Search for contact sequences until the time is up or nothing can improve.
 
@@ -154,6 +156,7 @@ class ContactPlanner:
             rng: for random expansions.
             time_limit: s, the heuristic not counted.
             observer: told of progress and of every solution.
+            exclusions: transitions that later stages rejected; the search keeps away from them.
 
         Returns:
             Every solution found, and why there is none where there is none.
@@ -180,6 +183,7 @@ class ContactPlanner:
             self._timings,
             self.config.palms,
             self.config.cost,
+            exclusions,
         )
         # What an evaluator compiles or loads at its first query is not part of the search.
         standing = ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], self._timings[0])

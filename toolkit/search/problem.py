@@ -16,6 +16,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.search import screen
 from toolkit.search.ana_star import Edge
 from toolkit.search.contact_table import ContactTable
+from toolkit.search.exclusion import Exclusion, excluded
 from toolkit.search.heuristic import Distance
 from toolkit.search.legs import stances_violated
 from toolkit.search.moves import MoveGenerator
@@ -95,6 +96,7 @@ class ContactProblem:
         timings: to choose from.
         palms: whether palms may be used.
         config: costs.
+        exclusions: transitions that later stages rejected.
 
     Attributes:
         rejected: (len(REASONS),) int; candidates that fell, by reason.
@@ -115,10 +117,11 @@ class ContactProblem:
         timings: tuple[Timing, ...],
         palms: bool,
         config: CostConfig,
+        exclusions: Sequence[Exclusion] = (),
     ):
         self._robot, self._moves, self._table = robot, moves, table
         self._evaluator, self._distance, self._goal = evaluator, distance, goal
-        self._timings, self._config = timings, config
+        self._timings, self._config, self._exclusions = timings, config, exclusions
         self._palms = [limb for limb in PALMS if palms and limb in robot.arms and moves.has_palm_surfaces]
         self._longest = longest
         numbers = np.full((1, 4), -1)
@@ -258,6 +261,13 @@ class ContactProblem:
         number = np.concatenate(numbers)
         after = np.repeat(contacts[None], n, axis=0)
         after[np.arange(n), limb] = number
+        if self._exclusions:
+            position = np.vstack([self._table.position, np.full(3, np.nan)])  # number -1: no contact
+            allowed = ~excluded(self._exclusions, position[contacts], limb, position[number])
+            self.rejected[screen.EXCLUDED] += n - int(allowed.sum())
+            limb, number, after, n = limb[allowed], number[allowed], after[allowed], int(allowed.sum())
+            if n == 0:
+                return None
         centre, yaw = self.feet(after)
         before = self.feet(contacts[None])[0][0]
         cost = np.hypot(*(centre[:, :2] - before[:2]).T) + self._config.step

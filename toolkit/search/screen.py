@@ -28,10 +28,11 @@ REASONS = (
     "dynamics",
     "cannot lead to a better plan",
     "arm out of reach of its palm",
+    "rejected by a later stage",
 )
 NO_SURFACE, CLOSE, HIGH, BODY, LEG = 1, 2, 3, 4, 5
 PALM_REASONS = (14, 15, 16, 17)  # palms are an option: where they find no wall is no reason why there is no plan
-CROSSES, FAST, STILL, NO_WALL, FAR, WRONG_SIDE, FACING, DYNAMICS, COSTLY, ARM = range(11, 21)
+CROSSES, FAST, STILL, NO_WALL, FAR, WRONG_SIDE, FACING, DYNAMICS, COSTLY, ARM, EXCLUDED = range(11, 22)
 
 
 @numba.njit(cache=True)

@@ -11,6 +11,7 @@ from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.collision import CollisionConfig, first_collision
+from toolkit.wholebody.finding import Finding
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.torque import inverse_dynamics, velocities
 from toolkit.world.world import World
@@ -50,7 +51,7 @@ class CheckReport:
         torque: (T, n) N m.
         base_residual: (T, 6) N and N m; see `torque.inverse_dynamics`.
         limits_respected: joint ranges, velocities, torques.
-        reasons: one line per violated check, empty where all hold.
+        findings: one per violated check, empty where all hold.
     """
 
     max_position_error: float
@@ -58,7 +59,12 @@ class CheckReport:
     torque: np.ndarray
     base_residual: np.ndarray
     limits_respected: bool
-    reasons: tuple[str, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """One line per violated check."""
+        return tuple(finding.text for finding in self.findings)
 
 
 def check(
@@ -85,8 +91,8 @@ def check(
     torque, residual = inverse_dynamics(robot, motion, times, qpos)
     limits = _limits(robot, times, qpos, torque, config)
     hit = first_collision(robot, world, times, qpos, config.collision)
-    reasons = tracking + limits + ([hit] if hit else [])
-    return CheckReport(position, orientation, torque, residual, not limits, tuple(reasons))
+    findings = tracking + limits + ([hit] if hit else [])
+    return CheckReport(position, orientation, torque, residual, not limits, tuple(findings))
 
 
 def _tracking(
@@ -96,7 +102,7 @@ def _tracking(
     times: np.ndarray,
     qpos: np.ndarray,
     config: CheckConfig,
-) -> tuple[float, float, list[str]]:
+) -> tuple[float, float, list[Finding]]:
     """Largest position and orientation error over CoM and contacts, and the reasons to fail."""
     model = robot.mujoco_model
     data = mujoco.MjData(model)
@@ -128,12 +134,12 @@ def _tracking(
             limit = config.foot if limb.is_foot else config.palm
             position = max(position, note(limb.label, "m", error, limit, time))
             orientation = max(orientation, note(limb.label, "rad", turn, config.orientation, time))
-    reasons = [
-        f"{thing} is {error:.3g} {unit} off its plan at {time:.2f} s (limit {limit:.3g} {unit})"
+    findings = [
+        Finding(f"{thing} is {error:.3g} {unit} off its plan at {time:.2f} s (limit {limit:.3g} {unit})", float(time))
         for (thing, unit), (error, limit, time) in worst.items()
         if error > limit
     ]
-    return position, orientation, reasons
+    return position, orientation, findings
 
 
 def _angle(limb: Limb, actual: np.ndarray, planned: np.ndarray) -> float:
@@ -146,17 +152,18 @@ def _angle(limb: Limb, actual: np.ndarray, planned: np.ndarray) -> float:
 
 def _limits(
     robot: RobotModel, times: np.ndarray, qpos: np.ndarray, torque: np.ndarray, config: CheckConfig
-) -> list[str]:
+) -> list[Finding]:
     """Reasons to fail: range, velocity, torque."""
-    reasons = []
+    findings = []
     joints = qpos[:, 7:]
     beyond = np.maximum(robot.lower - joints, joints - robot.upper)
     row, column = _worst(beyond)
     if not beyond[row, column] <= config.range_tolerance:
-        reasons.append(
+        text = (
             f"joint {robot.joint_names[column]} is at {joints[row, column]:.3f} rad at {times[row]:.2f} s "
             f"(range {robot.lower[column]:.3f} to {robot.upper[column]:.3f} rad)"
         )
+        findings.append(Finding(text, float(times[row])))
     speed = velocities(robot.mujoco_model, times, qpos)[:, 6:]
     for values, limit, allowed, what, unit in (
         (speed, robot.velocity_limit, config.velocity_ratio, "turns at", "rad/s"),
@@ -164,11 +171,12 @@ def _limits(
     ):
         row, column = _worst(np.abs(values) / limit)
         if not abs(values[row, column]) <= allowed * limit[column]:
-            reasons.append(
+            text = (
                 f"joint {robot.joint_names[column]} {what} {values[row, column]:.3g} {unit} at {times[row]:.2f} s "
                 f"(limit {allowed * limit[column]:.3g} {unit})"
             )
-    return reasons
+            findings.append(Finding(text, float(times[row])))
+    return findings
 
 
 def _worst(values: np.ndarray) -> tuple[int, int]:

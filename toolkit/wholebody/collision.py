@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from toolkit.robot.model import RobotModel
+from toolkit.wholebody.finding import Finding
 from toolkit.world.scene import compose_scene
 from toolkit.world.world import World
 
@@ -31,8 +32,8 @@ class CollisionConfig:
 
 def first_collision(
     robot: RobotModel, world: World, times: np.ndarray, qpos: np.ndarray, config: CollisionConfig
-) -> str:
-    """The first collision of a motion in one line, "" if there is none.
+) -> Finding | None:
+    """The first collision of a motion, None if there is none.
 
     Pairs of links that touch each other in the home posture are left out.
 
@@ -62,11 +63,12 @@ def first_collision(
             else:
                 allowed = np.inf if _bodies(model, first, second) in resting else config.self_depth
             if depth > allowed:
-                return (
+                return Finding(
                     f"{_label(model, first)} and {_label(model, second)} collide at {times[index]:.2f} s, "
-                    f"{depth * 1e3:.1f} mm deep (allowed {allowed * 1e3:.1f} mm)"
+                    f"{depth * 1e3:.1f} mm deep (allowed {allowed * 1e3:.1f} mm)",
+                    float(times[index]),
                 )
-    return ""
+    return None
 
 
 def _touching_at_home(

@@ -15,6 +15,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.avoidance import ArmAvoidance
 from toolkit.wholebody.check import CheckConfig, CheckReport, check
+from toolkit.wholebody.finding import Finding
 from toolkit.wholebody.ik import WholeBodyIK, first_guess
 from toolkit.wholebody.ik_config import IKConfig
 from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
@@ -62,8 +63,12 @@ def whole_body(
     paths = limb_paths(robot, world, schedule, motion, config.swing)
     count = max(int(round(schedule.duration * config.rate)), 2) + 1
     times = np.linspace(0.0, schedule.duration, count)
-    reasons = [
-        f"{limb.label} finds no way clear of the world in transition {transition}" for limb, transition in paths.blocked
+    blocked = [
+        Finding(
+            f"{limb.label} finds no way clear of the world in transition {transition}",
+            next(phase.start for phase in schedule.phases if phase.transition == transition and phase.swing == limb),
+        )
+        for limb, transition in paths.blocked
     ]
     if not motion.feasible:
         reason = f"the centroidal motion is not feasible: {motion.status}"
@@ -71,9 +76,10 @@ def whole_body(
     try:
         qpos = solve_ik(robot, paths, motion, times, config.ik, world)
     except PlanningError as error:
-        return _failed(robot, paths, times, "; ".join([*reasons, str(error)]), perf_counter() - begin)
+        reason = "; ".join([*(finding.text for finding in blocked), str(error)])
+        return _failed(robot, paths, times, reason, perf_counter() - begin)
     report = check(robot, world, paths, motion, times, qpos, config.check)
-    return _trajectory(robot, paths, times, qpos, report, reasons, begin)
+    return _trajectory(robot, paths, times, qpos, report, blocked, begin)
 
 
 def solve_ik(
@@ -132,10 +138,10 @@ def _trajectory(
     times: np.ndarray,
     qpos: np.ndarray,
     report: CheckReport,
-    reasons: list[str],
+    blocked: list[Finding],
     begin: float,
 ) -> WholeBodyTrajectory:
-    reasons = [*reasons, *report.reasons]
+    findings = [*blocked, *report.findings]
     pose, velocity, contact = _limb_arrays(paths, times)
     return WholeBodyTrajectory(
         times=times,
@@ -148,9 +154,10 @@ def _trajectory(
         max_position_error=report.max_position_error,
         max_orientation_error=report.max_orientation_error,
         limits_respected=report.limits_respected,
-        feasible=not reasons,
-        reason="; ".join(reasons),
+        feasible=not findings,
+        reason="; ".join(finding.text for finding in findings),
         seconds=perf_counter() - begin,
+        failure_time=findings[0].time if findings else None,
     )
 
 

@@ -26,6 +26,7 @@ class WholeBodyTrajectory:
         feasible: all of the checks above passed and no unplanned collision.
         reason: one line where not feasible, else "".
         seconds: wall-clock.
+        failure_time: s; of the failure named first in `reason`, None where feasible or unknown.
     """
 
     times: np.ndarray
@@ -41,3 +42,4 @@ class WholeBodyTrajectory:
     feasible: bool
     reason: str
     seconds: float
+    failure_time: float | None = None

@@ -1,0 +1,64 @@
+"""Exclusions: contact transitions that later stages rejected, so that the next search keeps away from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Stance
+from toolkit.geometry.limb import Limb
+
+
+@dataclass(frozen=True)
+class Exclusion:
+    """A transition out of a stance that proved impossible, and those much like it.
+
+    Attributes:
+        limb: that moves.
+        before: (4, 3) m; positions of the contacts before, NaN where there is none.
+        target: (3,) m; position of the new contact, NaN where a palm breaks.
+    """
+
+    limb: Limb
+    before: np.ndarray
+    target: np.ndarray
+
+    @classmethod
+    def of(cls, stance: Stance, transition: ContactTransition) -> Exclusion:
+        """Exclusion of a transition from a stance."""
+        before = np.full((4, 3), np.nan)
+        for contact in stance.contacts:
+            before[contact.limb] = contact.pose.position
+        target = np.full(3, np.nan) if transition.contact is None else transition.contact.pose.position
+        return cls(transition.limb, before, target)
+
+
+def excluded(
+    exclusions: Sequence[Exclusion], before: np.ndarray, limb: np.ndarray, target: np.ndarray, *, radius: float = 0.03
+) -> np.ndarray:
+    """Which candidates are like an excluded transition.
+
+    Args:
+        exclusions: to keep away from.
+        before: (4, 3) m; contacts of the state, NaN where there is none.
+        limb: (n,) int; that moves.
+        target: (n, 3) m; where to, NaN where a palm breaks.
+        radius: m; contacts no farther apart count as the same.
+
+    Returns:
+        (n,) bool.
+    """
+    result = np.zeros(len(limb), bool)
+    for item in exclusions:
+        if _near(before, item.before, radius).all():
+            result |= (limb == item.limb) & _near(target, item.target, radius)
+    return result
+
+
+def _near(a: np.ndarray, b: np.ndarray, radius: float) -> np.ndarray:
+    """(...,) bool: points (..., 3) within `radius`, or both absent (NaN)."""
+    absent = np.isnan(a[..., 0]) & np.isnan(b[..., 0])
+    return absent | (np.linalg.norm(a - b, axis=-1) <= radius)
