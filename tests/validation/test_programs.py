@@ -1,0 +1,86 @@
+"""Tiny runs of the experiments as a user starts them."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from validation import execution, options, planning, robustness
+
+
+@pytest.fixture
+def folders(tmp_path) -> list[str]:
+    return ["--workers", "0", "--out", str(tmp_path / "out"), "--results", str(tmp_path / "results")]
+
+
+def result(folders: list[str], name: str) -> dict:
+    folder = Path(folders[-1])
+    assert (folder / f"{name}.md").is_file()
+    return json.loads((folder / f"{name}.json").read_text())
+
+
+@pytest.mark.parametrize("module", [execution, planning, robustness], ids=lambda module: module.__name__)
+def test_an_unknown_kind_of_world_is_refused_before_anything_runs(module, folders):
+    from toolkit.errors import InputError
+
+    with pytest.raises(InputError, match="no_such_world"):
+        module.main(["--kinds", "no_such_world", *folders])
+    assert not Path(folders[-1]).exists()
+
+
+def test_networks_that_are_missing_are_refused_before_anything_runs(folders, tmp_path):
+    import shutil
+
+    from toolkit.errors import NetworkError
+    from toolkit.robot.loader import load_robot
+
+    robot = load_robot(None).folder
+    shutil.copytree(robot, tmp_path / "robots" / "bare", ignore=shutil.ignore_patterns("networks"))
+    with pytest.raises(NetworkError):
+        execution.main(["--robots", str(tmp_path / "robots"), "--robot", "bare", "--planner", "learned", *folders])
+    parser = options.parser("execution", "", ["flat"], 1)
+    args = parser.parse_args(["--robots", str(tmp_path / "robots"), "--robot", "bare", *folders])
+    assert options.settings_of(args).planner == "kinematic"
+
+
+@pytest.mark.slow
+def test_execution_runs_keeps_its_failures_and_resumes(folders, capsys):
+    assert execution.main(["--kinds", "flat", "--trials", "1", *folders]) == 0
+    first = result(folders, "execution")
+    (row,) = first["table"]
+    assert (row["trials"], row["held"], row["passed"]) == (1, 1, 1)
+    assert first["trials"][0]["replays"]
+    capsys.readouterr()
+    assert execution.main(["--kinds", "flat", "--trials", "1", *folders]) == 0
+    assert "1 of 1 trials known from before" in capsys.readouterr().out
+    assert result(folders, "execution")["trials"] == first["trials"]
+    # One expansion finds no plan: the trial counts, with its reason and its folder.
+    code = execution.main(["--kinds", "flat", "rubble_field", "--trials", "1", "--expansions", "1", *folders])
+    assert code == 1
+    failed = result(folders, "execution")["trials"][1]
+    assert failed["stage"] == "planning"
+    assert "expansion" in failed["reason"]
+    names = {path.name for path in Path(failed["folder"]).iterdir()}
+    assert {"report.json", "recording.rrd", "world.xml"} <= names
+
+
+@pytest.mark.slow
+def test_planning_compares_both_planners_and_measures_growth(folders):
+    command = ["--kinds", "flat", "--trials", "1", "--lengths", "2", "4", "--growth-trials", "1", "--time-limit", "3"]
+    assert planning.main([*command, *folders]) == 0
+    found = result(folders, "planning")
+    ours, baseline = found["table"]
+    assert baseline["planner"] == "quasi-static"
+    assert ours["feasible"] == baseline["feasible"] == 1
+    assert ours["figures"]["cop_distance"] > 0.0
+    assert ours["repeatable"]
+    assert len(found["growth"]["rows"]) == 2
+    assert found["growth"]["exponents"]["first_expansions"] is not None
+
+
+@pytest.mark.slow
+def test_robustness_executes_under_each_disturbance(folders):
+    robustness.main(["--kinds", "flat", "--trials", "1", *folders])
+    rows = result(folders, "robustness")["table"]
+    assert [row["disturbance"] for row in rows] == [robustness.NONE, *robustness.DISTURBANCES]
+    assert rows[0]["survived"] == 1

@@ -1,0 +1,98 @@
+"""The worlds that the experiments run on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from toolkit.errors import InputError
+from toolkit.world.generators import KINDS as GENERATORS
+from toolkit.world.loader import load_world
+from toolkit.world.world import World
+
+WORLDS = Path(__file__).resolve().parent.parent / "worlds"
+AUTHORED_TRIALS = 5  # seeds of a world that has nothing random
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of world to test on.
+
+    Attributes:
+        generator: name in `toolkit.world.generators.KINDS`; "" for a file in worlds/.
+        options: of the generator.
+        random: whether a seed makes another world; else it only seeds the planner.
+    """
+
+    generator: str = ""
+    options: dict[str, float] = field(default_factory=dict)
+    random: bool = False
+
+
+KINDS = {
+    "rubble_field": Kind("rubble_field", random=True),
+    "rubble_corridor": Kind("rubble_corridor", random=True),
+    "wide_gap": Kind("gap", {"width": 0.5}),
+    "steep_slope_1m": Kind("slope", {"length": 1.0}),
+    "steep_slope_2m": Kind("slope", {"length": 2.0}),
+    "steep_slope_3m": Kind("slope", {"length": 3.0}),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One world and one seed.
+
+    Attributes:
+        kind: a key of `KINDS`, or the name of a file in worlds/ without its ending.
+        seed: of the world where it is random, and of everything that the run draws.
+        options: of the generator, beyond those of the kind.
+    """
+
+    kind: str
+    seed: int
+    options: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Unique within an experiment."""
+        options = "".join(f"-{name}{value:g}" for name, value in self.options)
+        return f"{self.kind}{options}-{self.seed:04d}"
+
+    def mjcf(self) -> str:
+        """The world as MJCF text."""
+        kind = kind_of(self.kind)
+        if not kind.generator:
+            return (WORLDS / f"{self.kind}.xml").read_text(encoding="utf-8")
+        options = {**kind.options, **dict(self.options)}
+        return GENERATORS[kind.generator](np.random.default_rng(self.seed), **options)
+
+    def world(self) -> World:
+        """The world, loaded."""
+        return load_world(WORLDS / f"{self.name}.xml", mjcf=self.mjcf())
+
+
+def kind_of(name: str) -> Kind:
+    """The kind of a name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if name in KINDS:
+        return KINDS[name]
+    files = sorted(path.stem for path in WORLDS.glob("*.xml"))
+    if name not in files:
+        raise InputError(f"--kinds {name}: choose from {', '.join(dict.fromkeys([*KINDS, *files]))}")
+    return Kind()
+
+
+def make_cases(kinds: Sequence[str], trials: int, seed_offset: int) -> list[Case]:
+    """Cases of several kinds: `trials` seeds of a random one, at most `AUTHORED_TRIALS` of any other."""
+    cases = []
+    for kind in kinds:
+        count = trials if kind_of(kind).random else min(trials, AUTHORED_TRIALS)
+        cases += [Case(kind, seed_offset + index) for index in range(count)]
+    return cases

@@ -1,0 +1,69 @@
+"""What results were taken with: versions, machine, state of the code."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import resource
+import sys
+from pathlib import Path
+from typing import Any
+
+from toolkit import cli
+from toolkit.report.run_report import versions
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def environment() -> dict[str, Any]:
+    """Versions of the software and the machine that it ran on."""
+    return {
+        "versions": versions(),
+        "code": code_fingerprint(),
+        "machine": {
+            "processor": _processor(),
+            "cores": cli.cores(),
+            "system": f"{platform.system()} {platform.machine()}",
+            "load": round(os.getloadavg()[0], 2),
+        },
+    }
+
+
+def code_fingerprint() -> str:
+    """Twelve hex digits of the toolkit's source: results of two states of the code are never mixed unnoticed."""
+    digest = hashlib.sha256()
+    for path in sorted((ROOT / "toolkit").rglob("*.py")):
+        digest.update(str(path.relative_to(ROOT)).encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def folder_fingerprint(folder: Path) -> str:
+    """The same of every file of a robot's folder, networks included."""
+    digest = hashlib.sha256()
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        digest.update(str(path.relative_to(folder)).encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def memory() -> float:
+    """MB that this process holds now; where the system does not say (not Linux), the most that it has held."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") / 1024**2
+    except OSError:
+        unit = 1024**2 if sys.platform == "darwin" else 1024
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+
+
+def _processor() -> str:
+    """Name of the processor."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or "unknown"

@@ -1,0 +1,128 @@
+"""What the experiments' command lines share."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from toolkit import cli
+from toolkit.robot.loader import load_robot
+from toolkit.robot.model import RobotModel
+from validation.jobs import PoolOptions
+from validation.machine import ROOT, code_fingerprint, folder_fingerprint
+
+EXIT_CODES = "exit codes: 0 every trial passed, 1 one failed (see the results), 2 bad input"
+
+
+def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> argparse.ArgumentParser:
+    """Parser of `python -m validation.<module>` with everything that a trial and the pool need."""
+    made = argparse.ArgumentParser(
+        prog=f"python -m validation.{module}",
+        description=description,
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        conflict_handler="resolve",
+    )
+    made.add_argument(
+        "--trials", type=cli.positive(int), default=trials, help="of each random kind of world (default: %(default)s)"
+    )
+    made.add_argument("--kinds", nargs="+", default=list(kinds), metavar="KIND", help=f"default: {' '.join(kinds)}")
+    cli.add_robot_options(made)
+    cli.add_planning_options(made)
+    # A trial's own number seeds everything in it: the option of a single run gives way to this one.
+    made.add_argument("--seed-offset", "--seed", type=int, default=0, metavar="N", help="first seed (default: 0)")
+    made.add_argument(
+        "--workers", type=_count, default=cli.cores(), help="processes, one thread each; 0: this one (default: cores)"
+    )
+    made.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    made.add_argument(
+        "--out",
+        type=Path,
+        default=Path("runs") / "validation" / module,
+        metavar="DIR",
+        help="trials and the runs of those that failed; trials found there are not run again (default: %(default)s)",
+    )
+    made.add_argument(
+        "--results",
+        type=Path,
+        default=ROOT / "validation" / "results",
+        metavar="DIR",
+        help=f"where {module}.json and {module}.md go (default: validation/results)",
+    )
+    return made
+
+
+def _count(text: str) -> int:
+    """An argparse type: a whole number from 0 on."""
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text} is below zero")
+    return value
+
+
+@dataclass(frozen=True)
+class TrialSettings:
+    """What every trial of an experiment is told; can be sent to another process.
+
+    Attributes:
+        robot: name. robots: folder that holds it.
+        planner: who judges transitions, "auto" already resolved.
+        planning: the planning options of the command line.
+        out: folder for runs.
+        recording: whether runs are kept with a recording.
+    """
+
+    robot: str
+    robots: Path
+    planner: str
+    planning: argparse.Namespace
+    out: Path
+    recording: bool = True
+
+    def described(self) -> dict[str, Any]:
+        """As JSON can hold it, for results: what decides them."""
+        names = ("timing", "time_limit", "expansions", "no_palms", "steps", "heuristic")
+        return {"robot": self.robot, "planner": self.planner} | {name: getattr(self.planning, name) for name in names}
+
+    def deciding(self) -> dict[str, Any]:
+        """What a trial's record depends on, the code and the robot's files included."""
+        return {
+            **{name: str(value) for name, value in self.described().items()},
+            "code": code_fingerprint(),
+            "robot_files": folder_fingerprint(self.robots / self.robot),
+        }
+
+
+def settings_of(args: argparse.Namespace) -> TrialSettings:
+    """Settings of the trials.
+
+    Raises:
+        InputError: the robot cannot be loaded, or the networks that were asked for are not there.
+    """
+    robot = load_robot(args.robot, args.robots)
+    planner = resolved(args.planner, robot)
+    folder = robot.folder.resolve()
+    return TrialSettings(folder.name, folder.parent, planner, args, args.out.resolve())
+
+
+def resolved(planner: str, robot: RobotModel) -> str:
+    """What "auto" stands for; a planner that lacks its networks is refused before the first trial.
+
+    Raises:
+        NetworkError: the networks are missing or do not fit.
+    """
+    if planner == "auto":
+        planner = "learned" if (robot.folder / "networks").is_dir() else "kinematic"
+    if planner == "learned":
+        from toolkit.prediction.networks import load_networks
+
+        load_networks(robot)
+    return planner
+
+
+def pool_of(args: argparse.Namespace) -> PoolOptions:
+    """Where trials run."""
+    return PoolOptions(args.workers, args.cluster)
