@@ -10,6 +10,8 @@ Order: left foot, right foot, (left palm), (right palm), (new contact), CoM, CoM
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,14 +82,30 @@ class Canonical:
         """Points (..., 3) from canonical form into the world."""
         return self.vector_back(points) + self.world_from_parent.position
 
-    def contact(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Contacts (n, 3), (n, 3, 3) in the world as (n, 9): position, x axis, z axis, canonical.
+    def contacts(self, contacts: Sequence[Contact]) -> np.ndarray:
+        """Contacts as rows (n, 9): position, x axis, z axis, canonical.
 
         A mirrored contact frame keeps its x and z axes mirrored; y follows from them.
         """
-        return np.concatenate(
-            [self.point(positions), self.vector(rotations[..., :, 0]), self.vector(rotations[..., :, 2])], axis=-1
-        )
+        rotations = np.array([contact.pose.rotation for contact in contacts])
+        rows = np.empty((len(contacts), 3, 3))
+        rows[:, 0] = np.array([contact.pose.position for contact in contacts]) - self.world_from_parent.position
+        rows[:, 1], rows[:, 2] = rotations[:, :, 0], rotations[:, :, 2]
+        return self.vector(rows).reshape(-1, CONTACT)
+
+
+def parent_frame(stance: Stance) -> Pose:
+    """`stance.mean_feet` in plain floats, which is several times faster: it is needed for every query."""
+    left, right = (contact.pose for contact in stance.contacts[:2])
+    x = y = 0.0
+    for pose in (left, right):
+        dx, dy = float(pose.rotation[0, 0]), float(pose.rotation[1, 0])
+        length = math.hypot(dx, dy) or 1.0
+        x, y = x + dx / length, y + dy / length
+    length = math.hypot(x, y)
+    c, s = (x / length, y / length) if length > 0.0 else (1.0, 0.0)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return Pose(rotation, (left.position + right.position) / 2)
 
 
 def encode(
@@ -112,24 +130,22 @@ def encode(
     makes = LAYOUT[category][1]
     if any(item.limb != limb or (item.contact is not None) != makes for item in transitions):
         raise ValueError("transitions of one call must share their limb and category")
-    frame = Canonical(stance.mean_feet, not limb.is_left)
+    frame = Canonical(parent_frame(stance), not limb.is_left)
     order = [limb_in.mirrored if frame.mirrored else limb_in for limb_in in LAYOUT[category][0]]
-    old = [stance[item] for item in order]
-    parent = frame.contact(
-        np.array([contact.pose.position for contact in old]), np.array([contact.pose.rotation for contact in old])
-    )
-    n = len(transitions)
-    features = np.empty((n, feature_size(category)))
-    features[:, : parent.size] = parent.ravel()
-    column = parent.size
-    friction = np.full(n, min(contact.friction for contact in old))
+    contacts = [stance[item] for item in order]
+    before, n = len(contacts), len(transitions)
+    friction: float | np.ndarray = min(contact.friction for contact in contacts)
     if makes:
-        new: list[Contact] = [item.contact for item in transitions if item.contact is not None]
-        features[:, column : column + CONTACT] = frame.contact(
-            np.array([contact.pose.position for contact in new]), np.array([contact.pose.rotation for contact in new])
-        )
-        column += CONTACT
+        new = [item.contact for item in transitions if item.contact is not None]
+        contacts += new
         friction = np.minimum(friction, [contact.friction for contact in new])
+    rows = frame.contacts(contacts)
+    features = np.empty((n, feature_size(category)))
+    column = CONTACT * before
+    features[:, :column] = rows[:before].ravel()
+    if makes:
+        features[:, column : column + CONTACT] = rows[before:]
+        column += CONTACT
     features[:, column : column + 3] = frame.point(np.asarray(com, float))
     features[:, column + 3 : column + 6] = frame.vector(np.asarray(com_velocity, float))
     features[:, column + 6] = [item.timing.shift for item in transitions]
