@@ -23,6 +23,9 @@ OPTIONS = {
     "ipopt.bound_relax_factor": 0.0,
     "ipopt.max_iter": 400,
 }
+SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+SECOND_TRY = {"ipopt.mu_strategy": "adaptive"}
+"""Where Ipopt neither solves nor refutes a problem (unloaded contacts sit at the apex of their cone)."""
 
 
 class _Program:
@@ -53,7 +56,13 @@ class _Program:
         solver = ca.nlpsol("centroidal", "ipopt", {"x": x, "f": self.cost, "g": g}, options)
         bounds = {"lbg": np.concatenate(self.lower), "ubg": np.concatenate(self.upper)}
         result = solver(x0=np.concatenate(self.guess), **bounds)
-        return x, result["x"], solver.stats()
+        statistics = solver.stats()
+        if (
+            statistics["return_status"] not in (*SOLVED, "Infeasible_Problem_Detected")
+            and SECOND_TRY.items() - options.items()
+        ):
+            return self.solve({**options, **SECOND_TRY})
+        return x, result["x"], statistics
 
 
 def solve(problem: CentroidalProblem, *, options: dict | None = None) -> CentroidalMotion:
