@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
+from tests.prediction.networks import metadata, random_tensors
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError, NetworkError
 from toolkit.learning.dataset import (
@@ -16,31 +17,19 @@ from toolkit.learning.dataset import (
 )
 from toolkit.learning.evaluate import balanced, score
 from toolkit.prediction.features import feature_size
-from toolkit.prediction.network import HIDDEN, SCHEMA, load_network, network_path
+from toolkit.prediction.network import load_network, network_path
 from toolkit.prediction.networks import NetworkEvaluator
 
 CATEGORY = Category.BREAK_ONLY_PALM
 
 
-def tensors(rng, size):
-    result = {"features.lower": -np.ones(size, np.float32), "features.upper": np.ones(size, np.float32)}
-    for name, outputs in (("classifier", 1), ("regressor", 7)):
-        widths = [size, HIDDEN, HIDDEN, HIDDEN, outputs]
-        for layer in range(4):
-            scale = 1 / np.sqrt(widths[layer])
-            weight = scale * rng.normal(size=(widths[layer], widths[layer + 1]))
-            result[f"{name}.{layer}.weight"] = weight.astype(np.float32)
-            result[f"{name}.{layer}.bias"] = rng.normal(size=widths[layer + 1]).astype(np.float32)
-    return result
-
-
-METADATA = {"schema": SCHEMA, "category": str(int(CATEGORY)), "robot": "abc"}
+METADATA = metadata(CATEGORY, "abc")
 
 
 @pytest.fixture
 def saved(tmp_path):
     path = network_path(tmp_path, CATEGORY)
-    values = tensors(np.random.default_rng(0), feature_size(CATEGORY))
+    values = random_tensors(np.random.default_rng(0), CATEGORY)
     save_file(values, path, METADATA)
     return path, values
 
@@ -69,7 +58,7 @@ def test_a_network_computes_what_its_layers_say(saved):
     ],
 )
 def test_a_network_that_does_not_fit_is_refused(tmp_path, change, message):
-    values, metadata = tensors(np.random.default_rng(0), feature_size(CATEGORY)), dict(METADATA)
+    values, metadata = random_tensors(np.random.default_rng(0), CATEGORY), dict(METADATA)
     change(values, metadata)
     path = network_path(tmp_path, CATEGORY)
     save_file(values, path, metadata)
