@@ -70,6 +70,45 @@ def add_planning_options(target: argparse.ArgumentParser) -> None:
     )
 
 
+def add_disturbance_options(target: argparse.ArgumentParser) -> None:
+    """Add what may differ between the simulation and the plan; nothing does by default."""
+    group = target.add_argument_group("disturbances", "what differs between the simulation and the plan")
+    group.add_argument("--push", type=_finite, default=0.0, metavar="N", help="horizontal push at the base, for 0.2 s")
+    group.add_argument("--mass-error", type=_finite, default=0.0, metavar="X", help="of the robot, e.g. 0.05")
+    group.add_argument("--friction-error", type=_finite, default=0.0, metavar="X", help="of the world, e.g. -0.1")
+    group.add_argument(
+        "--terrain-error",
+        type=_terrain_error,
+        default=(0.0, 0.0),
+        metavar="M,DEG",
+        help="surfaces lie elsewhere by up to so many metres and degrees, e.g. 0.01,2",
+    )
+    group.add_argument(
+        "--state-noise", type=_finite, default=0.0, metavar="X", help="m and rad; ten times as many m/s and rad/s"
+    )
+    group.add_argument("--delay", type=_finite, default=0.0, metavar="S", help="of what the controller is told")
+
+
+def _terrain_error(text: str) -> tuple[float, float]:
+    """An argparse type: metres, or metres and degrees."""
+    parts = text.split(",")
+    if len(parts) > 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not M,DEG")
+    offset, tilt = (_finite(part) for part in (*parts, "0")[:2])
+    return offset, tilt
+
+
+def _finite(text: str) -> float:
+    """An argparse type: a finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not abs(value) < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not finite")
+    return value
+
+
 def timing(text: str) -> tuple[Timing, ...]:
     """An argparse type: `shift,swing` in seconds, or `auto` (an empty choice is the world's own)."""
     if text == "auto":

@@ -32,6 +32,7 @@ def arguments() -> argparse.ArgumentParser:
     parser.add_argument("world", type=Path, help="MJCF scene with sites named start and goal")
     cli.add_robot_options(parser)
     cli.add_planning_options(parser)
+    cli.add_disturbance_options(parser)
     parser.add_argument("--out", type=Path, help="output folder (default: runs/<world>-<robot>-<time>)")
     parser.add_argument("--candidates", type=cli.positive(int), default=6, help="sequences to test (default: 6)")
     parser.add_argument("--pictures", action="store_true", help="also render a strip of pictures and plots")
@@ -51,10 +52,13 @@ def main(argv: list[str] | None = None) -> int:
     from toolkit.report.run import write_run
     from toolkit.robot.loader import load_robot
     from toolkit.search.options import planner_config
+    from toolkit.simulation.config import ExecutionConfig
+    from toolkit.simulation.options import disturbance
     from toolkit.world.loader import load_world
 
     began = time.perf_counter()
     display = StageConsole()
+    disturbed = disturbance(args)
     world = load_world(args.world)
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
@@ -62,7 +66,13 @@ def main(argv: list[str] | None = None) -> int:
     if args.pictures or args.video:
         require_rendering()
     display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
-    config = replace(pipeline.PipelineConfig(), seed=args.seed, time_limit=args.time_limit, candidates=args.candidates)
+    config = replace(
+        pipeline.PipelineConfig(),
+        seed=args.seed,
+        time_limit=args.time_limit,
+        candidates=args.candidates,
+        execution=ExecutionConfig(disturbance=disturbed),
+    )
     planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
     result = pipeline.run(robot, world, planner, config, display)
     with folder:

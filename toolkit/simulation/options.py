@@ -1,0 +1,27 @@
+"""Disturbance from the options of a command line."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+import numpy as np
+
+from toolkit.simulation.disturbance import Disturbance
+
+
+def disturbance(args: Namespace) -> Disturbance:
+    """What differs between simulation and plan (see `toolkit.cli.add_disturbance_options`).
+
+    Raises:
+        InputError: a value is out of range.
+    """
+    offset, tilt = args.terrain_error
+    return Disturbance(
+        push=args.push,
+        mass_error=args.mass_error,
+        friction_error=args.friction_error,
+        terrain_offset=offset,
+        terrain_tilt=float(np.radians(tilt)),
+        state_noise=args.state_noise,
+        delay=args.delay,
+    )
