@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import ToolkitError
-from toolkit.pipeline import PipelineConfig, SilentObserver, test_solution
+from toolkit.pipeline import PipelineConfig, run
+from toolkit.pipeline import make_planner as make_pipeline_planner
 from toolkit.search.ana_star import Progress
-from toolkit.search.planner import ContactPlanner
+from toolkit.search.exclusion import Exclusion
+from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult
-from toolkit.world.world import World
 from validation.cases import Case
 from validation.machine import memory
 from validation.motion_figures import motion_figures
 from validation.options import TrialSettings
-from validation.run_trial import make_planner, robot_of
+from validation.run_trial import StageLog, make_planner, robot_of
 
 
 @dataclass
@@ -63,34 +67,73 @@ class SearchClock:
         return min((time.process_time() - self.processor) / max(elapsed, 1e-9), 1.0)
 
 
-def timed_search(planner: ContactPlanner, seed: int, time_limit: float) -> tuple[SearchResult, dict[str, Any]]:
-    """Search, with the figures that a table of times needs.
+@dataclass(frozen=True)
+class WarmUp:
+    """What a process has to be ready for: robot (name and folder) and kind of planner."""
 
-    Raises:
-        PlanningError: as `ContactPlanner.search`.
+    robot: str
+    robots: Path
+    planner: str
+
+
+class TimedPlanner:
+    """A planner that times its first search; to the pipeline it is a planner like any other.
+
+    Args:
+        planner: the planner.
+
+    Attributes:
+        search_result: of the first search; None before it.
+        figures: of the first search.
     """
-    before = memory()
-    clock = SearchClock.start()
-    search = planner.search(np.random.default_rng(seed), time_limit, clock)
-    share = clock.share()
-    after = memory()
-    first = search.solutions[0].seconds if search.solutions else None
-    first_share = clock.processor_share or share
-    return search, {
-        "first_seconds": first,
-        "first_processor_seconds": None if first is None else first * first_share,
-        "first_expansions": clock.first_expansions,
-        "heuristic_seconds": search.heuristic_seconds,
-        "heuristic_processor_seconds": search.heuristic_seconds * first_share,
-        "search_seconds": search.seconds,
-        "expansions": search.expansions,
-        "expansions_per_second": search.expansions / max(search.seconds, 1e-9),
-        "processor_share": share,
-        "memory_before": before,
-        "first_memory": clock.first_memory,
-        "first_memory_gain": None if clock.first_memory is None else clock.first_memory - before,
-        "peak_memory": max(clock.peak_memory, after),
-    }
+
+    def __init__(self, planner: ContactPlanner):
+        self._planner = planner
+        self.search_result: SearchResult | None = None
+        self.figures: dict[str, Any] = {}
+
+    def search(
+        self,
+        rng: np.random.Generator,
+        time_limit: float,
+        observer: Callable[[Progress], None] | None = None,
+        exclusions: Sequence[Exclusion] = (),
+    ) -> SearchResult:
+        """See `ContactPlanner.search`."""
+        if self.search_result is not None:
+            return self._planner.search(rng, time_limit, observer, exclusions)
+        before = memory()
+        clock = SearchClock.start()
+        search = self._planner.search(rng, time_limit, clock, exclusions)
+        share, after = clock.share(), memory()
+        first = search.solutions[0].seconds if search.solutions else None
+        first_share = clock.processor_share or share
+        self.search_result = search
+        self.figures = {
+            "first_seconds": first,
+            "first_processor_seconds": None if first is None else first * first_share,
+            "first_expansions": clock.first_expansions,
+            "heuristic_seconds": search.heuristic_seconds,
+            "heuristic_processor_seconds": search.heuristic_seconds * first_share,
+            "search_seconds": search.seconds,
+            "expansions": search.expansions,
+            "expansions_per_second": search.expansions / max(search.seconds, 1e-9),
+            "processor_share": share,
+            "memory_before": before,
+            "first_memory": clock.first_memory,
+            "first_memory_gain": None if clock.first_memory is None else clock.first_memory - before,
+            "peak_memory": max(clock.peak_memory, after),
+        }
+        return search
+
+
+@lru_cache(maxsize=4)
+def warm_up(settings: WarmUp) -> None:
+    """Compile and load in this process what a search needs, so that no trial's time contains it."""
+    world = Case("rubble_field", 0).world()
+    robot = robot_of(settings.robot, settings.robots)
+    planner = make_pipeline_planner(robot, world, settings.planner, PlannerConfig())
+    planner.search(np.random.default_rng(0), 0.2)
 
 
 def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: bool) -> dict[str, Any]:
@@ -102,7 +145,7 @@ def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: b
         planner_kind: see `toolkit.pipeline.make_planner`.
         repeat: search a second time and compare the plans.
     """
-    world = case.world()
+    world, log = case.world(), StageLog()
     record: dict[str, Any] = {
         "kind": case.kind,
         "seed": case.seed,
@@ -110,49 +153,43 @@ def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: b
         "found": False,
         "feasible": False,
         "passed": False,
+        "stage": "planning",
     }
+    limit = settings.planning.time_limit
+    config = replace(PipelineConfig(), seed=case.seed, time_limit=limit, until="dynamics")
+    warm_up(WarmUp(settings.robot, settings.robots, planner_kind))
     try:
-        planner = make_planner(settings, world, planner_kind)
-        search, figures = timed_search(planner, case.seed, settings.planning.time_limit)
+        planner = TimedPlanner(make_planner(settings, world, planner_kind))
+        result = run(robot_of(settings.robot, settings.robots), world, cast(ContactPlanner, planner), config, log)
     except ToolkitError as error:
-        return record | {"stage": "planning", "reason": " ".join(str(error).split())}
-    record |= figures | {"found": bool(search.solutions), "sequences": len(search.solutions)}
+        return record | {"reason": " ".join(str(error).split())}
+    first, trial = planner.search_result, result.trial
+    assert first is not None
+    record |= planner.figures | {
+        "found": bool(first.solutions),
+        "sequences": len(first.solutions),
+        "tested": result.tested,
+        "stages": log.entries,
+        "feasible": result.passed,
+        "passed": result.passed,
+        "reason": result.reason,
+    }
     if repeat:
         again = make_planner(settings, world, planner_kind)
-        second = again.search(np.random.default_rng(case.seed), settings.planning.time_limit)
-        record["repeatable"] = signature(search) == signature(second)
-    if not search.solutions:
-        return record | {"stage": "planning", "reason": search.reason}
-    return record | tested(settings, case, world, search)
-
-
-def tested(settings: TrialSettings, case: Case, world: World, search: SearchResult) -> dict[str, Any]:
-    """Optimise the sequences of a search, newest first, until one is feasible."""
-    config = replace(PipelineConfig(), seed=case.seed, until="dynamics")
-    robot, observer, reasons = robot_of(settings.robot, settings.robots), SilentObserver(), []
-    for count, solution in enumerate(reversed(search.solutions), 1):
-        trial = test_solution(robot, world, solution, config, observer)
-        if trial.passed and trial.motion is not None:
-            transitions = solution.sequence.transitions
-            return {
-                "feasible": True,
-                "passed": True,
-                "stage": "done",
-                "reason": "",
-                "tested": count,
-                "rejected": reasons,
-                "objective": trial.motion.objective,
-                "optimiser_seconds": trial.motion.seconds,
-                "transitions": len(transitions),
-                "palm_contacts": sum(not t.limb.is_foot and t.contact is not None for t in transitions),
-                "figures": asdict(motion_figures(trial.motion)),
-            }
-        reasons.append(trial.reason)
-    return {
-        "tested": len(reasons),
-        "rejected": reasons,
-        "stage": "dynamics",
-        "reason": f"none of {len(reasons)} sequences is dynamically feasible; the cheapest: {reasons[0]}",
+        second = again.search(np.random.default_rng([case.seed, 0]), limit)
+        record["repeatable"] = signature(first) == signature(second)
+    if trial is None or trial.motion is None:
+        return record
+    if not result.passed:
+        return record | {"stage": "dynamics"}
+    transitions = trial.solution.sequence.transitions
+    return record | {
+        "stage": "done",
+        "objective": trial.motion.objective,
+        "optimiser_seconds": trial.motion.seconds,
+        "transitions": len(transitions),
+        "palm_contacts": sum(not t.limb.is_foot and t.contact is not None for t in transitions),
+        "figures": asdict(motion_figures(trial.motion)),
     }
 
 
@@ -162,13 +199,15 @@ def growth_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
     record = {"kind": case.kind, "seed": case.seed, "found": False, "passed": False, "stage": "planning"}
     record["length"] = float(np.hypot(*(world.goal.position - world.start.position)[:2]))
     limit = settings.planning.time_limit
+    warm_up(WarmUp(settings.robot, settings.robots, settings.planner))
     try:
-        search, figures = timed_search(make_planner(settings, world), case.seed, limit)
+        planner = TimedPlanner(make_planner(settings, world))
+        search = planner.search(np.random.default_rng(case.seed), limit)
     except ToolkitError as error:
         return record | {"reason": " ".join(str(error).split())}
     found = bool(search.solutions)
     late = search.seconds / limit - 1.0
-    return record | figures | {"found": found, "passed": found, "overtime": late, "reason": search.reason}
+    return record | planner.figures | {"found": found, "passed": found, "overtime": late, "reason": search.reason}
 
 
 def signature(search: SearchResult) -> list[tuple]:
