@@ -1,4 +1,4 @@
-"""Random contact transitions of every category, for tests and benchmarks of the solvers.
+"""Random contact transitions of every category, and walks, for tests and benchmarks of the solvers.
 
 Contacts are tilted within 20 degrees, palms rest on walls beside the robot, CoM and velocity vary around plausible
 values, widely enough that both labels of feasibility occur. Training data come from the planner instead.
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.contacts.category import Category, category_of
-from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, rotation_about_z, rotation_on_surface
@@ -170,3 +170,38 @@ def _palm(robot, limb, world_from_feet, friction, rng, config) -> Contact:
     up_in_wall /= np.linalg.norm(up_in_wall)
     rotation = np.column_stack([up_in_wall, np.cross(normal, up_in_wall), normal])
     return Contact(limb, Pose(world_from_feet.rotation @ rotation, world_from_feet @ place), friction)
+
+
+def sample_walk(
+    robot: RobotModel,
+    contacts: int,
+    rng: np.random.Generator,
+    *,
+    timing: Timing | None = None,
+    tilt: float = math.radians(10),
+    friction: float = 0.5,
+) -> ContactSequence:
+    """A random walk ahead over tilted stones, one foot after the other.
+
+    Args:
+        robot: strides are in proportion to its legs.
+        contacts: number of transitions.
+        rng: randomness.
+        timing: of every transition; the default timing where None.
+        tilt: rad; largest tilt of a stone.
+        friction: of the stones.
+    """
+    config = SamplingConfig(tilt=tilt)
+    length = robot.legs[Limb.LEFT_FOOT].max_length
+
+    def stone(foot: Limb, x: float) -> Contact:
+        place = np.array([x, 1.15 * robot.legs[foot].hip_in_com[1] + 0.01 * rng.normal(), rng.uniform(-0.03, 0.03)])
+        return _foot(foot, Pose.identity(), place, rng.uniform(-0.15, 0.15), friction, rng, config)
+
+    start = Stance(tuple(stone(foot, 0.0) for foot in FEET))
+    transitions, x = [], 0.0
+    for index in range(contacts):
+        x += rng.uniform(0.15, 0.35) * length * (0.5 if index == 0 else 1.0)
+        foot = FEET[index % 2]
+        transitions.append(ContactTransition(foot, stone(foot, x), timing or Timing()))
+    return ContactSequence(start, tuple(transitions))

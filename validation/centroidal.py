@@ -1,0 +1,280 @@
+"""The fast centroidal solver against the Ipopt reference, and whole sequences, on one thread.
+
+`python -m validation.centroidal` times random transitions of all ten categories with both solvers (building the
+problem and checking the motion counted in), compares their answers, and solves walks of up to 60 contacts. Times are
+processor times of the process, which on an idle machine are wall-clock times.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+from rich.progress import Progress
+
+from toolkit import cli
+from toolkit.centroidal import fast, reference
+from toolkit.centroidal.build import initial_com, sequence_problem, transition_problem
+from toolkit.centroidal.residual import check
+from toolkit.centroidal.sampling import SamplingConfig, sample_transition, sample_walk
+from toolkit.contacts.category import Category
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.report.console import make_console
+from toolkit.robot.loader import load_robot
+from toolkit.robot.model import RobotModel
+from toolkit.train import progress_bar
+from validation import goals
+from validation.goals import Goal
+from validation.growth import exponent
+from validation.machine import ROOT
+from validation.tables import largest, markdown_table, number, write_results
+
+SETTINGS = {
+    "1 s + 1 s, friction 0.5": SamplingConfig(),
+    "any timing and friction": SamplingConfig(friction=(0.3, 0.9), shift=(0.05, 1.0), swing=(0.3, 1.0)),
+}
+LENGTHS = (6, 9, 12, 18, 24, 31, 40, 50, 60)
+DECIDED = (*reference.SOLVED, "Infeasible_Problem_Detected")
+OBJECTIVE_TOLERANCE = 0.01
+
+
+def compare(robot: RobotModel, category: Category, index: int, seed: int, config: SamplingConfig) -> dict[str, Any]:
+    """One random transition with both solvers."""
+    sample = sample_transition(robot, category, np.random.default_rng([seed, category, index]), config)
+    record: dict[str, Any] = {"category": int(category), "index": index}
+    for name, solver in (("fast", fast), ("reference", reference)):
+        start = process_time()
+        problem = transition_problem(robot, sample.stance, sample.com, sample.com_velocity, sample.transition)
+        motion = solver.solve(problem)
+        seconds = process_time() - start
+        record[name] = {
+            "seconds": seconds,
+            "feasible": motion.feasible,
+            "status": motion.status,
+            "objective": motion.objective if math.isfinite(motion.objective) else None,
+            "iterations": motion.iterations,
+        }
+        if motion.feasible:
+            record[name]["residual"] = check(motion).largest
+    return record
+
+
+def summarise(category: Category, records: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Figures of one category."""
+    quick = np.array([record["fast"]["seconds"] for record in records])
+    slow = np.array([record["reference"]["seconds"] for record in records])
+    both = [r for r in records if r["fast"]["feasible"] and r["reference"]["feasible"]]
+    close = [
+        abs(r["fast"]["objective"] / r["reference"]["objective"] - 1) <= OBJECTIVE_TOLERANCE
+        for r in both
+        if r["reference"]["objective"]
+    ]
+    return {
+        "category": category.name.lower(),
+        "trials": len(records),
+        "feasible": float(np.mean([record["fast"]["feasible"] for record in records])),
+        "fast_median": float(np.median(quick)),
+        "fast_95": float(np.percentile(quick, 95)),
+        "reference_median": float(np.median(slow)),
+        "reference_95": float(np.percentile(slow, 95)),
+        "ratio": float(np.median(slow) / np.median(quick)),
+        "feasibility_agrees": float(np.mean([r["fast"]["feasible"] == r["reference"]["feasible"] for r in records])),
+        "reference_undecided": sum(not r["reference"]["status"].startswith(DECIDED) for r in records),
+        "fast_undecided": sum(not r["fast"]["status"].startswith(("solved", "infeasible")) for r in records),
+        "objective_agrees": float(np.mean(close)) if close else None,
+        "largest_residual": largest([r["fast"]["residual"] for r in records if r["fast"]["feasible"]]),
+    }
+
+
+def walk(robot: RobotModel, contacts: int, seed: int, repeats: int) -> dict[str, Any]:
+    """One random walk, everything from the contacts to the checked motion; the best of some repeats."""
+    sequence = sample_walk(robot, contacts, np.random.default_rng([seed, contacts]))
+    times = []
+    for _ in range(repeats):
+        start = process_time()
+        schedule = ContactSchedule.of(sequence, initial_rest=0.5, final_rest=1.0)
+        problem = sequence_problem(robot, schedule, initial_com(robot, sequence.start), np.zeros(3))
+        motion = fast.solve(problem)
+        times.append(process_time() - start)
+    return {
+        "contacts": contacts,
+        "steps": problem.steps,
+        "seconds": min(times),
+        "feasible": motion.feasible,
+        "iterations": motion.iterations,
+        "objective": motion.objective,
+    }
+
+
+def transition_table(rows: Sequence[dict[str, Any]]) -> str:
+    """Transitions in Markdown."""
+    header = (
+        "category",
+        "trials",
+        "feasible",
+        "fast [ms]",
+        "95 %",
+        "reference [ms]",
+        "95 %",
+        "ratio",
+        "feasibility agrees",
+        "objective within 1 %",
+        "undecided: fast",
+        "reference",
+    )
+    cells = [
+        (
+            row["category"],
+            str(row["trials"]),
+            f"{row['feasible']:.0%}",
+            *(f"{1e3 * row[name]:.3g}" for name in ("fast_median", "fast_95", "reference_median", "reference_95")),
+            f"{row['ratio']:.0f}",
+            f"{row['feasibility_agrees']:.2%}",
+            "-" if row["objective_agrees"] is None else f"{row['objective_agrees']:.2%}",
+            str(row["fast_undecided"]),
+            str(row["reference_undecided"]),
+        )
+        for row in rows
+    ]
+    return markdown_table(header, cells)
+
+
+def walk_table(rows: Sequence[dict[str, Any]], fit: float | None) -> str:
+    """Walks in Markdown, the median over their seeds."""
+    header = ("contacts", "walks", "feasible", "steps", "iterations", "all in [ms]")
+    cells = []
+    for contacts in sorted({row["contacts"] for row in rows}):
+        same = [row for row in rows if row["contacts"] == contacts]
+        cells.append(
+            (
+                str(contacts),
+                str(len(same)),
+                str(sum(row["feasible"] for row in same)),
+                str(same[0]["steps"]),
+                f"{np.median([row['iterations'] for row in same]):.0f}",
+                f"{1e3 * np.median([row['seconds'] for row in same]):.3g}",
+            )
+        )
+    return f"{markdown_table(header, cells)}\n\nFitted exponent of time over contacts: {number(fit, '.2f')}."
+
+
+def goals_of(tables: dict[str, list[dict[str, Any]]], walks: Sequence[dict[str, Any]], fit: float | None) -> list[Goal]:
+    """What is asked of the solver."""
+    found = []
+    for name, rows in tables.items():
+        feet = [row for row in rows if row["category"] == Category.MOVE_FOOT.name.lower()]
+        agree = [row["objective_agrees"] for row in rows if row["objective_agrees"] is not None]
+        residual = largest([row["largest_residual"] for row in rows if row["largest_residual"] is not None])
+        found += [
+            goals.at_most(f"{name}: a foot's move, median", 1e3 * feet[0]["fast_median"] if feet else None, 3.0, "ms"),
+            goals.at_least(f"{name}: reference / fast, worst category", min(row["ratio"] for row in rows), 12.0),
+            goals.at_least(
+                f"{name}: feasibility agrees, worst category", min(row["feasibility_agrees"] for row in rows), 0.99
+            ),
+            goals.at_least(f"{name}: objective within 1 %, worst category", min(agree, default=None), 0.95),
+            goals.at_most(f"{name}: residual of anything called feasible", residual, 1e-6),
+        ]
+    long = [row["seconds"] for row in walks if row["contacts"] == 31]
+    return [
+        *found,
+        goals.at_most("31 contacts, all in", float(np.median(long)) if long else None, 0.5, "s"),
+        goals.at_most("exponent of time over contacts", fit, 1.1),
+    ]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the experiment; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m validation.centroidal",
+        description="The fast centroidal solver against the Ipopt reference, and whole sequences, on one thread.",
+        epilog=cli.EXIT_CODES,
+    )
+    parser.add_argument(
+        "--trials", type=cli.positive(int), default=50, help="per category and setting (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--walks", type=cli.positive(int), default=5, help="random walks of each length (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of every random draw (default: %(default)s)")
+    parser.add_argument(
+        "--results",
+        type=Path,
+        default=ROOT / "validation" / "results",
+        metavar="DIR",
+        help="where centroidal.json and centroidal.md go (default: validation/results)",
+    )
+    cli.add_robot_options(parser)
+    args = parser.parse_args(argv)
+    robot = load_robot(args.robot, args.robots)
+    console = make_console()
+
+    start = perf_counter()
+    walk(robot, 1, args.seed, 1)
+    first = perf_counter() - start
+    with progress_bar(console) as progress:
+        tables, records = _transitions(robot, args, progress)
+        walks = _walks(robot, args, progress)
+    fit = exponent([row["contacts"] for row in walks], [row["seconds"] for row in walks])
+    found = goals_of(tables, walks, fit)
+    sections = [(f"Transitions: {name}", transition_table(rows)) for name, rows in tables.items()]
+    note = (
+        f"Times are processor times, everything from the contacts to the checked motion. Walks over stones tilted by up to 10 degrees, 1 s + 1 s per contact; best of 3 runs each. "
+        f"The first solution in this process took {first:.1f} s (loading or compiling the solver).\n\n"
+    )
+    path = write_results(
+        args.results,
+        "centroidal",
+        title="Centroidal optimiser: fast against reference",
+        sections=[*sections, ("Whole sequences", note + walk_table(walks, fit))],
+        content={
+            "tables": tables,
+            "disagreements": [r for r in records if r["fast"]["feasible"] != r["reference"]["feasible"]],
+            "walks": walks,
+            "exponent": fit,
+            "first_solution_seconds": first,
+        },
+        goals=found,
+        settings={"robot": robot.name, "trials": args.trials, "walks": args.walks, "seed": args.seed},
+    )
+    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
+    return 1 if any(goal.result == goals.NOT_MET for goal in found) else 0
+
+
+def _transitions(
+    robot: RobotModel, args: argparse.Namespace, progress: Progress
+) -> tuple[dict[str, list[dict[str, Any]]], list[dict[str, Any]]]:
+    """Table rows by setting, and all trials."""
+    tables: dict[str, list[dict[str, Any]]] = {}
+    everything = []
+    task = progress.add_task("transitions", total=len(SETTINGS) * len(Category) * args.trials)
+    for setting, (name, config) in enumerate(SETTINGS.items()):
+        tables[name] = []
+        for category in Category:
+            records = []
+            for index in range(args.trials):
+                records.append(compare(robot, category, index, args.seed + 1000 * setting, config))
+                progress.advance(task)
+            tables[name].append(summarise(category, records))
+            everything += [{"setting": name, **record} for record in records]
+    return tables, everything
+
+
+def _walks(robot: RobotModel, args: argparse.Namespace, progress: Progress) -> list[dict[str, Any]]:
+    """Walks of all lengths."""
+    task = progress.add_task("walks", total=len(LENGTHS) * args.walks)
+    rows = []
+    for index in range(args.walks):
+        for contacts in LENGTHS:
+            rows.append(walk(robot, contacts, args.seed + index, 3))
+            progress.advance(task)
+    return rows
+
+
+if __name__ == "__main__":
+    cli.run(main, sys.argv[1:])
