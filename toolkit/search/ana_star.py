@@ -126,7 +126,9 @@ class AnaStarConfig:
         epsilon: probability of expanding a random open state.
         initial_cost: stands for G before there is a solution, for the order of expansion only: inf expands the least
             h (depth first, fastest), a smaller value weighs the cost so far as well. Nothing is pruned by it.
-        crowding: added to h for the order of expansion, per state already expanded in the same crowd.
+        crowding: added to h for the order of expansion, per state already expanded in the same crowd. While there is no
+            solution it grows, by as much again with every `patience` expansions.
+        patience: see `crowding`.
         max_expansions: ends the search; None for no limit.
         max_states: ends the search, to bound memory.
         report_interval: s between calls of the observer, solutions apart.
@@ -135,6 +137,7 @@ class AnaStarConfig:
     epsilon: float = 0.1
     initial_cost: float = math.inf
     crowding: float = 0.0
+    patience: int = 200
     max_expansions: int | None = None
     max_states: int = 1_000_000
     report_interval: float = 0.1
@@ -195,6 +198,7 @@ class AnaStar:
         self._place: list[int] = []  # of each node in _open, -1 where it is not open
         self._heap: list[tuple[float, int, int, float]] = []
         self._pushes = 0
+        self._crowding = self._config.crowding
         self._forbidden: set[tuple[State, State]] = set()
 
     def run(self, time_limit: float = math.inf, observer: Callable[[Progress], None] | None = None) -> AnaStarResult:
@@ -235,6 +239,8 @@ class AnaStar:
             expanded.append(self._state[node])
             crowd = self._crowd[node]
             self._expanded_in[crowd] = self._expanded_in.get(crowd, 0) + 1
+            if not paths:
+                self._crowding = config.crowding * (1.0 + len(expanded) / config.patience)
             for edge in sorted(goals, key=lambda goal: goal.cost):
                 path = self._reach(node, edge, time.perf_counter() - began, len(expanded))
                 if path is not None:
@@ -308,7 +314,7 @@ class AnaStar:
         """Falls as e(s) rises."""
         g, h = self._g[node], self._h[node]
         if self._config.crowding > 0:
-            h += self._config.crowding * self._expanded_in.get(self._crowd[node], 0)
+            h += self._crowding * self._expanded_in.get(self._crowd[node], 0)
         target = self._best if self._best < math.inf else self._config.initial_cost
         if target == math.inf:
             return h
@@ -356,6 +362,7 @@ class AnaStar:
         if not cost < self._best:
             return None
         self._best = cost
+        self._crowding = self._config.crowding
         bound = cost / max(self._lower_bound(), _TINY) if cost > 0 else 1.0
         self._prune()
         return Path(tuple(states[::-1]), tuple(payloads[-2::-1]), cost, bound, seconds, expansions)
