@@ -147,9 +147,12 @@ class Trial:
         return None if self.failure_time is None else self.schedule.phase_at(self.failure_time).transition
 
     @property
-    def stages_passed(self) -> int:
-        """How far it came, to keep the most telling failure."""
-        return sum(stage is not None for stage in (self.motion, self.trajectory, self.execution)) + self.passed
+    def merit(self) -> tuple[int, bool, int]:
+        """How far it came, to keep the most telling failure: stages, then arrival, then checks passed."""
+        stages = sum(stage is not None for stage in (self.motion, self.trajectory, self.execution)) + self.passed
+        if self.execution is None:
+            return stages, False, 0
+        return stages, self.execution.goal_reached, sum(c.result == Result.PASS for c in self.execution.checks)
 
 
 @dataclass(frozen=True)
@@ -270,17 +273,18 @@ def run(
     exclusions: list[Exclusion] = []
     tested = attempt = 0
     while search.solutions:
+        before = tested
         for solution in reversed(search.solutions):  # newest, cheapest first
             if tested == config.candidates or _meets(solution, exclusions):
                 continue
             tested += 1
             trial = test_solution(robot, world, solution, config, observer)
-            if best is None or trial.passed or trial.stages_passed > best.stages_passed:
+            if best is None or trial.merit > best.merit:
                 best, chosen = trial, search
             if trial.passed:
                 return PipelineResult(robot, world, chosen, best, tested, "")
             exclusions += _blamed(trial)
-        if tested == config.candidates or not exclusions:
+        if tested in (before, config.candidates) or not exclusions:
             break
         attempt += 1
         search = _search(planner, config, observer, attempt, exclusions)
