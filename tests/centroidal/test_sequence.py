@@ -184,7 +184,7 @@ def test_hessian_is_symmetric_and_convex(program):
 
 def test_program_objective_is_the_paper_s_without_regularisers(walker):
     start, schedule = walk(walker, 1, 0.3, (0.4, 0.6))
-    none = Regularisers(*[0.0] * 7, slack=3000.0)
+    none = Regularisers(*[0.0] * 9, slack=3000.0)
     config = SequenceConfig(problem=ProblemConfig(margins=Margins()), regularisers=none)
     motion = optimise(walker, schedule, initial_com(walker, start), np.zeros(3), config=config)
     regular = optimise(walker, schedule, initial_com(walker, start), np.zeros(3))

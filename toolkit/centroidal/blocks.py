@@ -4,8 +4,9 @@ A `Piece` is one small CasADi function with its derivatives; a `Block` applies i
 index arrays. `Assembly` gathers, maps and scatters, so that building a program of any size takes a handful of graph
 nodes, and hands the solvers ready-made derivatives instead of letting them differentiate the whole program.
 
-The Hessian is Gauss-Newton in the objective: sum_i rho_i(v)^2 + linear(v) has the Hessian 2 Jrho^T Jrho. Rows add their
-curvature only where a piece says that it is wanted (convex ones), so the Hessian stays positive semidefinite.
+The Hessian is Gauss-Newton in the objective: sum_i rho_i(v)^2 + linear(v) has the Hessian 2 Jrho^T Jrho. Rows add
+curvature only where a piece knows a convex part of it, so the Hessian is positive semidefinite whatever the point and
+the multipliers: the solvers need no regularisation (Fatrop's search for one has no end on bad points).
 """
 
 from __future__ import annotations
@@ -26,11 +27,14 @@ class Piece:
         rho: (nr,) terms whose squares add to the objective, or None.
         linear: scalar added to the objective, linear in v, or None.
         rows: (ng,) constraint rows, or None.
-        curved: (ng,) rows with those replaced by 0 whose curvature is left out of the Hessian; None for no curvature.
+        curvature: maps the rows' multipliers (not positive where a row's lower bound is active) to a positive
+            semidefinite (nv, nv) part of the Hessian; None to leave the rows' curvature out.
         jacobian: (ng, nv) of the rows where the caller knows a shorter expression.
     """
 
-    def __init__(self, name: str, v: ca.SX, p: ca.SX, *, rho=None, linear=None, rows=None, curved=None, jacobian=None):
+    def __init__(
+        self, name: str, v: ca.SX, p: ca.SX, *, rho=None, linear=None, rows=None, curvature=None, jacobian=None
+    ):
         self.name = name
         rho = ca.SX(0, 1) if rho is None else rho
         rows = ca.SX(0, 1) if rows is None else rows
@@ -40,8 +44,8 @@ class Piece:
         jacobian = ca.jacobian(rows, v) if jacobian is None else jacobian
         d_rho = ca.jacobian(rho, v)
         hessian = 2 * weight * (d_rho.T @ d_rho)
-        if curved is not None:
-            hessian = hessian + ca.hessian(ca.dot(multiplier, curved), v)[0]
+        if curvature is not None:
+            hessian = hessian + curvature(multiplier)
         hessian = ca.triu2symm(ca.triu(hessian + ca.SX(hessian.sparsity().T, 0)))
         lagrangian = ca.gradient(weight * cost + ca.dot(multiplier, rows), v)  # by reverse mode
         self.size, self.parameters, self.rows = v.numel(), p.numel(), rows.numel()

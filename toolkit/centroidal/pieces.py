@@ -2,13 +2,13 @@
 
 Scaled variables of a stage: x = [CoM r (m), velocity v (m/s), kappa = k / m (m^2/s), acceleration a of the step before
 (m/s^2)] and u = [per contact: force and moment at the patch centre, in the contact frame, in weights (and weights
-times 1 m); slacks sigma of friction, CoP and body]. The angular momentum is about the CoM, and its exact integral under
-constant wrenches is a sum over the contacts:
+times 1 m), slacks of friction and CoP (weights); per step: excess (weights) and the body's slack]. The angular momentum
+is about the CoM, and its exact integral under constant wrenches is a sum over the contacts:
 
     kappa+ = kappa + dt g sum_i [ (p_i - r - dt v / 2 - dt^2 g_vec / 6) x f_i + tau_i ]
 
-A slack sigma moves its constraints linearly from the wanted margin (0) to the physical limit (1) and beyond, which is
-infeasible: the program itself always has a solution, and says where and how far it had to cheat.
+Slacks take back the wanted margins, at a price and down to the physical limit; what goes beyond it, the excess of a
+step and a body's slack above 1, costs much more. So the program always has a solution, and says where it had to cheat.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ from toolkit.centroidal.problem import GRAVITY
 
 STATE = 12
 WRENCH = 6
-SLACKS = 3
+CONTACT = WRENCH + 2
+SLACKS = 2
+EVEN = 0.1  # part of a slack's price on its square: shared out evenly where the linear price is indifferent
 G = float(-GRAVITY[2])
 
 
@@ -38,7 +40,7 @@ class Pieces:
         torque: joint torques of a stance leg in the middle of a step.
         distance: hip or shoulder to tip, between two bounds, at a knot.
         height: CoM above the lowest foot at a knot.
-        slack: penalty of the slacks of a step.
+        slack: price of the excess and the body's slack of a step.
         initial: the given state.
         final: rest, box and centring at the end.
     """
@@ -123,38 +125,52 @@ def _stage(contacts: int) -> Piece:
 def _contact() -> Piece:
     """Friction cone, patch and yaw moment (Caron et al., ICRA 2015) of a contact, and its objective.
 
+    Variables: wrench, slacks of friction and CoP, excess. Slacks in weights: at the normal force the margin is gone.
     Parameters: mu, (2) half extents; wanted friction factor, (2) CoP margin in m, yaw factor; square roots of the
-    weights of force, lateral force, torque (in weights), CoP, CoP times load, early or late load.
+    weights of force, lateral force, torque (in weights), CoP, CoP times load, and distance from a wanted normal force;
+    that force; price of a slack.
     """
     p = _Parameters()
-    wrench, slack = ca.SX.sym("w", WRENCH), ca.SX.sym("s", 2)
-    mu, half, wanted, cop_margin, yaw_factor, weights = p(), p(2), p(), p(2), p(), p(6)
+    wrench, slack, excess = ca.SX.sym("w", WRENCH), ca.SX.sym("s", 2), ca.SX.sym("e")
+    mu, half, wanted, cop_margin, yaw_factor, weights, load, price = p(), p(2), p(), p(2), p(), p(6), p(), p()
     fx, fy, fz, tx, ty, tz = ca.vertsplit(wrench)
-    mu = mu * (wanted + (1 - wanted) * slack[0])
-    yaw = yaw_factor + (1 - yaw_factor) * slack[0]
-    hx, hy = ca.vertsplit(half - cop_margin * (1 - slack[1]))
-    lateral = (fx**2 + fy**2) / (mu * fz + 1e-7)  # smooth at rest, unlike its square root
-    cone = mu * fz - lateral
-    room = mu * (hx + hy) * fz
-    yaw_rows = []
-    for s in (-1, 1):
-        for q in (-1, 1):
-            yaw_rows.append(yaw * (room + s * (hy * fx - mu * tx) + q * (hx * fy - mu * ty)) + tz)
-            yaw_rows.append(yaw * (room + s * (hy * fx + mu * tx) + q * (hx * fy + mu * ty)) - tz)
-    rows = ca.vertcat(10 * cone, 10 * (hx * fz - ty), 10 * (hx * fz + ty), 10 * (hy * fz - tx), 10 * (hy * fz + tx))
-    rows = ca.vertcat(rows, 10 * ca.vertcat(*yaw_rows))
-    curved = ca.vertcat(-10 * lateral, ca.SX.zeros(rows.numel() - 1))
-    load = fz + 0.01  # an unloaded contact has no CoP: keeps the objective smooth there
-    cop_x, cop_y = -ty / load, tx / load
+    held = mu * (wanted * fz + (1 - wanted) * slack[0] + excess) + 1e-7
+    cone = held - (fx**2 + fy**2) / held  # smooth at rest, unlike the square root
+    x, y = ca.vertsplit((half - cop_margin) * fz + cop_margin * slack[1] + half * excess)
+    rows = [cone, x - ty, x + ty, y - tx, y + tx, fz - slack[0], fz - slack[1]]
+    # Yaw: the wanted part of the range under the margins, and the whole physical range: a moment of the wrong sign can
+    # be within a part of the range but not in the range itself.
+    most = 2 * mu * (half[0] + half[1])
+    ranges = [
+        (yaw_factor, mu * wanted, half - cop_margin, most * (slack[0] + slack[1] + excess)),
+        (1, mu, half, most * excess),
+    ]
+    for factor, friction, (hx, hy), more in ((a, b, ca.vertsplit(c), d) for a, b, c, d in ranges):
+        room = friction * (hx + hy) * fz
+        for s in (-1, 1):
+            for q in (-1, 1):
+                low = room + s * (hy * fx - friction * tx) + q * (hx * fy - friction * ty)
+                high = room + s * (hy * fx + friction * tx) + q * (hx * fy + friction * ty)
+                rows += [factor * low + more + tz, factor * high + more - tz]
+    v = ca.vertcat(wrench, slack, excess)
+    tilt = ca.jacobian(wrench[:2], v) - ca.vertcat(fx, fy) / held @ ca.jacobian(held, v)
+
+    def curvature(multiplier: ca.SX) -> ca.SX:
+        return (20 * ca.fmax(-multiplier[0], 0) / held) * (tilt.T @ tilt)
+
+    pressed = fz + 0.01  # an unloaded contact has no CoP: keeps the objective smooth there
+    cop_x, cop_y = -ty / pressed, tx / pressed
     rho = ca.vertcat(
         weights[0] * wrench[:3],
         weights[1] * wrench[:2],
         weights[2] * (tz - cop_x * fy + cop_y * fx),
         weights[3] * ca.vertcat(cop_x, cop_y) / (2 * half),
         weights[4] * ca.vertcat(-ty, tx) / (2 * half),
-        weights[5] * fz,
+        weights[5] * (fz - load),
+        ca.sqrt(EVEN * price) * slack,
     )
-    return Piece("contact", ca.vertcat(wrench, slack), p.vector, rho=rho, rows=rows, curved=curved)
+    linear = price * (slack[0] + slack[1])
+    return Piece("contact", v, p.vector, rho=rho, linear=linear, rows=10 * ca.vertcat(*rows), curvature=curvature)
 
 
 @dataclass(frozen=True)
@@ -286,10 +302,10 @@ def _height() -> Piece:
 
 
 def _slack() -> Piece:
-    """Price of the slacks of a step; parameters: penalty, and square root of the weight of the squares."""
+    """Price of the excess and of the body's slack of a step; parameters: both prices."""
     p = _Parameters()
-    slack, linear, square = ca.SX.sym("s", SLACKS), p(), p()
-    return Piece("slack", slack, p.vector, rho=square * slack, linear=linear * ca.sum1(slack))
+    slack, prices = ca.SX.sym("s", SLACKS), p(SLACKS)
+    return Piece("slack", slack, p.vector, rho=ca.sqrt(EVEN * prices) * slack, linear=ca.dot(prices, slack))
 
 
 def _initial() -> Piece:

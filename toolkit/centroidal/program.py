@@ -1,7 +1,8 @@
 """The whole-sequence problem as an optimal-control program in the layout of Fatrop: stages of states and controls.
 
-Stage t holds the state at knot t, the wrenches of step t and three slacks; the last one a state and the body's slack.
-Rows of stage t are the dynamics to knot t + 1, then its inequalities.
+Stage t holds the state at knot t, the wrench and two slacks of each contact of step t, the excess and the body's slack
+of the step; the last one a state and the body's slack. Rows of stage t are the dynamics to knot t + 1, then its
+inequalities.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from toolkit.centroidal.body import (
     lowest_foot,
     swing_ankles,
 )
-from toolkit.centroidal.pieces import SLACKS, STATE, WRENCH, G, pieces
+from toolkit.centroidal.pieces import CONTACT, SLACKS, STATE, WRENCH, G, pieces
 from toolkit.centroidal.problem import CentroidalProblem
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
@@ -37,21 +38,27 @@ class Regularisers:
         height: weight of the CoM's distance from home height above the feet, m^2.
         cop: weight of the CoP's distance from the middle of the patch over the patch's size, times the load in weights;
             decides in slow gaits, whose momenta cost little: slow single support does not forgive a CoP near the edge.
-        load: weight of the normal force (in weights) of a contact in the step after it is made or before it is broken.
+        load: weight of the normal force (in weights) of a foot in the step after it lands or before it lifts.
+        palm: weight of the distance (in weights) of a palm's normal force from `palm_force`.
+        palm_force: in weights; a palm that only touches is neither of use nor easy to control.
         final_center: weight of the distance of the last CoM from the mean of the feet, m^2.
         final_acceleration: weight of the last CoM acceleration, m^2/s^4.
         final_spin: weight of the last angular momentum per mass, m^4/s^2.
-        slack: penalty of relaxing a margin from wanted to physical for 0.2 s.
+        slack: price of a margin of a fully loaded contact, or of the body, taken back for 0.2 s.
+        excess: price of going beyond a physical limit by as much, in multiples of `slack`.
     """
 
     jerk: float = 0.02
     height: float = 400.0
     load: float = 20.0
+    palm: float = 1000.0
+    palm_force: float = 0.075
     cop: float = 200.0
     final_center: float = 20000.0
     final_acceleration: float = 20.0
     final_spin: float = 200.0
     slack: float = 3000.0
+    excess: float = 10.0
 
 
 @dataclass(frozen=True)
@@ -61,7 +68,7 @@ class Layout:
     Attributes:
         offset: (N + 1,) first variable of each stage.
         wrench: (N, 4) first variable of a limb's wrench; -1 where not active.
-        slack: (N + 1, 3) variables of the slacks of friction, CoP and body; at the last knot all are the body's.
+        slack: (N + 1, 2) variables of the excess and of the body's slack; at the last knot both are the body's.
         states, controls: (N + 1,) sizes.
     """
 
@@ -75,12 +82,12 @@ class Layout:
     def of(cls, active: np.ndarray) -> Layout:
         """Layout for (N, 4) active contacts."""
         count = active.sum(1)
-        controls = np.append(WRENCH * count + SLACKS, 1)
+        controls = np.append(CONTACT * count + SLACKS, 1)
         states = np.full(len(controls), STATE)
         offset = np.concatenate([[0], np.cumsum(states + controls)[:-1]])
         rank = np.cumsum(active, 1) - 1
-        wrench = np.where(active, offset[:-1, None] + STATE + WRENCH * rank, -1)
-        slack = (offset[:-1] + STATE + WRENCH * count)[:, None] + np.arange(SLACKS)
+        wrench = np.where(active, offset[:-1, None] + STATE + CONTACT * rank, -1)
+        slack = (offset[:-1] + STATE + CONTACT * count)[:, None] + np.arange(SLACKS)
         slack = np.concatenate([slack, np.full((1, SLACKS), offset[-1] + STATE)])
         return cls(offset, wrench, slack, states, controls)
 
@@ -149,7 +156,7 @@ class Program:
         p, w, reg = self.problem, self.problem.weights, self.regularisers
         duration = SCALE * p.dt / 0.2
         weight = p.mass * G
-        cop_margin = p.half_size - p.reduced_half_size
+        cop_margin, price = p.half_size - p.reduced_half_size, self._price()
         for limb in range(4):
             step = np.flatnonzero(p.active[:, limb])
             if not len(step):
@@ -157,16 +164,22 @@ class Program:
             on = p.active[:, limb]
             made = np.concatenate([[False], on[1:] & ~on[:-1]])[step]
             broken = np.concatenate([on[:-1] & ~on[1:], [False]])[step]
-            edge = np.where(made | broken, reg.load, 0.0)
+            if Limb(limb).is_foot:
+                press, force = np.where(made | broken, reg.load, 0.0), 0.0
+            else:
+                press, force = np.full(len(step), reg.palm), reg.palm_force
             squares = [np.full(len(step), value) for value in (w.force, w.lateral_force, w.torque * weight**2)]
-            squares += [np.full(len(step), w.cop), np.full(len(step), reg.cop), edge]
+            squares += [np.full(len(step), w.cop), np.full(len(step), reg.cop), press]
             weights = np.sqrt(duration[step, None] * np.stack(squares, 1))
             wanted = np.array([p.margins.friction, *cop_margin[limb], p.margins.yaw])
             variables = np.concatenate(
-                [p_index(self.layout.wrench[step, limb], WRENCH), self.layout.slack[step, :2]], 1
+                [p_index(self.layout.wrench[step, limb], CONTACT), self.layout.slack[step, :1]], 1
             )
             fixed = np.tile(np.concatenate([p.half_size[limb], wanted]), (len(step), 1))
-            self._add(pieces().contact, step, variables, p.friction[step, limb], fixed, weights)
+            wanted_force = np.full(len(step), force)
+            self._add(
+                pieces().contact, step, variables, p.friction[step, limb], fixed, weights, wanted_force, price[step]
+            )
 
     def _add_body(self) -> None:
         """Limits of legs and arms."""
@@ -180,7 +193,7 @@ class Program:
             hip = self._heading @ leg.hip_in_com
             here = limbs == limb
             at = knots[here]
-            variables = np.concatenate([self._state(at, com), layout.slack[at, 2:]], 1)
+            variables = np.concatenate([self._state(at, com), layout.slack[at, 1:]], 1)
             ranges = [leg.ranges[role] for role in ("ankle_pitch", "ankle_roll", "hip_pitch", "hip_roll")]
             fixed = np.concatenate([[leg.min_length, leg.max_length], *ranges, [body.length, body.ankle, body.hip]])
             rotation = rotations[here]
@@ -191,7 +204,7 @@ class Program:
 
             step = np.flatnonzero(p.active[:, limb])
             wrench = p_index(layout.wrench[step, limb], WRENCH)
-            variables = np.concatenate([self._state(step, com, slice(3, 6)), wrench, layout.slack[step, 2:]], 1)
+            variables = np.concatenate([self._state(step, com, slice(3, 6)), wrench, layout.slack[step, 1:]], 1)
             sole, rotation = p.position[step, limb], p.rotation[step, limb]
             limits = np.array([leg.torques[role] for role in TORQUE_ROLES]) / weight
             posture = (self._middle_heading[step] @ leg.hip_in_com, sole + rotation @ leg.ankle_in_sole, rotation)
@@ -210,27 +223,27 @@ class Program:
                 self._add_distance(knots[here], shoulder, positions[here], arm.min_reach, arm.max_reach)
         floor, _ = lowest_foot(p)
         at = np.flatnonzero(np.isfinite(floor))
-        variables = np.concatenate([self._state(at, slice(2, 3)), layout.slack[at, 2:]], 1)
+        variables = np.concatenate([self._state(at, slice(2, 3)), layout.slack[at, 1:]], 1)
         least = floor[at] + p.min_height
         self._add(pieces().height, at, variables, least, np.full(len(at), body.height))
 
     def _add_distance(self, knot: np.ndarray, root: np.ndarray, tip: np.ndarray, lower: float, upper: float) -> None:
         """Bounds on the distance from a root to a tip at knots."""
         if len(knot):
-            variables = np.concatenate([self._state(knot, slice(0, 3)), self.layout.slack[knot, 2:]], 1)
+            variables = np.concatenate([self._state(knot, slice(0, 3)), self.layout.slack[knot, 1:]], 1)
             fixed = np.tile([lower, upper, self.body.length], (len(knot), 1))
             self._add(pieces().distance, knot, variables, root, tip, fixed)
 
+    def _price(self) -> np.ndarray:
+        """(N,) price of a slack in each step; short steps cost as much as 0.05 s, or margins would go there."""
+        return SCALE * self.regularisers.slack * np.maximum(self.problem.dt, 0.05) / 0.2
+
     def _add_slacks(self) -> None:
-        """Penalties of the slacks."""
-        slack = self.layout.slack
-        step = np.arange(self.problem.steps)
-        # A short step costs as much as one of 0.05 s: else margins would be given away where steps are short.
-        duration = SCALE * np.maximum(self.problem.dt, 0.05) / 0.2
-        linear = self.regularisers.slack * duration
-        self._add(pieces().slack, step, slack[:-1], linear, np.sqrt(0.1 * linear))
-        last = np.array([self.problem.steps])
-        self._add(pieces().slack, last, slack[-1:], linear[-1:] / SLACKS, np.sqrt(0.1 * linear[-1:]))
+        """Prices of what the steps take beyond their contacts' margins."""
+        slack, price = self.layout.slack, self._price()
+        step, last = np.arange(self.problem.steps), np.array([self.problem.steps])
+        self._add(pieces().slack, step, slack[:-1], self.regularisers.excess * price, price)
+        self._add(pieces().slack, last, slack[-1:], price[-1:] / 2, price[-1:] / 2)
 
     def _finish(self) -> None:
         """Dynamics, bounds and the assembly."""
@@ -281,6 +294,7 @@ class Program:
         self.variable_bounds = np.stack([np.full(layout.size, -np.inf), np.full(layout.size, np.inf)], 1)
         self.variable_bounds[layout.slack, 0] = 0.0
         step, limb = np.nonzero(p.active)
+        self.variable_bounds[p_index(layout.wrench[step, limb] + WRENCH, 2), 0] = 0.0
         normal = layout.wrench[step, limb] + 2
         self.variable_bounds[normal, 0] = 0.0
         self.variable_bounds[normal, 1] = p.max_normal_force[limb] / (p.mass * G)
