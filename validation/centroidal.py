@@ -224,7 +224,8 @@ def main(argv: list[str] | None = None) -> int:
     found = goals_of(tables, walks, fit)
     sections = [(f"Transitions: {name}", transition_table(rows)) for name, rows in tables.items()]
     note = (
-        f"Times are processor times, everything from the contacts to the checked motion. Walks over stones tilted by up to 10 degrees, 1 s + 1 s per contact; best of 3 runs each. "
+        "Times are processor times, everything from the contacts to the checked motion. Walks over stones tilted by "
+        "up to 10 degrees, 1 s + 1 s per contact; best of 3 runs each. "
         f"The first solution in this process took {first:.1f} s (loading or compiling the solver).\n\n"
     )
     path = write_results(

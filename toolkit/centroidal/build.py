@@ -16,7 +16,7 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import InputError
-from toolkit.geometry.limb import FEET
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 
 STANDARD_GRAVITY = 9.81
@@ -201,7 +201,7 @@ def _problem(
         used[landing.limb] = True
     for limb in range(4):
         if used[limb] and not reach[limb] > 0.0:
-            raise InputError(f"the robot has no limb {limb} with a reach; it cannot make this contact")
+            raise InputError(f"the robot has no {Limb(limb).label} with a reach; it cannot make this contact")
     a, b = last[0].pose.position.tolist(), last[1].pose.position.tolist()
     return CentroidalProblem(
         mass=robot.mass,

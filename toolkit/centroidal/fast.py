@@ -86,6 +86,12 @@ def wrenches(problem: CentroidalProblem, *, config: FastConfig | None = None) ->
 
 def _run(problem: CentroidalProblem, config: FastConfig) -> tuple[int, int, Arrays]:
     """Status, iterations and the arrays of the motion."""
+    code, iterations, *motion = _kernel()(float(config.tolerance), int(config.max_iterations), *_arguments(problem))
+    return code, iterations, tuple(motion)
+
+
+def _arguments(problem: CentroidalProblem) -> tuple:
+    """What `kernels.setup.pack` takes, in the exact types that the kernels were compiled for."""
     p, w = problem, problem.weights
     weights = np.array(
         [
@@ -97,40 +103,49 @@ def _run(problem: CentroidalProblem, config: FastConfig) -> tuple[int, int, Arra
             w.torque,
             w.lateral_force,
             w.cop,
-        ]
+        ],
+        float,
     )
     landing = p.landing_limb >= 0
-    code, iterations, *motion = _kernel()(
-        config.tolerance,
-        config.max_iterations,
-        p.mass,
-        p.dt,
-        p.active,
-        p.position,
-        p.rotation,
-        p.friction,
-        p.half_size,
-        p.reduced_half_size,
-        p.max_normal_force,
-        p.yaw,
-        p.com,
-        p.com_velocity,
-        p.angular_momentum,
-        p.root_in_com,
-        p.tip_in_contact,
-        p.max_reach,
-        p.min_height,
-        p.final_center,
-        p.final_half_size,
-        p.final_at_rest,
+    return (
+        float(p.mass),
+        _plain(p.dt),
+        _plain(p.active, bool),
+        _plain(p.position),
+        _plain(p.rotation),
+        _plain(p.friction),
+        _plain(p.half_size),
+        _plain(p.reduced_half_size),
+        _plain(p.max_normal_force),
+        _plain(p.yaw),
+        _plain(p.com),
+        _plain(p.com_velocity),
+        _plain(p.angular_momentum),
+        _plain(p.root_in_com),
+        _plain(p.tip_in_contact),
+        _plain(p.max_reach),
+        float(p.min_height),
+        _plain(p.final_center),
+        _plain(p.final_half_size),
+        bool(p.final_at_rest),
         weights,
-        p.margins.friction,
-        p.margins.yaw,
-        p.landing_limb,
-        p.landing_position if landing else np.zeros(3),
-        p.landing_rotation if landing else np.eye(3),
+        float(p.margins.friction),
+        float(p.margins.yaw),
+        int(p.landing_limb),
+        _plain(p.landing_position) if landing else np.zeros(3),
+        _plain(p.landing_rotation) if landing else np.eye(3),
     )
-    return code, iterations, tuple(motion)
+
+
+def _plain(array: np.ndarray | None, dtype: type = float) -> np.ndarray:
+    """The array, contiguous and writable: any other kind would be compiled for anew."""
+    array = np.ascontiguousarray(array, dtype)
+    return array if array.flags.writeable else array.copy()
+
+
+def pack(problem: CentroidalProblem) -> tuple[setup.Data, float]:
+    """The scaled arrays that the kernels work on, and how far the first knot is out of reach in m."""
+    return setup.pack(*_arguments(problem))
 
 
 def solve_many(problems: Iterable[CentroidalProblem], *, config: FastConfig | None = None) -> list[CentroidalMotion]:

@@ -94,7 +94,7 @@ def check(motion: CentroidalMotion) -> Residuals:
     )
     inactive = 0.0
     if off.any():
-        inactive = max(_largest(force[off]) / weight, _largest(cop[off]), _largest(torque[off]) / weight)
+        inactive = float(max(_largest(force[off]) / weight, _largest(cop[off]), _largest(torque[off]) / weight))
 
     local = (p.rotation * force[..., None]).sum(-2) / weight  # force in the contact frame, in weights
     fx, fy, fz = local[..., 0], local[..., 1], local[..., 2]
