@@ -66,13 +66,13 @@ class ControllerConfig:
     leg_posture: float = 0.05
     angular_momentum: TaskGains = TaskGains(40.0, 5.0, 0.0)
     angular_momentum_scale: float = 10.0
-    divergence_scale: float = 0.03
+    divergence_scale: float = 0.01
     divergence_rate: float = 3.4
     force: float = 1e-5
     moment: float = 2e-4
     acceleration: float = 1e-4
     nesting: float = 0.5
-    urgent_nesting: float = 0.15
+    urgent_nesting: float = 0.05
     min_foot_force: float = 10.0
     min_palm_force: float = 2.0
     foot_ramp: float = 0.06

@@ -211,10 +211,10 @@ class Controller:
             linear = angular = gains.swing if limb.is_foot else gains.hand
         share = 1.0 if self.tracker.in_contact[limb] else targets.authority[limb]
         rows = self._append(limb, slice(0, 3), linear, share, rows)
-        if limb.is_foot:
-            return self._append(limb, slice(3, 6), angular, share, rows)
-        # A palm may turn about the normal as its arm likes: only the two other axes of its frame are rows.
         rows = self._append(limb, slice(3, 6), angular, share, rows)
+        if limb.is_foot or self.tracker.in_contact[limb]:
+            return rows
+        # In the air a palm may turn about the normal as its arm likes: only its two other axes are rows.
         last, tilt = slice(rows - 3, rows), dynamics.limb_rotation[limb, :, :2].T
         self._tasks[rows - 3 : rows - 1] = tilt @ self._tasks[last]
         self._wanted[rows - 3 : rows - 1] = tilt @ self._wanted[last]
