@@ -153,7 +153,7 @@ def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig 
         config: settings; dynamics do not count in the cost.
     """
     config, static = config or PlannerConfig(), QuasiStaticConfig()
-    palms = config.palms and bool(robot.arms) and any(surface.serves_palm for surface in world.surfaces)
+    palms = config.palms and bool(robot.arms) and _walls_in_reach(robot, world)
     config = replace(
         config,
         cost=replace(config.cost, dynamics=0.0),
@@ -162,3 +162,21 @@ def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig 
         timings=config.timings[:1],
     )
     return ContactPlanner(robot, world, QuasiStaticEvaluator(robot, config.moves, static), config)
+
+
+def _walls_in_reach(robot: RobotModel, world: World) -> bool:
+    """Whether a palm surface rises to waist height above ground that is no farther away than an arm reaches."""
+    boxes = {}
+    for surface in world.surfaces:
+        points = surface.pose @ np.column_stack([surface.boundary[0], np.zeros(len(surface.boundary[0]))])
+        boxes[surface.index] = points.min(0), points.max(0)
+    reach = 2.0 * max(arm.max_reach for arm in robot.arms.values())
+    ground = [boxes[surface.index] for surface in world.surfaces if surface.serves_foot]
+    lower, upper = (np.array(corners) for corners in zip(*ground, strict=True))
+    for surface in world.surfaces:
+        if surface.serves_palm:
+            low, high = boxes[surface.index]
+            near = ((lower - reach <= high) & (low <= upper + reach))[:, :2].all(1)
+            if (high[2] - upper[near, 2] > 0.6 * robot.com_height).any():
+                return True
+    return False
