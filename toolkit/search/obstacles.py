@@ -62,15 +62,15 @@ def _local(model: mujoco.MjModel, index: int) -> np.ndarray:
         zero = np.zeros_like(a)
         low, high = np.full((_SIDES, 1), -size[1]), np.full((_SIDES, 1), size[1])
 
-        def face(*corners):
+        def triangle(*corners):
             return np.stack([np.column_stack(corner) for corner in corners], axis=1)
 
         return np.concatenate(
             [
-                face((a, low), (b, low), (b, high)),
-                face((a, low), (b, high), (a, high)),
-                face((zero, low), (a, low), (b, low)),
-                face((zero, high), (a, high), (b, high)),
+                triangle((a, low), (b, low), (b, high)),
+                triangle((a, low), (b, high), (a, high)),
+                triangle((zero, low), (a, low), (b, low)),
+                triangle((zero, high), (a, high), (b, high)),
             ]
         )
     half = {
