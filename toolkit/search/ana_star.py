@@ -24,15 +24,15 @@ import math
 import time
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-State = Hashable
+State = TypeVar("State", bound=Hashable)
 _TINY = 1e-9  # divisor in place of h = 0
 
 
-class Edge(NamedTuple):
+class Edge(NamedTuple, Generic[State]):
     """A way out of a state: where it leads, its cost (>= 0), and anything the caller wants to find in the path."""
 
     state: State
@@ -40,25 +40,25 @@ class Edge(NamedTuple):
     payload: Any = None
 
 
-class SearchProblem(Protocol):
+class SearchProblem(Protocol[State]):
     """A graph, given by what can be reached from where."""
 
     def start(self) -> State:
         """The state in which the search begins."""
         ...
 
-    def expand(self, state: State, slack: float) -> Sequence[Edge] | None:
+    def expand(self, state: State, slack: float) -> Sequence[Edge[State]] | None:
         """Edges out of a state; None where there is no time left to find them.
 
         Edges with cost + heuristic >= slack cannot improve and may be left out.
         """
         ...
 
-    def heuristic(self, states: Sequence[State]) -> Sequence[float]:
+    def heuristic(self, states: Sequence[State]) -> Sequence[float] | np.ndarray:
         """Estimates >= 0 of the cost from each state to the goal; inf where it cannot be reached."""
         ...
 
-    def is_goal(self, states: Sequence[State]) -> Sequence[bool]:
+    def is_goal(self, states: Sequence[State]) -> Sequence[bool] | np.ndarray:
         """Whether each state is a goal."""
         ...
 
@@ -67,11 +67,11 @@ class SearchProblem(Protocol):
         ...
 
 
-Judge = Callable[[State, Edge], Edge | None]
+Judge = Callable[[State, Edge[State]], Edge[State] | None]
 
 
 @dataclass(frozen=True)
-class Path:
+class Path(Generic[State]):
     """A solution.
 
     Attributes:
@@ -93,7 +93,7 @@ class Path:
 
 
 @dataclass(frozen=True)
-class Progress:
+class Progress(Generic[State]):
     """How a search is going.
 
     Attributes:
@@ -144,7 +144,7 @@ class AnaStarConfig:
 
 
 @dataclass(frozen=True)
-class AnaStarResult:
+class AnaStarResult(Generic[State]):
     """Outcome.
 
     Attributes:
@@ -155,7 +155,7 @@ class AnaStarResult:
         expanded: states in order of expansion.
     """
 
-    paths: tuple[Path, ...]
+    paths: tuple[Path[State], ...]
     stopped_by: str
     lower_bound: float
     seconds: float
@@ -164,7 +164,7 @@ class AnaStarResult:
     expanded: tuple[State, ...] = field(repr=False)
 
 
-class AnaStar:
+class AnaStar(Generic[State]):
     """One search. Make it, call `run` once.
 
     Args:
@@ -177,10 +177,10 @@ class AnaStar:
 
     def __init__(
         self,
-        problem: SearchProblem,
+        problem: SearchProblem[State],
         rng: np.random.Generator,
         config: AnaStarConfig | None = None,
-        judge: Judge | None = None,
+        judge: Judge[State] | None = None,
     ):
         self._problem, self._rng, self._judge = problem, rng, judge
         self._config = config or AnaStarConfig()
@@ -201,7 +201,9 @@ class AnaStar:
         self._crowding = self._config.crowding
         self._forbidden: set[tuple[State, State]] = set()
 
-    def run(self, time_limit: float = math.inf, observer: Callable[[Progress], None] | None = None) -> AnaStarResult:
+    def run(
+        self, time_limit: float = math.inf, observer: Callable[[Progress[State]], None] | None = None
+    ) -> AnaStarResult[State]:
         """Search until nothing can improve, or a limit is reached.
 
         Args:
@@ -255,7 +257,7 @@ class AnaStar:
             tuple(paths), stopped_by, self._lower_bound(), seconds, len(expanded), len(self._state), tuple(expanded)
         )
 
-    def _expand(self, node: int) -> list[Edge] | None:
+    def _expand(self, node: int) -> list[Edge[State]] | None:
         """Open the children of a node that may improve; returns the edges to goals instead of opening them.
 
         None where the problem had no time left.
@@ -276,7 +278,7 @@ class AnaStar:
                 self._improve(edge, g + edge.cost, float(h), node, crowd)
         return goals
 
-    def _improve(self, edge: Edge, g: float, h: float, parent: int, crowd: Hashable) -> None:
+    def _improve(self, edge: Edge[State], g: float, h: float, parent: int, crowd: Hashable) -> None:
         """Open a state, or reopen it, where the path to it is the cheapest so far and may lead to a better solution."""
         if not g + h < self._best or h == math.inf:
             return
@@ -340,7 +342,7 @@ class AnaStar:
         self._open.pop()
         self._place[node] = -1
 
-    def _reach(self, node: int, edge: Edge, seconds: float, expansions: int) -> Path | None:
+    def _reach(self, node: int, edge: Edge[State], seconds: float, expansions: int) -> Path[State] | None:
         """Take an edge to a goal if it improves on the best solution and the judge agrees."""
         if not self._g[node] + edge.cost < self._best:
             return None

@@ -206,7 +206,7 @@ class ContactPlanner:
             reason="" if result.paths else self._reason(result, problem),
         )
 
-    def _reason(self, result: AnaStarResult, problem: ContactProblem) -> str:
+    def _reason(self, result: AnaStarResult[bytes], problem: ContactProblem) -> str:
         dynamics = getattr(self._evaluator, "rejection", screen.REASONS[screen.DYNAMICS])
         return _reason(result.stopped_by, result.seconds, result.expansions, problem.rejected, dynamics)
 
@@ -256,7 +256,7 @@ class ContactPlanner:
 def _goal_judge(problem: ContactProblem, evaluator: TransitionEvaluator, cost: CostConfig):
     """Judge of the last transition for ANA*: it must end at rest; its objective is replaced."""
 
-    def judge(state: bytes, edge: Edge) -> Edge | None:
+    def judge(state: bytes, edge: Edge[bytes]) -> Edge[bytes] | None:
         row = unpack([state])[0]
         transition = problem.transition(edge.state, edge.payload)
         batch = evaluator.evaluate(problem.stance(state), row[COM] / 1000.0, row[VELOCITY] / 1000.0, [transition])
@@ -273,7 +273,7 @@ def _goal_judge(problem: ContactProblem, evaluator: TransitionEvaluator, cost: C
     return judge
 
 
-def _solution(problem: ContactProblem, path: Path) -> Solution:
+def _solution(problem: ContactProblem, path: Path[bytes]) -> Solution:
     """A path as a contact sequence with its predicted motion."""
     rows = unpack(path.states)
     steps = list(zip(path.states[1:], path.payloads, strict=True))

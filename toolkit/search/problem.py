@@ -180,7 +180,7 @@ class ContactProblem:
         centre = self.feet(unpack(states)[:, CONTACTS])[0]
         return list(map(tuple, np.floor(centre[:, :2] / _CROWD).astype(int).tolist()))
 
-    def expand(self, state: bytes, slack: float) -> list[Edge] | None:
+    def expand(self, state: bytes, slack: float) -> list[Edge[bytes]] | None:
         """See `SearchProblem`: screens, then one query of the evaluator for all children together."""
         row = unpack([state])[0]
         candidates = self._candidates(row)

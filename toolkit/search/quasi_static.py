@@ -117,11 +117,11 @@ class QuasiStaticEvaluator:
 
     def _reaches(self, com: np.ndarray, stance: Stance) -> bool:
         """Whether legs and arms reach every contact of a stance with this CoM."""
-        yaw = stance.mean_feet.yaw
+        yaw, (x, y, z) = stance.mean_feet.yaw, com
         for contact in stance.contacts:
             pose = contact.pose
             if contact.limb.is_foot:
-                if violated(self._legs, int(contact.limb), *com, yaw, pose.position, pose.rotation) >= 0:
+                if violated(self._legs, int(contact.limb), x, y, z, yaw, pose.position, pose.rotation) >= 0:
                     return False
             else:
                 arm = self._robot.arms[contact.limb]
@@ -170,7 +170,7 @@ def _walls_in_reach(robot: RobotModel, world: World) -> bool:
     for surface in world.surfaces:
         points = surface.pose @ np.column_stack([surface.boundary[0], np.zeros(len(surface.boundary[0]))])
         boxes[surface.index] = points.min(0), points.max(0)
-    reach = 2.0 * max(arm.max_reach for arm in robot.arms.values())
+    reach = 1.5 * max(arm.max_reach for arm in robot.arms.values())
     ground = [boxes[surface.index] for surface in world.surfaces if surface.serves_foot]
     lower, upper = (np.array(corners) for corners in zip(*ground, strict=True))
     for surface in world.surfaces:
