@@ -27,6 +27,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.legs import legs_of, violated
 from toolkit.search.moves import MoveConfig
 from toolkit.search.planner import ContactPlanner, PlannerConfig
+from toolkit.world.surface import Surface
 from toolkit.world.world import World
 
 _KEPT = 20_000  # linear programs remembered
@@ -165,18 +166,18 @@ def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig 
 
 
 def _walls_in_reach(robot: RobotModel, world: World) -> bool:
-    """Whether a palm surface rises to waist height above ground that is no farther away than an arm reaches."""
-    boxes = {}
-    for surface in world.surfaces:
-        points = surface.pose @ np.column_stack([surface.boundary[0], np.zeros(len(surface.boundary[0]))])
-        boxes[surface.index] = points.min(0), points.max(0)
+    """Whether a corner of a palm surface is at waist height above ground no farther away than an arm reaches."""
+
+    def corners(surface: Surface) -> np.ndarray:
+        return surface.pose @ np.column_stack([surface.boundary[0], np.zeros(len(surface.boundary[0]))])
+
+    ground = [corners(surface) for surface in world.surfaces if surface.serves_foot]
+    lower, upper = np.array([points.min(0) for points in ground]), np.array([points.max(0) for points in ground])
     reach = 1.5 * max(arm.max_reach for arm in robot.arms.values())
-    ground = [boxes[surface.index] for surface in world.surfaces if surface.serves_foot]
-    lower, upper = (np.array(corners) for corners in zip(*ground, strict=True))
     for surface in world.surfaces:
         if surface.serves_palm:
-            low, high = boxes[surface.index]
-            near = ((lower - reach <= high) & (low <= upper + reach))[:, :2].all(1)
-            if (high[2] - upper[near, 2] > 0.6 * robot.com_height).any():
+            points = corners(surface)[:, None]
+            near = ((points >= lower - reach) & (points <= upper + reach))[..., :2].all(-1)
+            if (near & (points[..., 2] - upper[:, 2] > 0.6 * robot.com_height)).any():
                 return True
     return False
