@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.geometry.limb import Limb
 from toolkit.simulation.config import ControllerConfig
 from toolkit.simulation.dynamics import RobotDynamics
-from toolkit.simulation.reference import Reference
+from toolkit.simulation.reference import Reference, Swing
 from toolkit.simulation.touchdown import ContactTracker, LimbState
 
 
@@ -37,34 +36,33 @@ class LimbTargets:
         """Evaluate at a row of the reference and the measured limbs."""
         reference, tracker = self._reference, self._tracker
         for limb in dynamics.limbs:
-            state = tracker.state[limb]
+            state, swing = tracker.state[limb], tracker.current[limb]
             self.error[limb] = self.velocity[limb] = self.acceleration[limb] = 0.0
             self.authority[limb] = reference.authority[index, limb]
             if state is LimbState.REST and tracker.loose[limb]:
                 self.velocity[limb, :3] = -self._rest_speed * dynamics.limb_rotation[limb, :, 2]
-            if state in (LimbState.REST, LimbState.FREE):
+            if state in (LimbState.REST, LimbState.FREE) or swing is None:
                 continue
             if tracker.begun[limb]:
                 self._offset[limb] = dynamics.limb_position[limb] - reference.limb_position[index, limb]
-                if not tracker.current[limb].breaks:
+                if not swing.breaks:
                     self._offset[limb] = 0.0
                 self.shift[limb] = self.shift_velocity[limb] = 0.0
             target = reference.limb_position[index, limb] + self.shift[limb]
             self.velocity[limb] = reference.limb_velocity[index, limb]
             self.velocity[limb, :3] += self.shift_velocity[limb]
             self.acceleration[limb] = reference.limb_acceleration[index, limb]
-            if state is LimbState.SEARCH:
-                normal = tracker.current[limb].contact.pose.normal
+            if state is LimbState.SEARCH and swing.contact is not None:
+                normal = swing.contact.pose.normal
                 target = target - tracker.depth[limb] * normal
                 self.velocity[limb, :3] -= tracker.search_speed(limb) * normal
             else:
-                target = target + self._remaining(limb, reference.times[index]) * self._offset[limb]
+                target = target + self._remaining(swing, reference.times[index]) * self._offset[limb]
             self.error[limb, :3] = target - dynamics.limb_position[limb]
             self.error[limb, 3:] = rotation_error(reference.limb_rotation[index, limb], dynamics.limb_rotation[limb])
 
-    def _remaining(self, limb: Limb, time: float) -> float:
+    def _remaining(self, swing: Swing, time: float) -> float:
         """Share of the initial offset that is left."""
-        swing = self._tracker.current[limb]
         share = min((time - swing.start) / (self.fade * (swing.end - swing.start)), 1.0)
         return 1.0 - share * share * (3.0 - 2.0 * share)
 
