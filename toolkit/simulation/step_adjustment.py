@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.simulation.config import StepAdjustmentConfig
 from toolkit.simulation.dynamics import RobotDynamics
 from toolkit.simulation.limb_target import LimbTargets
-from toolkit.simulation.reference import Reference, Swing
+from toolkit.simulation.reference import Reference
 from toolkit.simulation.touchdown import ContactTracker, LimbState
 from toolkit.world.surface import Surface
 
@@ -59,12 +60,12 @@ class StepAdjuster:
             if tracker.made[foot]:
                 self.shifts[foot] = targets.shift[foot]
             swing = tracker.current[foot]
-            if swing is None or tracker.state[foot] is not LimbState.SWING:
+            if swing is None or swing.contact is None or tracker.state[foot] is not LimbState.SWING:
                 targets.shift_velocity[foot] = 0.0
                 continue
             share = (reference.times[index] - swing.start) / (swing.end - swing.start)
             if swing.end - swing.start <= config.max_swing and share <= config.fraction:
-                self._choose(foot, swing, self._divergence(index, dynamics), dynamics)
+                self._choose(foot, swing.contact, self._divergence(index, dynamics), dynamics)
             step = self._goal[foot] - targets.shift[foot]
             length = float(np.linalg.norm(step))
             most = config.slew * period
@@ -85,25 +86,25 @@ class StepAdjuster:
             return np.zeros(3)
         return xi * (min(length - config.deadband, config.max_shift) / length)
 
-    def _choose(self, foot: Limb, swing: Swing, wanted: np.ndarray, dynamics: RobotDynamics) -> None:
+    def _choose(self, foot: Limb, contact: Contact, wanted: np.ndarray, dynamics: RobotDynamics) -> None:
         """Take the largest part of a wanted shift that lands on the surface and clear of the other foot."""
-        pose = swing.contact.pose
-        if swing.contact.surface < 0:
+        pose = contact.pose
+        if contact.surface < 0:
             return
         slope = wanted - np.array([0.0, 0.0, (wanted @ pose.normal) / pose.normal[2]])
         for part in (1.0, 0.75, 0.5, 0.25):
             shift = part * slope
-            if not shift.any() or self._lands(foot, swing, shift, dynamics):
+            if not shift.any() or self._lands(foot, contact, shift, dynamics):
                 self._goal[foot] = shift
                 return
         self._goal[foot] = 0.0
 
-    def _lands(self, foot: Limb, swing: Swing, shift: np.ndarray, dynamics: RobotDynamics) -> bool:
+    def _lands(self, foot: Limb, contact: Contact, shift: np.ndarray, dynamics: RobotDynamics) -> bool:
         """Whether the shifted sole is inside its surface and beside the other sole."""
-        config, pose, half = self._config, swing.contact.pose, self._half_sizes[foot]
+        config, pose, half = self._config, contact.pose, self._half_sizes[foot]
         corners = np.array([[a, b, 0.0] for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))]) * np.r_[half, 0.0]
         points = corners @ pose.rotation.T + pose.position + shift
-        surface = self._surfaces[swing.contact.surface]
+        surface = self._surfaces[contact.surface]
         region = self._regions.get(surface.index)
         if region is None:
             region = shapely.Polygon(surface.boundary[0], surface.boundary[1:]).buffer(-config.margin)
