@@ -136,15 +136,14 @@ class ContactQP:
         Returns:
             (size,) x, or None where the solver failed or its answer violates the constraints.
         """
-        if self._model is None:
-            self._model = daqp.Model()
-            flag, _ = self._model.setup(
-                self.hessian, self.gradient, self.rows, self.upper, self.lower, self._sense.copy()
-            )
+        model = self._model
+        if model is None:
+            model = self._model = daqp.Model()
+            flag, _ = model.setup(self.hessian, self.gradient, self.rows, self.upper, self.lower, self._sense.copy())
         else:
-            flag = self._model.update(self.hessian, self.gradient, self.rows, self.upper, self.lower)
+            flag = model.update(self.hessian, self.gradient, self.rows, self.upper, self.lower)
         if flag >= 0:
-            x, _, flag, _ = self._model.solve()
+            x, _, flag, _ = model.solve()
             if flag > 0 and self._holds(x, self.lower, self.upper):
                 return x
         self._model = None  # a broken workspace is not warm-started from
