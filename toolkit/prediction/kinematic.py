@@ -75,7 +75,7 @@ class KinematicEvaluator:
 
         normal_z = np.clip(rotation[:, :, 2, 2], 1e-6, 1.0)
         tilt = np.arccos(normal_z)
-        feasible = (np.tan(tilt) <= config.friction * friction).all(1)
+        feasible = np.all(np.tan(tilt) <= config.friction * friction, axis=1)
 
         mean = position.mean(1)
         before = stance.mean_feet.position
