@@ -101,4 +101,4 @@ class NetworkEvaluator:
         lower, upper = network.lower[TIMING_AND_FRICTION], network.upper[TIMING_AND_FRICTION]
         slack = 0.01 * (upper - lower) + 1e-6
         values = features[:, TIMING_AND_FRICTION]
-        return ((values >= lower - slack) & (values <= upper + slack)).all(1)
+        return np.all((values >= lower - slack) & (values <= upper + slack), axis=1)
