@@ -56,13 +56,30 @@ class Piece:
             return ca.Function(f"{name}_{kind}", inputs, ca.cse(outputs))
 
         def nonzeros(matrix: ca.SX) -> ca.SX:
-            return ca.vertcat(*matrix.nonzeros()) if matrix.nnz() else ca.SX(0, 1)
+            return matrix.nz[:]
 
         self.cost = function("cost", [v, p], [cost])
         self.value = function("value", [v, p], [rows])
         self.gradient = function("gradient", [v, p], [cost, ca.densify(gradient)])
         self.first = function("first", [v, p], [rows, nonzeros(jacobian)])
         self.second = function("second", [v, p, weight, multiplier], [ca.densify(lagrangian), nonzeros(hessian)])
+
+
+class Parameters:
+    """Hands out named parts of one growing parameter vector."""
+
+    def __init__(self):
+        self.parts: list[ca.SX] = []
+
+    def __call__(self, size: int = 1) -> ca.SX:
+        """The next part."""
+        self.parts.append(ca.SX.sym(f"p{len(self.parts)}", size))
+        return self.parts[-1]
+
+    @property
+    def vector(self) -> ca.SX:
+        """All parts so far."""
+        return ca.vertcat(*self.parts)
 
 
 @dataclass(frozen=True)
@@ -138,7 +155,7 @@ class Assembly:
             return ca.vertcat(*[ca.vec(output[which]) for output in outputs])
 
         def total(outputs: list) -> ca.MX:
-            return sum(ca.sum2(output[0]) for output in outputs)
+            return sum((ca.sum2(output[0]) for output in outputs), ca.MX(0))
 
         to_x = self._scatter([block.variables for block in self.blocks], self.size)
         to_g = self._scatter([block.rows for block in self.blocks], self.rows)

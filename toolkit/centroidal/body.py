@@ -79,7 +79,7 @@ def knot_contacts(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, n
     knot = np.concatenate([step + 1, step[first]])  # each contact at the end of its steps, and where it begins
     at, limb = np.concatenate([step, step[first]]), np.concatenate([limb, limb[first]])
     position, rotation = problem.position[at, limb], problem.rotation[at, limb]
-    if problem.landing_limb >= 0:
+    if problem.landing_position is not None and problem.landing_rotation is not None:
         knot, limb = np.append(knot, n), np.append(limb, problem.landing_limb)
         position = np.concatenate([position, problem.landing_position[None]])
         rotation = np.concatenate([rotation, problem.landing_rotation[None]])
@@ -98,14 +98,14 @@ def swing_ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np
         tip = problem.position[:, limb] + problem.rotation[:, limb] @ problem.tip_in_contact[limb]
         edges = np.flatnonzero(np.diff(np.concatenate([[1], problem.active[:, limb].astype(int), [1]])))
         for lift, land in edges.reshape(-1, 2):
-            landing = land == problem.steps
-            if lift == 0 or (landing and problem.landing_limb != limb):
+            if lift == 0:
                 continue
-            end = (
-                tip[land]
-                if not landing
-                else (problem.landing_position + problem.landing_rotation @ problem.tip_in_contact[limb])
-            )
+            if land < problem.steps:
+                end = tip[land]
+            elif problem.landing_limb == limb and problem.landing_position is not None:
+                end = problem.landing_position + problem.landing_rotation @ problem.tip_in_contact[limb]
+            else:
+                continue
             inside = np.arange(lift + 1, land)
             s = ((times[inside] - times[lift]) / (times[land] - times[lift]))[:, None]
             along = s * s * (3 - 2 * s)
@@ -164,7 +164,8 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
 
     def enter(name: str, at: np.ndarray, limb: np.ndarray | int, value: np.ndarray) -> None:
         table = violation.setdefault(name, np.full((n + 1, 4), -np.inf))
-        np.maximum.at(table, (at, limb), np.where(np.isnan(value), np.inf, value))
+        flat = np.ravel_multi_index((at, np.broadcast_to(limb, at.shape)), table.shape)
+        np.maximum.at(table.reshape(-1), flat, np.where(np.isnan(value), np.inf, value))
 
     reach = ReachMargins(length=margins.length, ankle=margins.ankle, hip=margins.hip)
     knots, limbs, positions, rotations = knot_contacts(p)

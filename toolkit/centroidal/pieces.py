@@ -18,11 +18,11 @@ from functools import lru_cache
 
 import casadi as ca
 
-from toolkit.centroidal.blocks import Piece
+from toolkit.centroidal.blocks import Parameters, Piece
+from toolkit.centroidal.leg_pieces import WRENCH, leg, torque
 from toolkit.centroidal.problem import GRAVITY
 
 STATE = 12
-WRENCH = 6
 CONTACT = WRENCH + 2
 SLACKS = 2
 EVEN = 0.1  # part of a slack's price on its square: shared out evenly where the linear price is indifferent
@@ -56,29 +56,14 @@ class Pieces:
     final: Piece
 
 
-class _Parameters:
-    """Hands out named parts of one growing parameter vector."""
-
-    def __init__(self):
-        self.parts: list[ca.SX] = []
-
-    def __call__(self, size: int = 1) -> ca.SX:
-        self.parts.append(ca.SX.sym(f"p{len(self.parts)}", size))
-        return self.parts[-1]
-
-    @property
-    def vector(self) -> ca.SX:
-        return ca.vertcat(*self.parts)
-
-
 @lru_cache(maxsize=1)
 def pieces() -> Pieces:
     """The pieces; building them takes tens of milliseconds once."""
     return Pieces(
         stage={n: _stage(n) for n in range(1, 5)},
         contact=_contact(),
-        leg=_leg(),
-        torque=_torque(),
+        leg=leg(),
+        torque=torque(),
         distance=_distance(),
         height=_height(),
         slack=_slack(),
@@ -93,7 +78,7 @@ def _stage(contacts: int) -> Piece:
     Parameters: dt, per contact R (9, row-major) and p (3); square roots of the weights of v, a, kappa, kappa rate,
     acceleration change, height; wanted height.
     """
-    p = _Parameters()
+    p = Parameters()
     x, after = ca.SX.sym("x", STATE), ca.SX.sym("after", STATE)
     wrenches = ca.SX.sym("w", WRENCH * contacts)
     dt = p()
@@ -130,7 +115,7 @@ def _contact() -> Piece:
     weights of force, lateral force, torque (in weights), CoP, CoP times load, and distance from a wanted normal force;
     that force; price of a slack.
     """
-    p = _Parameters()
+    p = Parameters()
     wrench, slack, excess = ca.SX.sym("w", WRENCH), ca.SX.sym("s", 2), ca.SX.sym("e")
     mu, half, wanted, cop_margin, yaw_factor, weights, load, price = p(), p(2), p(), p(2), p(), p(6), p(), p()
     fx, fy, fz, tx, ty, tz = ca.vertsplit(wrench)
@@ -173,119 +158,12 @@ def _contact() -> Piece:
     return Piece("contact", v, p.vector, rho=rho, linear=linear, rows=10 * ca.vertcat(*rows), curvature=curvature)
 
 
-@dataclass(frozen=True)
-class _Posture:
-    """The leg of `toolkit.contacts.reach.LegPosture` as expressions."""
-
-    length: ca.SX
-    hip_roll: ca.SX
-    hip_pitch: ca.SX
-    ankle_pitch: ca.SX
-    ankle_roll: ca.SX
-    hip: ca.SX
-    knee: ca.SX
-    ankle: ca.SX
-    pitch_axis: ca.SX
-
-
-def _posture(com: ca.SX, p: _Parameters) -> tuple[_Posture, ca.SX]:
-    """Posture of a leg, and world_from_sole.
-
-    Parameters: hip relative to the CoM in the world (3), ankle in the world (3), R of the sole (9, row-major), thigh,
-    shin.
-    """
-    hip_offset, ankle, rotation = p(3), p(3), ca.reshape(p(9), 3, 3).T
-    thigh, shin = p(), p()
-    hip = com + hip_offset
-    h = rotation.T @ (hip - ankle)
-    square = ca.sumsqr(h)
-    length = ca.sqrt(square)
-    roll = ca.atan2(h[1], h[2])
-    cosine = (square + shin**2 - thigh**2) / (2 * shin * length)
-    lean = ca.atan2(h[0], ca.sqrt(h[1] ** 2 + h[2] ** 2)) + ca.acos(ca.fmin(ca.fmax(cosine, -0.9999), 0.9999))
-    axis = rotation @ ca.vertcat(0, ca.cos(roll), -ca.sin(roll))
-    up = ca.vertcat(ca.sin(lean), ca.sin(roll) * ca.cos(lean), ca.cos(roll) * ca.cos(lean))
-    knee = ankle + shin * (rotation @ up)
-    thigh_z = hip - knee
-    thigh_x = ca.cross(axis, thigh_z)
-    posture = _Posture(
-        length=length,
-        hip_roll=ca.asin(ca.fmin(ca.fmax(axis[2], -0.9999), 0.9999)),
-        hip_pitch=ca.atan2(-thigh_x[2], thigh_z[2]),
-        ankle_pitch=-lean,
-        ankle_roll=roll,
-        hip=hip,
-        knee=knee,
-        ankle=ankle,
-        pitch_axis=axis,
-    )
-    return posture, rotation
-
-
-def _leg() -> Piece:
-    """Joint ranges of a leg.
-
-    Parameters: of the posture; (2) length, then (2) lower and upper of ankle pitch, ankle roll, hip pitch, hip roll;
-    wanted margins of length, ankle, hip.
-    """
-    p = _Parameters()
-    com, slack = ca.SX.sym("c", 3), ca.SX.sym("s")
-    posture, _ = _posture(com, p)
-    values = [posture.length, posture.ankle_pitch, posture.ankle_roll, posture.hip_pitch, posture.hip_roll]
-    ranges = [p(2) for _ in values]
-    length, ankle, hip = p(), p(), p()
-    rows = []
-    for value, limits, margin, scale in zip(
-        values, ranges, (length, ankle, ankle, hip, hip), (5, 1, 1, 1, 1), strict=True
-    ):
-        kept = margin * (1 - slack)
-        rows += [scale * (value - limits[0] - kept), scale * (limits[1] - value - kept)]
-    return Piece("leg", ca.vertcat(com, slack), p.vector, rows=ca.vertcat(*rows))
-
-
-def _torque() -> Piece:
-    """Joint torques of a stance leg in the middle of a step.
-
-    Parameters: half of dt; of the posture; sole position (3); (5) torque limits of knee, hip pitch, hip roll, ankle
-    pitch, ankle roll in weights times 1 m; wanted part of the limits.
-    """
-    p = _Parameters()
-    com, velocity, wrench = ca.SX.sym("c", 3), ca.SX.sym("v", 3), ca.SX.sym("w", WRENCH)
-    slack, half_dt = ca.SX.sym("s"), p()
-    middle = ca.SX.sym("middle", 3)
-    leg, rotation = _posture(middle, p)
-    sole, limits, wanted = p(3), p(5), p()
-    force, moment = rotation @ wrench[:3], rotation @ wrench[3:]
-
-    def about(point: ca.SX, axis: ca.SX) -> ca.SX:
-        return ca.dot(axis, ca.cross(sole - point, force) + moment)
-
-    w = leg.pitch_axis
-    roll_axis = ca.vertcat(w[1], -w[0], 0) / ca.sqrt(w[0] ** 2 + w[1] ** 2)
-    torques = ca.vertcat(
-        about(leg.knee, w),
-        about(leg.hip, w),
-        about(leg.hip, roll_axis),
-        about(leg.ankle, w),
-        about(leg.ankle, rotation[:, 0]),
-    )
-    ratio = torques / limits
-    reduced = ca.vertcat(middle, wrench)
-    slope = ca.jacobian(ratio, reduced)
-    slope = ca.horzcat(slope[:, :3], half_dt * slope[:, :3], slope[:, 3:])  # the middle is com + dt / 2 velocity
-    part, gain = wanted + (1 - wanted) * slack, ca.repmat(1 - wanted, 5, 1)
-    rows = ca.vertcat(part - ratio, part + ratio)
-    jacobian = ca.vertcat(ca.horzcat(-slope, gain), ca.horzcat(slope, gain))
-    rows, jacobian = ca.substitute([rows, jacobian], [middle], [com + half_dt * velocity])
-    return Piece("torque", ca.vertcat(com, velocity, wrench, slack), p.vector, rows=rows, jacobian=jacobian)
-
-
 def _distance() -> Piece:
     """Distance from hip or shoulder to a tip.
 
     Parameters: root relative to the CoM in the world (3), tip (3), lower and upper bound, wanted margin.
     """
-    p = _Parameters()
+    p = Parameters()
     com, slack = ca.SX.sym("c", 3), ca.SX.sym("s")
     root, tip, lower, upper, margin = p(3), p(3), p(), p(), p()
     length = ca.sqrt(ca.sumsqr(com + root - tip) + 1e-12)
@@ -296,21 +174,21 @@ def _distance() -> Piece:
 
 def _height() -> Piece:
     """Least height of the CoM; parameters: that height in the world, wanted margin."""
-    p = _Parameters()
+    p = Parameters()
     z, slack, least, margin = ca.SX.sym("z"), ca.SX.sym("s"), p(), p()
     return Piece("height", ca.vertcat(z, slack), p.vector, rows=5 * (z - least - margin * (1 - slack)))
 
 
 def _slack() -> Piece:
     """Price of the excess and of the body's slack of a step; parameters: both prices."""
-    p = _Parameters()
+    p = Parameters()
     slack, prices = ca.SX.sym("s", SLACKS), p(SLACKS)
     return Piece("slack", slack, p.vector, rho=ca.sqrt(EVEN * prices) * slack, linear=ca.dot(prices, slack))
 
 
 def _initial() -> Piece:
     """Given state; parameters: the state (12), its acceleration is what the first step is compared with."""
-    p = _Parameters()
+    p = Parameters()
     x = ca.SX.sym("x", STATE)
     rows = x - p(STATE)
     return Piece("initial", x, p.vector, rows=rows)
@@ -322,7 +200,7 @@ def _final() -> Piece:
     Parameters: centre (3), (2) cos and sin of the final yaw, square roots of the weights of centring, acceleration and
     angular momentum.
     """
-    p = _Parameters()
+    p = Parameters()
     x = ca.SX.sym("x", STATE)
     center, heading, weights = p(3), p(2), p(3)
     dx, dy, dz = ca.vertsplit(x[:3] - center)

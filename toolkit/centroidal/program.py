@@ -19,7 +19,8 @@ from toolkit.centroidal.body import (
     lowest_foot,
     swing_ankles,
 )
-from toolkit.centroidal.pieces import CONTACT, SLACKS, STATE, WRENCH, G, pieces
+from toolkit.centroidal.layout import Layout, indices
+from toolkit.centroidal.pieces import CONTACT, STATE, WRENCH, G, pieces
 from toolkit.centroidal.problem import CentroidalProblem
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
@@ -59,42 +60,6 @@ class Regularisers:
     final_spin: float = 200.0
     slack: float = 3000.0
     excess: float = 10.0
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where things are in the vector of variables.
-
-    Attributes:
-        offset: (N + 1,) first variable of each stage.
-        wrench: (N, 4) first variable of a limb's wrench; -1 where not active.
-        slack: (N + 1, 2) variables of the excess and of the body's slack; at the last knot both are the body's.
-        states, controls: (N + 1,) sizes.
-    """
-
-    offset: np.ndarray
-    wrench: np.ndarray
-    slack: np.ndarray
-    states: np.ndarray
-    controls: np.ndarray
-
-    @classmethod
-    def of(cls, active: np.ndarray) -> Layout:
-        """Layout for (N, 4) active contacts."""
-        count = active.sum(1)
-        controls = np.append(CONTACT * count + SLACKS, 1)
-        states = np.full(len(controls), STATE)
-        offset = np.concatenate([[0], np.cumsum(states + controls)[:-1]])
-        rank = np.cumsum(active, 1) - 1
-        wrench = np.where(active, offset[:-1, None] + STATE + CONTACT * rank, -1)
-        slack = (offset[:-1] + STATE + CONTACT * count)[:, None] + np.arange(SLACKS)
-        slack = np.concatenate([slack, np.full((1, SLACKS), offset[-1] + STATE)])
-        return cls(offset, wrench, slack, states, controls)
-
-    @property
-    def size(self) -> int:
-        """Number of variables."""
-        return int((self.states + self.controls).sum())
 
 
 class Program:
@@ -173,7 +138,7 @@ class Program:
             weights = np.sqrt(duration[step, None] * np.stack(squares, 1))
             wanted = np.array([p.margins.friction, *cop_margin[limb], p.margins.yaw])
             variables = np.concatenate(
-                [p_index(self.layout.wrench[step, limb], CONTACT), self.layout.slack[step, :1]], 1
+                [indices(self.layout.wrench[step, limb], CONTACT), self.layout.slack[step, :1]], 1
             )
             fixed = np.tile(np.concatenate([p.half_size[limb], wanted]), (len(step), 1))
             wanted_force = np.full(len(step), force)
@@ -203,7 +168,7 @@ class Program:
             self._add(pieces().leg, at, variables, *posture, np.tile(fixed, (len(at), 1)))
 
             step = np.flatnonzero(p.active[:, limb])
-            wrench = p_index(layout.wrench[step, limb], WRENCH)
+            wrench = indices(layout.wrench[step, limb], WRENCH)
             variables = np.concatenate([self._state(step, com, slice(3, 6)), wrench, layout.slack[step, 1:]], 1)
             sole, rotation = p.position[step, limb], p.rotation[step, limb]
             limits = np.array([leg.torques[role] for role in TORQUE_ROLES]) / weight
@@ -278,7 +243,7 @@ class Program:
             if not len(step):
                 continue
             limbs = np.nonzero(p.active[step])[1].reshape(-1, contacts)
-            wrench = p_index(layout.wrench[step[:, None], limbs].ravel(), WRENCH).reshape(len(step), -1)
+            wrench = indices(layout.wrench[step[:, None], limbs].ravel(), WRENCH).reshape(len(step), -1)
             variables = np.concatenate([self._state(step), wrench, self._state(step + 1)], 1)
             rotation = p.rotation[step[:, None], limbs].reshape(len(step), contacts, 9)
             pose = np.concatenate([rotation, p.position[step[:, None], limbs]], 2).reshape(len(step), -1)
@@ -294,7 +259,7 @@ class Program:
         self.variable_bounds = np.stack([np.full(layout.size, -np.inf), np.full(layout.size, np.inf)], 1)
         self.variable_bounds[layout.slack, 0] = 0.0
         step, limb = np.nonzero(p.active)
-        self.variable_bounds[p_index(layout.wrench[step, limb] + WRENCH, 2), 0] = 0.0
+        self.variable_bounds[indices(layout.wrench[step, limb] + WRENCH, 2), 0] = 0.0
         normal = layout.wrench[step, limb] + 2
         self.variable_bounds[normal, 0] = 0.0
         self.variable_bounds[normal, 1] = p.max_normal_force[limb] / (p.mass * G)
@@ -309,8 +274,3 @@ def _home_height(problem: CentroidalProblem) -> np.ndarray:
     np.add.at(total, knots[feet], positions[feet, 2])
     np.add.at(count, knots[feet], 1.0)
     return total / np.maximum(count, 1.0) + home
-
-
-def p_index(first: np.ndarray, size: int) -> np.ndarray:
-    """(n, size) consecutive indices from (n,) first ones."""
-    return first[:, None] + np.arange(size)

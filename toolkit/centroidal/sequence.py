@@ -13,14 +13,14 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
-from toolkit.centroidal.body import BodyMargins, BodyResiduals, body_residuals, knot_contacts
+from toolkit.centroidal.body import BodyMargins, knot_contacts
 from toolkit.centroidal.build import ProblemConfig, sequence_problem
+from toolkit.centroidal.layout import indices
 from toolkit.centroidal.pieces import WRENCH, G
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem, Margins
-from toolkit.centroidal.program import Program, Regularisers, p_index
-from toolkit.centroidal.residual import TOLERANCE, check, confirmed
+from toolkit.centroidal.program import Program, Regularisers
+from toolkit.centroidal.verdict import judged
 from toolkit.contacts.schedule import ContactSchedule
-from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 
 WANTED = Margins(friction=0.66, cop=(0.055, 0.045), yaw=0.6)
@@ -29,7 +29,6 @@ CONVERGED = "converged"
 HOPELESS = (0.05, 1.5)  # excess and slack of the body at which a sequence is infeasible, the solver converged or not
 # Fatrop's barrier for a start near the solution; for a sequence a few per cent different it saves nothing.
 WARM = {"mu_init": 1e-3, "bound_push": 1e-5, "bound_frac": 1e-5}
-BODY_TOLERANCE = 1e-5  # m, rad, part of a torque limit
 
 
 @dataclass(frozen=True)
@@ -105,13 +104,13 @@ def optimise_problem(
     start = time.perf_counter()
     program = Program(problem, robot, config.body, config.regularisers)
     x, status, iterations = _solve(program, _guess(program, warm), config.solver, config, warm is not None)
-    motion = _judged(_motion(program, x, status), program, robot, x)
+    motion = judged(_motion(program, x, status), robot, x[program.layout.slack])
     # Far beyond a physical limit the verdict will not change: Ipopt is asked only where it may.
     hopeless = np.isfinite(x).all() and (x[program.layout.slack[:-1]].max(0) > HOPELESS).any()
     if not motion.feasible and status != CONVERGED and config.solver == "fatrop" and not hopeless:
         x, status, count = _solve(program, _guess(program, warm), "ipopt", config)
         iterations += count
-        motion = _judged(_motion(program, x, status), program, robot, x)
+        motion = judged(_motion(program, x, status), robot, x[program.layout.slack])
     return replace(motion, iterations=iterations, seconds=time.perf_counter() - start)
 
 
@@ -194,8 +193,8 @@ def _guess(program: Program, warm: CentroidalMotion | None) -> np.ndarray:
         com = np.stack([np.convolve(padded[:, i], window / window.sum(), "valid") for i in range(3)], 1)
         velocity[:-1] = np.diff(com, axis=0) / p.dt[:, None]
     com[0], velocity[0] = p.com, p.com_velocity
-    x[p_index(layout.offset, 3)] = com
-    x[p_index(layout.offset + 3, 3)] = velocity
+    x[indices(layout.offset, 3)] = com
+    x[indices(layout.offset + 3, 3)] = velocity
     # The weight is shared, as far as it is inside the cones: a palm on a wall starts with a light touch.
     up = p.rotation[..., 2, :] / np.maximum(p.active[:, :2].sum(1), 1)[:, None, None]
     normal = np.maximum(up[..., 2], 0.02)
@@ -203,11 +202,11 @@ def _guess(program: Program, warm: CentroidalMotion | None) -> np.ndarray:
     inside = np.minimum(1.0, 0.5 * p.friction * normal / np.maximum(lateral, 1e-9))
     local = np.concatenate([up[..., :2] * inside[..., None], normal[..., None]], -1)
     step, limb = np.nonzero(p.active)
-    x[p_index(layout.wrench[step, limb], 3)] = local[step, limb]
+    x[indices(layout.wrench[step, limb], 3)] = local[step, limb]
     if warm is not None:
         _copy_wrenches(x, program, warm)
     start = 1e-4 if warm is not None else 0.01
-    x[p_index(layout.wrench[step, limb] + WRENCH, 2)] = start
+    x[indices(layout.wrench[step, limb] + WRENCH, 2)] = start
     x[layout.slack] = start
     return x
 
@@ -224,7 +223,7 @@ def _copy_wrenches(x: np.ndarray, program: Program, warm: CentroidalMotion) -> N
     cop, torque = warm.cop[at[step], limb], warm.yaw_torque[at[step], limb] / weight
     moment = np.stack([cop[:, 1] * force[:, 2], -cop[:, 0] * force[:, 2], torque], 1)
     moment[:, 2] += cop[:, 0] * force[:, 1] - cop[:, 1] * force[:, 0]
-    x[p_index(layout.wrench[step, limb], WRENCH)] = np.concatenate([force, moment], 1)
+    x[indices(layout.wrench[step, limb], WRENCH)] = np.concatenate([force, moment], 1)
 
 
 def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
@@ -233,8 +232,8 @@ def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
     n, weight = p.steps, p.mass * G
     local, moment = np.zeros((n, 4, 3)), np.zeros((n, 4, 3))
     step, limb = np.nonzero(p.active)
-    local[step, limb] = weight * x[p_index(layout.wrench[step, limb], 3)]
-    moment[step, limb] = weight * x[p_index(layout.wrench[step, limb] + 3, 3)]
+    local[step, limb] = weight * x[indices(layout.wrench[step, limb], 3)]
+    moment[step, limb] = weight * x[indices(layout.wrench[step, limb] + 3, 3)]
     normal = local[..., 2]
     loaded = normal > 1e-7 * weight
     scale = np.where(loaded, normal, 1.0)
@@ -255,64 +254,3 @@ def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
         seconds=0.0,
         iterations=0,
     )
-
-
-def _judged(motion: CentroidalMotion, program: Program, robot: RobotModel, x: np.ndarray) -> CentroidalMotion:
-    """The motion with the margins that it keeps, and the verdict of the independent checks."""
-    judged = motion
-    for margins in _margins(motion):
-        judged = confirmed(replace(motion, problem=replace(motion.problem, margins=margins)), TOLERANCE)
-        if judged.feasible:
-            break
-    body = body_residuals(judged, robot)
-    if judged.feasible and body.largest <= BODY_TOLERANCE:
-        return judged
-    reason, knot = _reason(judged, body, x[program.layout.slack])
-    time = None if knot is None else float(judged.problem.times[knot])
-    return replace(judged, feasible=False, status=f"{motion.status}; {reason}", failure_time=time)
-
-
-def _margins(motion: CentroidalMotion) -> list[Margins]:
-    """Margins that a motion may keep, the wanted ones first and the physical limits last.
-
-    Friction and CoP factors follow from the forces. The yaw range also depends on them and has no such simple answer:
-    ever wider margins are offered. A larger yaw factor alone is no looser where the other forces demand a yaw moment.
-    """
-    p, wanted = motion.problem, motion.problem.margins
-    accepted = TOLERANCE / 2  # of a weight
-    local = np.einsum("tlji,tlj->tli", p.rotation, motion.force) / (p.mass * G)
-    normal = np.maximum(local[..., 2], 1e-9)
-    lateral = np.hypot(local[..., 0], local[..., 1]) - accepted
-    friction = np.max(lateral / (np.maximum(p.friction, 1e-9) * normal), where=p.active, initial=wanted.friction)
-    from_edge = p.half_size - np.abs(motion.cop) + accepted / normal[..., None]
-    kept = np.min(from_edge, axis=0, where=p.active[..., None], initial=np.inf)
-    less = kept < p.half_size - p.reduced_half_size
-    cop = np.min(kept, axis=0, where=less, initial=np.inf)
-    friction, (cop_x, cop_y) = min(float(friction), 1.0), np.clip(cop, 0.0, wanted.cop).tolist()
-    offers = [wanted]
-    for part in np.linspace(0.0, 1.0, 6).tolist():
-        wider = friction + part * (1.0 - friction), ((1 - part) * cop_x, (1 - part) * cop_y)
-        offers += [Margins(*wider, wanted.yaw + part * (1.0 - wanted.yaw)), Margins(*wider, 1.0)]
-    return offers
-
-
-def _reason(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) -> tuple[str, int | None]:
-    """Which constraint is violated most, by how much, and where; and the knot, None where unknown."""
-    name, knot, limb = body.worst
-    limits = f"infeasible: {name} of {limb.label} beyond its limit by {body.largest:.3g} at knot {knot}", int(knot)
-    step = int(np.argmax(slack[:-1, 0]))
-    excess = slack[step, 0]
-    if body.largest > BODY_TOLERANCE and (slack[:, 1].max() - 1.0 >= excess or excess < 1e-5):
-        return limits
-    residuals = check(motion)
-    if excess < 1e-5 and residuals.largest < 1e-3:
-        return f"unsolved: {residuals.worst.replace('_', ' ')} is violated by {residuals.largest:.2g}", None
-    p = motion.problem
-    local = np.einsum("lji,lj->li", p.rotation[step], motion.force[step]) / (p.mass * G)
-    friction = np.hypot(local[:, 0], local[:, 1]) - p.friction[step] * local[:, 2]
-    edge = (np.abs(motion.cop[step]) - p.half_size).max(-1) * local[:, 2]
-    beyond = np.where(p.active[step], np.stack([friction, 5 * edge]), -np.inf)  # a sole is a fifth of a metre
-    kind, worst = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
-    what = ("friction", "centre of pressure")[kind] if beyond[kind, worst] > 0.0 else "yaw moment"
-    limb = Limb(int(worst))
-    return f"infeasible: {what} of {limb.label} beyond the physical limit at knot {step}", step
