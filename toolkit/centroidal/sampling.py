@@ -105,7 +105,7 @@ def sample_transition(
         raise AssertionError(f"sampled {category_of(stance, transition)!r} instead of {category!r}")
     world_from_mean = stance.mean_feet
     for _ in range(20):  # most states that the limbs cannot reach say nothing about dynamics
-        offset = np.array([0.0, 0.0, robot.com_height]) + rng.normal(size=3) * config.com_spread
+        offset: np.ndarray = np.array([0.0, 0.0, robot.com_height]) + rng.normal(size=3) * config.com_spread
         if _within_reach(robot, stance, world_from_mean, offset):
             break
     speed = config.speed_spread * (1.0 if rng.random() < 0.5 else 0.1)
