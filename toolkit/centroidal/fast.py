@@ -23,7 +23,7 @@ from toolkit.centroidal.residual import confirmed
 
 FIRST_KNOT_TOLERANCE = 1e-7
 """m; how far the given first knot may violate reach or height."""
-Arrays = tuple[np.ndarray, ...]
+Arrays = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 STATUS = {
     interior_point.SOLVED: "solved",
     interior_point.INFEASIBLE: "infeasible: proved by multipliers",
@@ -86,8 +86,9 @@ def wrenches(problem: CentroidalProblem, *, config: FastConfig | None = None) ->
 
 def _run(problem: CentroidalProblem, config: FastConfig) -> tuple[int, int, Arrays]:
     """Status, iterations and the arrays of the motion."""
-    code, iterations, *motion = _kernel()(float(config.tolerance), int(config.max_iterations), *_arguments(problem))
-    return code, iterations, tuple(motion)
+    solved = _kernel()(float(config.tolerance), int(config.max_iterations), *_arguments(problem))
+    code, iterations, com, linear, angular, force, cop, torque = solved
+    return code, iterations, (com, linear, angular, force, cop, torque)
 
 
 def _arguments(problem: CentroidalProblem) -> tuple:
