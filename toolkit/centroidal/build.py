@@ -196,7 +196,7 @@ def _problem(
         elif limb in robot.arms:
             arm = robot.arms[limb]
             root[limb], reach[limb] = arm.shoulder_in_com, arm.max_reach
-    used = active.any(0)
+    used = np.asarray(active.any(0))
     if landing is not None:
         used[landing.limb] = True
     for limb in range(4):

@@ -186,7 +186,7 @@ def _geometry(p: CentroidalProblem, com: np.ndarray) -> tuple[float, float]:
         limb = p.landing_limb
         touching[1, n, limb] = True
         tip[1, n, limb] = p.landing_position + p.landing_rotation @ p.tip_in_contact[limb]
-        if limb < 2:
+        if limb < 2 and p.landing_position is not None:
             floor[1, n, limb] = p.landing_position[2]
     cos, sin, zero = np.cos(p.yaw), np.sin(p.yaw), np.zeros(n + 1)
     heading = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, zero + 1]]).transpose(2, 0, 1)
