@@ -13,9 +13,11 @@ from toolkit.centroidal.program import Program, Regularisers
 from toolkit.centroidal.residual import check, cop_margin, objective
 from toolkit.centroidal.sequence import WANTED, WANTED_BODY, SequenceConfig, optimise
 from toolkit.contacts.schedule import ContactSchedule
-from toolkit.contacts.sequence import ContactSequence
-from toolkit.contacts.stance import Stance
-from toolkit.geometry.limb import FEET
+from toolkit.contacts.sequence import ContactSequence, ContactTransition
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.errors import InputError
+from toolkit.geometry.limb import FEET, PALMS
+from toolkit.geometry.pose import Pose
 from toolkit.robot.loader import find_robots, load_robot
 
 
@@ -127,6 +129,42 @@ def test_a_broken_motion_fails_the_checks(walker):
     for name, shift in [("force", 1.0), ("com", 1e-3), ("linear_momentum", 0.1), ("yaw_torque", 5.0), ("cop", 0.05)]:
         moved = replace(motion, **{name: getattr(motion, name) + shift})
         assert not check(moved).within(), name
+
+
+def test_contacts_that_are_not_finite_are_an_input_error(walker):
+    stance = Stance(tuple(foot(walker, limb, 0.0, friction=np.nan) for limb in FEET))
+    schedule = ContactSchedule.of(ContactSequence(stance, ()), final_rest=1.0)
+    with pytest.raises(InputError, match="not finite"):
+        optimise(walker, schedule, initial_com(walker, stance), np.zeros(3))
+
+
+def test_palm_presses_as_wanted(walker):
+    """A palm on a wall beside the robot: the plan holds it, presses gently, and lets go."""
+    limb = next((limb for limb in PALMS if limb in walker.arms), None)
+    if limb is None:
+        pytest.skip("no palm")
+    side = 1 if limb.is_left else -1
+    start, _ = walk(walker, 2, 0.2)
+    com = initial_com(walker, start)
+    arm = walker.arms[limb]
+    reach = (arm.min_reach + arm.max_reach) / 2
+    rotation = np.array([[1.0, 0, 0], [0, 0, -side], [0, side, 0]])
+    palm = Contact(limb, Pose(rotation, com + arm.shoulder_in_com + [0, side * reach, 0]), 0.5)
+    sequence = ContactSequence(start, (ContactTransition(limb, palm), ContactTransition(limb, None)))
+    schedule = ContactSchedule.of(sequence, final_rest=1.0)
+    motion = optimise(walker, schedule, com, np.zeros(3))
+    assert motion.feasible, motion.status
+    pressed = motion.problem.active[:, limb]
+    force = np.einsum("tij,ti->tj", motion.problem.rotation[:, limb], motion.force[:, limb])[:, 2]
+    weight = walker.mass * 9.81
+    assert pressed.any() and not force[~pressed].any()
+    np.testing.assert_allclose(force[pressed] / weight, Regularisers().palm_force, rtol=0.3)
+    away = palm.pose.position + [0, side * arm.max_reach, 0]
+    far = ContactTransition(limb, Contact(limb, Pose(rotation, away), 0.5))
+    schedule = ContactSchedule.of(ContactSequence(start, (far,)), final_rest=1.0)
+    refused = optimise(walker, schedule, com, np.zeros(3))
+    assert not refused.feasible and "arm reach" in refused.status
+    assert refused.failure_time is not None and refused.failure_time >= 2.0 - 0.21
 
 
 @pytest.fixture(scope="module")

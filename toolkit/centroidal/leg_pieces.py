@@ -36,11 +36,11 @@ def _posture(com: ca.SX, p: Parameters) -> tuple[Posture, ca.SX]:
     thigh, shin = p(), p()
     hip = com + hip_offset
     h = rotation.T @ (hip - ankle)
-    square = ca.sumsqr(h)
+    square = ca.sumsqr(h) + 1e-12
     length = ca.sqrt(square)
     roll = ca.atan2(h[1], h[2])
     cosine = (square + shin**2 - thigh**2) / (2 * shin * length)
-    lean = ca.atan2(h[0], ca.sqrt(h[1] ** 2 + h[2] ** 2)) + ca.acos(ca.fmin(ca.fmax(cosine, -0.9999), 0.9999))
+    lean = ca.atan2(h[0], ca.sqrt(h[1] ** 2 + h[2] ** 2 + 1e-12)) + ca.acos(ca.fmin(ca.fmax(cosine, -0.9999), 0.9999))
     axis = rotation @ ca.vertcat(0, ca.cos(roll), -ca.sin(roll))
     up = ca.vertcat(ca.sin(lean), ca.sin(roll) * ca.cos(lean), ca.cos(roll) * ca.cos(lean))
     knee = ankle + shin * (rotation @ up)
@@ -99,7 +99,7 @@ def torque() -> Piece:
         return ca.dot(axis, ca.cross(sole - point, force) + moment)
 
     w = posture.pitch_axis
-    roll_axis = ca.vertcat(w[1], -w[0], 0) / ca.sqrt(w[0] ** 2 + w[1] ** 2)
+    roll_axis = ca.vertcat(w[1], -w[0], 0) / ca.sqrt(w[0] ** 2 + w[1] ** 2 + 1e-12)
     torques = ca.vertcat(
         about(posture.knee, w),
         about(posture.hip, w),

@@ -21,6 +21,7 @@ from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem, Marg
 from toolkit.centroidal.program import Program, Regularisers
 from toolkit.centroidal.verdict import judged
 from toolkit.contacts.schedule import ContactSchedule
+from toolkit.errors import InputError
 from toolkit.robot.model import RobotModel
 
 WANTED = Margins(friction=0.66, cop=(0.055, 0.045), yaw=0.6)
@@ -77,7 +78,7 @@ def optimise(
         `status` names the constraint that is violated most, and where.
 
     Raises:
-        InputError: as `sequence_problem`.
+        InputError: as `sequence_problem`, or a contact is not finite.
     """
     start = time.perf_counter()
     problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem)
@@ -103,6 +104,8 @@ def optimise_problem(
     """Optimise a problem whose margins are the wanted ones; as `optimise`."""
     start = time.perf_counter()
     program = Program(problem, robot, config.body, config.regularisers)
+    if not np.isfinite(program.assembly.parameters).all():
+        raise InputError("a contact pose, a friction coefficient or a timing of the sequence is not finite")
     x, status, iterations = _solve(program, _guess(program, warm), config.solver, config, warm is not None)
     motion = judged(_motion(program, x, status), robot, x[program.layout.slack])
     # Far beyond a physical limit the verdict will not change: Ipopt is asked only where it may.
