@@ -104,8 +104,10 @@ def sample_transition(
     if category_of(stance, transition) != category:
         raise AssertionError(f"sampled {category_of(stance, transition)!r} instead of {category!r}")
     world_from_mean = stance.mean_feet
+    home = np.array([0.0, 0.0, robot.com_height])
+    offset = home
     for _ in range(20):  # most states that the limbs cannot reach say nothing about dynamics
-        offset: np.ndarray = np.array([0.0, 0.0, robot.com_height]) + rng.normal(size=3) * config.com_spread
+        offset = home + rng.normal(size=3) * config.com_spread
         if _within_reach(robot, stance, world_from_mean, offset):
             break
     speed = config.speed_spread * (1.0 if rng.random() < 0.5 else 0.1)
