@@ -55,14 +55,11 @@ class Piece:
         def function(kind: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> ca.Function:
             return ca.Function(f"{name}_{kind}", inputs, ca.cse(outputs))
 
-        def nonzeros(matrix: ca.SX) -> ca.SX:
-            return matrix.nz[:]
-
         self.cost = function("cost", [v, p], [cost])
         self.value = function("value", [v, p], [rows])
         self.gradient = function("gradient", [v, p], [cost, ca.densify(gradient)])
-        self.first = function("first", [v, p], [rows, nonzeros(jacobian)])
-        self.second = function("second", [v, p, weight, multiplier], [ca.densify(lagrangian), nonzeros(hessian)])
+        self.first = function("first", [v, p], [rows, jacobian.nz[:]])
+        self.second = function("second", [v, p, weight, multiplier], [ca.densify(lagrangian), hessian.nz[:]])
 
 
 class Parameters:
