@@ -10,6 +10,7 @@ from time import perf_counter
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion, CentroidalProblem
 from toolkit.centroidal.residual import confirmed
@@ -43,15 +44,15 @@ class _Program:
         self.guess.append(np.broadcast_to(guess, size))
         return x
 
-    def require(self, expression: ca.SX, lower=-np.inf, upper=np.inf) -> None:
+    def require(self, expression: ca.SX, lower: ArrayLike = -np.inf, upper: ArrayLike = np.inf) -> None:
         """Constrain lower <= expression <= upper."""
         rows = expression.numel()
         self.constraints.append(expression)
         self.lower.append(np.broadcast_to(lower, rows))
         self.upper.append(np.broadcast_to(upper, rows))
 
-    def solve(self, options: dict) -> tuple[ca.Function, ca.DM, dict]:
-        """Run Ipopt: the unknowns as a function's argument, the solution and the solver's statistics."""
+    def solve(self, options: dict) -> tuple[ca.SX, ca.DM, dict]:
+        """Run Ipopt: the unknowns in one vector, the solution and the solver's statistics."""
         x, g = ca.vertcat(*self.variables), ca.vertcat(*self.constraints)
         solver = ca.nlpsol("centroidal", "ipopt", {"x": x, "f": self.cost, "g": g}, options)
         bounds = {"lbg": np.concatenate(self.lower), "ubg": np.concatenate(self.upper)}
