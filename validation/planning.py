@@ -204,7 +204,7 @@ def main(argv: list[str] | None = None) -> int:
         kind_of(kind)
     console = make_console()
     settings = options.settings_of(args)
-    planners = list(dict.fromkeys([settings.planner, *([] if args.no_baseline else [BASELINE])]))
+    planners: list[str] = list(dict.fromkeys([settings.planner, *([] if args.no_baseline else [BASELINE])]))
     cases = [(case, planner) for planner in planners for case in make_cases(args.kinds, args.trials, args.seed_offset)]
     store = TrialFile(args.out / "trials.jsonl", settings.deciding())
     jobs = [
