@@ -30,6 +30,10 @@ def motion(data):
     return u, x, w
 
 
+def contact_terms(data, t, j, u, gradient, hessian):
+    return objective.contact_terms(data.omega[t], data.weights, data.cop_weight[j], u, gradient, hessian)
+
+
 def differences(function, x, step=1e-6):
     """Central differences of a scalar or vector function."""
     x = np.array(x, float)
@@ -44,8 +48,8 @@ def differences(function, x, step=1e-6):
 def test_gradient_of_a_contact(data, motion):
     u = motion[0][3].copy()
     gradient, hessian = np.empty(6), np.empty((6, 6))
-    objective.contact_terms(data, 0, 3, u, gradient, hessian)
-    numeric = differences(lambda v: objective.contact_terms(data, 0, 3, v, np.empty(6), np.empty((6, 6))), u)
+    contact_terms(data, 0, 3, u, gradient, hessian)
+    numeric = differences(lambda v: contact_terms(data, 0, 3, v, np.empty(6), np.empty((6, 6))), u)
     np.testing.assert_allclose(gradient, numeric[0], rtol=1e-6, atol=1e-6)  # second order of the differences
     np.testing.assert_allclose(hessian, hessian.T, atol=1e-12)
     assert np.linalg.eigvalsh(hessian).min() > -1e-9 * np.linalg.eigvalsh(hessian).max()
@@ -55,11 +59,11 @@ def test_hessian_of_a_contact_where_residuals_vanish(data):
     # With the CoP in the centre and no twist, Gauss-Newton is exact.
     u = np.array([0.02, -0.01, 0.5, 0.0, 0.0, 0.0])
     gradient, hessian = np.empty(6), np.empty((6, 6))
-    objective.contact_terms(data, 0, 3, u, gradient, hessian)
+    contact_terms(data, 0, 3, u, gradient, hessian)
 
     def slope(v):
         out = np.empty(6)
-        objective.contact_terms(data, 0, 3, v, out, np.empty((6, 6)))
+        contact_terms(data, 0, 3, v, out, np.empty((6, 6)))
         return out
 
     np.testing.assert_allclose(hessian, differences(slope, u), rtol=1e-5, atol=1e-4)
@@ -101,7 +105,7 @@ def test_value_is_the_sum_of_the_terms(data, motion):
     total = 0.0
     for t in range(len(data.h)):
         for j in range(data.first[t], data.first[t + 1]):
-            total += objective.contact_terms(data, t, j, u[j], np.empty(6), np.empty((6, 6)))
+            total += contact_terms(data, t, j, u[j], np.empty(6), np.empty((6, 6)))
         args = (data.h[t], data.omega[t], data.weights)
         total += objective.step_terms(*args, x[t], w[t], np.empty(15), np.empty((15, 15)))
         total += objective.knot_terms(*args[1:], x[t + 1], np.zeros(9), np.zeros((9, 9)))
@@ -150,7 +154,7 @@ def test_the_sweeps_solve_the_newton_system(data):
     x_of, w_of = np.zeros((contacts * 6, n + 1, 9)), np.zeros((contacts * 6, n, 6))
     for column, u in enumerate(unit):
         for t in range(n):
-            riccati.total_wrench(data, t, u, w_of[column, t])
+            riccati.total_wrench(data.first, data.wrench, t, u, w_of[column, t])
             riccati.forward(data.h[t], x_of[column, t], w_of[column, t], x_of[column, t + 1])
     hessian, gradient = np.zeros((contacts * 6,) * 2), np.zeros(contacts * 6)
     for j in range(contacts):

@@ -51,7 +51,8 @@ def linearise(data, u, x, w, y_rest, model, sweep):
     for t in range(n):
         h, omega = data.h[t], data.omega[t]
         for j in range(data.first[t], data.first[t + 1]):
-            value += objective.contact_terms(data, t, j, u[j], model.contact_gradient[j], sweep.hessian[j])
+            gradient, hessian = model.contact_gradient[j], sweep.hessian[j]
+            value += objective.contact_terms(omega, data.weights, data.cop_weight[j], u[j], gradient, hessian)
         gradient, hessian = model.step_gradient[t], model.step_hessian[t]
         value += objective.step_terms(h, omega, data.weights, x[t], w[t], gradient, hessian)
         gradient, hessian = model.knot_gradient[t + 1], model.knot_hessian[t + 1]
@@ -83,7 +84,7 @@ def slope(data, model, du, dx):
         for j in range(data.first[t], data.first[t + 1]):
             for a in range(6):
                 total += model.contact_gradient[j, a] * du[j, a]
-        riccati.total_wrench(data, t, du, dw)
+        riccati.total_wrench(data.first, data.wrench, t, du, dw)
         for a in range(9):
             total += model.knot_gradient[t + 1, a] * dx[t + 1, a] + model.step_gradient[t, a] * dx[t, a]
         for a in range(6):
@@ -221,7 +222,7 @@ def solve(data, tolerance, max_iterations, u, x, w):
     sweep = riccati.allocate(n, contacts)
     scratch = (np.empty((contacts, 6)), np.empty((n + 1, 9)))
     du, dx, u_trial = np.empty((contacts, 6)), np.empty((n + 1, 9)), np.empty((contacts, 6))
-    y_rest, y_refuting = np.zeros(3), np.zeros(3)
+    y_rest, velocity, y_refuting = np.zeros(3), np.zeros(3), np.zeros(3)
 
     constraints.constants(data, constant)
     start.follow(data, sweep, u, x, w)
@@ -245,24 +246,23 @@ def solve(data, tolerance, max_iterations, u, x, w):
         riccati.factor_contacts(data, sweep)
         riccati.factor_steps(data, model.knot_hessian, model.step_hessian, sweep)
 
-        # Predictor.
-        direction(data, model, sweep, scaling, residual, s, z, 0.0, False, targets, scratch, du, dx, ds, dz)
+        # Predictor; corrector; or a plain step where the corrector does not lower the barrier function.
         accepted = tolerance * (value + SMALL)
-        if worst < FEASIBLE and gap < accepted and abs(slope(data, model, du, dx)) < accepted:
-            return SOLVED, iteration
-        step = min(1.0, constraints.longest_step(s, ds), constraints.longest_step(z, dz))
-        # Far below the accepted gap the objective gains nothing, and unloaded contacts lose the digits of their CoP.
-        goal = mu * min(1.0, max((1.0 - step) ** 3, 0.2 * accepted / gap))
-
-        # Corrector, or a plain step where its second-order term does not lower the barrier function.
-        before = value + rest_terms(data, x, y_rest) - goal * constraints.barrier(s)
-        for attempt in range(2):
-            correct = attempt == 0
+        goal, before, step = 0.0, 0.0, 0.0
+        for phase in range(3):
+            correct = phase == 1
             direction(data, model, sweep, scaling, residual, s, z, goal, correct, targets, scratch, du, dx, ds, dz)
-            step = min(1.0, 0.99 * min(constraints.longest_step(s, ds), constraints.longest_step(z, dz)))
-            if data.rest and attempt == 0:
+            if phase == 0:
+                if worst < FEASIBLE and gap < accepted and abs(slope(data, model, du, dx)) < accepted:
+                    return SOLVED, iteration
+                step = min(1.0, constraints.longest_step(s, ds), constraints.longest_step(z, dz))
+                # Far below the accepted gap nothing is gained, and unloaded contacts lose the digits of their CoP.
+                goal = mu * min(1.0, max((1.0 - step) ** 3, 0.2 * accepted / gap))
+                before = value + rest_terms(data, x, y_rest) - goal * constraints.barrier(s)
                 for a in range(3):
-                    y_refuting[a] = x[n, 3 + a]
+                    velocity[a] = x[n, 3 + a]
+                continue
+            step = min(1.0, 0.99 * min(constraints.longest_step(s, ds), constraints.longest_step(z, dz)))
             # What full steps would change the Lagrangian by through the residual of the slacks.
             owed = constraints.dot(z, residual) + constraints.dot(dz, residual)
             lower = False
@@ -290,7 +290,7 @@ def solve(data, tolerance, max_iterations, u, x, w):
         if data.rest:
             for a in range(3):
                 # The velocity that the full step leads to.
-                y_rest[a] += step * REST_STIFFNESS * (y_refuting[a] + dx[n, 3 + a])
+                y_rest[a] += step * REST_STIFFNESS * (velocity[a] + dx[n, 3 + a])
         constraints.add(s, step, ds)
         constraints.add(z, step, dz)
         for a in range(3):

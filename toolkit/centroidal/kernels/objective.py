@@ -23,16 +23,15 @@ def rollout(data, u, x, w):
     for a in range(9):
         x[0, a] = data.x0[a]
     for t in range(data.h.shape[0]):
-        riccati.total_wrench(data, t, u, w[t])
+        riccati.total_wrench(data.first, data.wrench, t, u, w[t])
         advance(data.h[t], x[t], w[t], x[t + 1])
 
 
 @compiled
-def contact_terms(data, t, j, u, gradient, hessian):
-    """Gradient (6,) and Gauss-Newton Hessian (6, 6) of the terms of contact j in step t; returns their value."""
-    omega, weights = data.omega[t], data.weights
+def contact_terms(omega, weights, cop_weight, u, gradient, hessian):
+    """Gradient (6,) and Gauss-Newton Hessian (6, 6) of a contact's terms; returns their value."""
     weight_f, weight_lateral, weight_torque = omega * weights[4], omega * weights[6], omega * weights[5]
-    weight_x, weight_y = omega * data.cop_weight[j, 0], omega * data.cop_weight[j, 1]
+    weight_x, weight_y = omega * cop_weight[0], omega * cop_weight[1]
     inverse = 1.0 / u[2]
     cop_x, cop_y = -u[4] * inverse, u[3] * inverse
     twist = u[5] + (u[4] * u[1] + u[3] * u[0]) * inverse

@@ -262,13 +262,14 @@ def step_forward(data, t, contact_gradient, sweep, dx, du):
 
 
 @compiled
-def total_wrench(data, t, u, w):
+def total_wrench(first, wrench, t, u, w):
     """Fill w (6,) with the sum of the wrenches u (C, 6) of step t about the origin."""
-    w[:] = 0.0
-    for j in range(data.first[t], data.first[t + 1]):
+    for a in range(6):
+        w[a] = 0.0
+    for j in range(first[t], first[t + 1]):
         for a in range(6):
             for b in range(6):
-                w[a] += data.wrench[j, a, b] * u[j, b]
+                w[a] += wrench[j, a, b] * u[j, b]
 
 
 @compiled
@@ -279,5 +280,5 @@ def solve(data, contact_gradient, knot_gradient, step_gradient, sweep, du, dx):
     dx[0] = 0.0
     for t in range(data.h.shape[0]):
         step_forward(data, t, contact_gradient, sweep, dx[t], du)
-        total_wrench(data, t, du, dw)
+        total_wrench(data.first, data.wrench, t, du, dw)
         forward(data.h[t], dx[t], dw, dx[t + 1])

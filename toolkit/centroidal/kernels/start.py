@@ -30,21 +30,21 @@ def share_weight(data, t, u):
         for a in range(3):
             u[j, a] = share * data.rotation[j, 2, a]
             u[j, 3 + a] = 0.0
-        pull_inside(data, j, u[j])
+        pull_inside(data.mu[j], data.force_bound[j], data.rows[j], u[j])
 
 
 @compiled
-def pull_inside(data, j, u):
-    """Shrink a wrench (6,) of contact j until it lies inside its cones."""
-    u[2] = min(max(u[2], 0.02), INSIDE * data.force_bound[j])
+def pull_inside(mu, bound, rows, u):
+    """Shrink a wrench (6,) of a contact until it lies inside its cones."""
+    u[2] = min(max(u[2], 0.02), INSIDE * bound)
     factor = 1.0
     lateral = math.sqrt(u[0] * u[0] + u[1] * u[1])
-    if lateral > INSIDE * data.mu[j] * u[2]:
-        factor = INSIDE * data.mu[j] * u[2] / lateral
+    if lateral > INSIDE * mu * u[2]:
+        factor = INSIDE * mu * u[2] / lateral
     for i in range(1, ROWS):  # f_z - load >= 0
         load = u[2]
         for a in range(6):
-            load -= data.rows[j, i, a] * u[a]
+            load -= rows[i, a] * u[a]
         if load * factor > INSIDE * u[2]:
             factor = INSIDE * u[2] / load
     for a in range(6):
@@ -65,7 +65,7 @@ def follow(data, sweep, u, x, w):
     # Everything below is the quadratic model around the guess, taken at x = 0, w = 0 plus the sharing wrenches' own.
     for t in range(n):
         share_weight(data, t, u)
-        riccati.total_wrench(data, t, u, w[t])
+        riccati.total_wrench(data.first, data.wrench, t, u, w[t])
         for k in range(2):
             for a in range(3):
                 x_guess[k, a] = data.guess[t + k, a]
@@ -112,6 +112,6 @@ def follow(data, sweep, u, x, w):
         for j in range(data.first[t], data.first[t + 1]):
             for a in range(6):
                 u[j, a] += du[j, a]
-            pull_inside(data, j, u[j])
-        riccati.total_wrench(data, t, u, w[t])
+            pull_inside(data.mu[j], data.force_bound[j], data.rows[j], u[j])
+        riccati.total_wrench(data.first, data.wrench, t, u, w[t])
         objective.advance(data.h[t], x[t], w[t], x[t + 1])
