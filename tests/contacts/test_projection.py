@@ -40,9 +40,9 @@ def test_soles_lie_wholly_on_the_highest_surface_that_holds_them():
     surfaces, regions = zip(*(random_surface(rng, i) for i in range(12)), strict=True)
     projector = Projector(ROBOT, surfaces, EMPTY, ProjectionConfig(margin=0.01))
     half = np.array([0.12, 0.075])
-    pose = np.column_stack([rng.uniform(-1.5, 1.5, (700, 2)), rng.uniform(-4, 4, 700)])
+    pose = np.column_stack([rng.uniform(-1.5, 1.5, (400, 2)), rng.uniform(-4, 4, 400)])
     result = projector.project_soles(Limb.LEFT_FOOT, pose, -0.5, 0.4, shift=False)
-    assert 50 < result.found.sum() < 650
+    assert 30 < result.found.sum() < 370
     for row in range(len(pose)):
         valid = []
         for surface, region in zip(surfaces, regions, strict=True):

@@ -46,7 +46,8 @@ def test_swings_do_not_cross_the_stance_leg():
     half = np.array([0.11, 0.065]) + 0.01
     stand, old = np.array([0.0, -0.1, 0.0]), np.array([-0.3, 0.1, 0.0])
     new = np.array([[0.3, 0.1, 0.0], [0.3, -0.35, 0.0], [-0.29, 0.1, 0.0], [3.0, 0.1, 0.0]])
-    codes = screen.screen_swings(new, np.zeros(4), old, 0.0, stand, 0.0, half, 2.0, 0.04, 0.1)
+    codes = np.empty(4, np.int64)
+    screen.screen_swings(new, np.zeros(4), old, 0.0, stand, 0.0, half, 2.0, 0.04, 0.1, codes)
     assert codes.tolist() == [0, screen.CROSSES, screen.STILL, screen.FAST]
 
 

@@ -78,9 +78,14 @@ def surface_table(surfaces: Sequence[Surface], reach: float, cell: float = 0.1) 
     cell = max(cell, float(np.sqrt((high - low + cell).prod() / _MAX_CELLS)))
     corner = low - cell * (1.0 + _OFFSET)
     shape = (np.ceil((high - corner) / cell) + 1).astype(np.int64)
-    index = _index(
-        origin, rotation, edges, start, np.flatnonzero(foot), lower[:, :2], upper[:, :2], corner, cell, shape, reach
-    )
+    used = np.flatnonzero(foot)
+    first = ((lower[used, :2] - corner) / cell).astype(np.int64)
+    last = ((upper[used, :2] - corner) / cell).astype(np.int64) + 1
+    ranges = np.stack([first[:, 0], last[:, 0], first[:, 1], last[:, 1]], axis=1)
+    ends = origin[owner][:, None] + np.einsum("nij,nkj->nki", rotation[owner][:, :, :2], edges.reshape(-1, 2, 2))
+    edges_xy = np.ascontiguousarray(ends[..., :2]).reshape(-1, 4)
+    near_distance = reach + cell * np.sqrt(0.5)
+    index = _index(edges_xy, start, used, ranges, corner, cell, shape, near_distance)
     return SurfaceTable(
         origin=origin,
         rotation=rotation,
@@ -98,7 +103,7 @@ def surface_table(surfaces: Sequence[Surface], reach: float, cell: float = 0.1) 
     )
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _distance_to_segment(x, y, ax, ay, bx, by):
     """Distance from a point to a segment."""
     dx, dy = bx - ax, by - ay
@@ -107,65 +112,75 @@ def _distance_to_segment(x, y, ax, ay, bx, by):
     return np.hypot(ax + t * dx - x, ay + t * dy - y)
 
 
-@numba.njit(cache=True)
-def _index(origin, rotation, edges, edge_start, surfaces, lower, upper, corner, cell, shape, reach):
-    """Entries by cell; see `SurfaceTable`."""
-    cells = shape[0] * shape[1]
-    count = np.zeros(cells + 1, np.int64)
-    ranges = np.empty((len(surfaces), 4), np.int64)
+def _index(
+    edges_xy: np.ndarray,
+    edge_start: np.ndarray,
+    surfaces: np.ndarray,
+    ranges: np.ndarray,
+    corner: np.ndarray,
+    cell: float,
+    shape: np.ndarray,
+    near_distance: float,
+) -> tuple[np.ndarray, ...]:
+    """The last five fields of `SurfaceTable`: count entries, then the edges near them, then fill.
+
+    Args:
+        edges_xy: (E, 4) m; both ends of the edges in the world's XY.
+        edge_start: (S + 1,) int.
+        surfaces: (k,) int; those that serve feet.
+        ranges: (k, 4) int; cells that each surface covers: i from, to, j from, to.
+        corner: (2,) m.
+        cell: m.
+        shape: (2,) int.
+        near_distance: m; edges this near to a cell's centre count.
+    """
+    count = np.zeros((shape[0] + 1, shape[1] + 1), np.int64)  # by differences: every range adds a rectangle
+    for low, high, sign in ((0, 2, 1), (1, 3, 1), (0, 3, -1), (1, 2, -1)):
+        np.add.at(count, (ranges[:, low], ranges[:, high]), sign)
+    per_cell = count.cumsum(0).cumsum(1)[: shape[0], : shape[1]].ravel()
+    entry_start = np.concatenate([[0], np.cumsum(per_cell)])
+    total = int(entry_start[-1])
+    entry_surface, entry_inside = np.zeros(total, np.int64), np.zeros(total, bool)
+    near_start, near = np.zeros(total + 1, np.int64), np.zeros(0, np.int64)
+    columns = int(shape[1])
+    fixed = (edges_xy, edge_start, surfaces, ranges, corner, cell, columns, near_distance)
+    _fill(*fixed, entry_start[:-1].copy(), entry_surface, entry_inside, near_start, near)
+    near_start = np.cumsum(near_start)
+    near = np.zeros(int(near_start[-1]), np.int64)
+    if len(near):
+        _fill(*fixed, entry_start[:-1].copy(), entry_surface, entry_inside, near_start, near)
+    return entry_start, entry_surface, entry_inside, near_start, near
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _fill(
+    xy, edge_start, surfaces, ranges, corner, cell, columns, near_distance, fill, entry_surface, entry_inside,
+    near_start, near,
+):  # fmt: skip
+    """Fill the entries; counts the near edges of entry k in near_start[k + 1] while `near` has no room."""
+    write = len(near) > 0
     for k in range(len(surfaces)):
-        s = surfaces[k]
-        for axis in range(2):
-            ranges[k, 2 * axis] = int((lower[s, axis] - corner[axis]) / cell)
-            ranges[k, 2 * axis + 1] = int((upper[s, axis] - corner[axis]) / cell) + 1
+        first, last = edge_start[surfaces[k]], edge_start[surfaces[k] + 1]
         for i in range(ranges[k, 0], ranges[k, 1]):
             for j in range(ranges[k, 2], ranges[k, 3]):
-                count[i * shape[1] + j + 1] += 1
-    entry_start = np.cumsum(count)
-    total = entry_start[-1]
-    entry_surface = np.empty(total, np.int64)
-    entry_edges = np.zeros(total + 1, np.int64)  # becomes near_start
-    entry_inside = np.zeros(total, np.bool_)
-    fill = entry_start[:-1].copy()
-    near_distance = reach + cell * np.sqrt(0.5)
-    near = np.empty(0, np.int64)
-    for step in range(2):  # count the near edges, then write them
-        fill[:] = entry_start[:-1]
-        if step == 1:
-            entry_edges = np.cumsum(entry_edges)
-            near = np.empty(entry_edges[-1], np.int64)
-        for k in range(len(surfaces)):
-            s = surfaces[k]
-            first, last = edge_start[s], edge_start[s + 1]
-            xy = np.empty((last - first, 4))
-            for e in range(first, last):
-                for end in range(2):
-                    u, v = edges[e, 2 * end], edges[e, 2 * end + 1]
-                    for axis in range(2):
-                        xy[e - first, 2 * end + axis] = (
-                            origin[s, axis] + rotation[s, axis, 0] * u + rotation[s, axis, 1] * v
-                        )
-            for i in range(ranges[k, 0], ranges[k, 1]):
-                for j in range(ranges[k, 2], ranges[k, 3]):
-                    x, y = corner[0] + (i + 0.5) * cell, corner[1] + (j + 0.5) * cell
-                    entry = fill[i * shape[1] + j]
-                    fill[i * shape[1] + j] += 1
-                    written = 0
-                    inside = False
-                    for e in range(last - first):
-                        ax, ay, bx, by = xy[e, 0], xy[e, 1], xy[e, 2], xy[e, 3]
-                        if (ay > y) != (by > y) and x < ax + (y - ay) / (by - ay) * (bx - ax):
-                            inside = not inside
-                        if min(ax, bx) - x > near_distance or x - max(ax, bx) > near_distance:
-                            continue
-                        if min(ay, by) - y > near_distance or y - max(ay, by) > near_distance:
-                            continue
-                        if _distance_to_segment(x, y, ax, ay, bx, by) <= near_distance:
-                            if step == 1:
-                                near[entry_edges[entry] + written] = first + e
-                            written += 1
-                    if step == 0:
-                        entry_surface[entry] = s
-                        entry_inside[entry] = inside
-                        entry_edges[entry + 1] = written
-    return entry_start, entry_surface, entry_inside, entry_edges, near
+                x, y = corner[0] + (i + 0.5) * cell, corner[1] + (j + 0.5) * cell
+                entry = fill[i * columns + j]
+                fill[i * columns + j] += 1
+                written = 0
+                inside = False
+                for e in range(first, last):
+                    ax, ay, bx, by = xy[e, 0], xy[e, 1], xy[e, 2], xy[e, 3]
+                    if (ay > y) != (by > y) and x < ax + (y - ay) / (by - ay) * (bx - ax):
+                        inside = not inside
+                    if min(ax, bx) - x > near_distance or x - max(ax, bx) > near_distance:
+                        continue
+                    if min(ay, by) - y > near_distance or y - max(ay, by) > near_distance:
+                        continue
+                    if _distance_to_segment(x, y, ax, ay, bx, by) <= near_distance:
+                        if write:
+                            near[near_start[entry] + written] = e
+                        written += 1
+                entry_surface[entry] = surfaces[k]
+                entry_inside[entry] = inside
+                if not write:
+                    near_start[entry + 1] = written

@@ -136,10 +136,10 @@ class AnaStarConfig:
 
     epsilon: float = 0.1
     initial_cost: float = math.inf
-    crowding: float = 0.0
+    crowding: float = 0.3
     patience: int = 200
     max_expansions: int | None = None
-    max_states: int = 1_000_000
+    max_states: int = 700_000
     report_interval: float = 0.1
 
 

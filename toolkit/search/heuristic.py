@@ -98,17 +98,17 @@ class GridDistance:
         self._corner = np.array(bounds[:2], float)
         levels = self._levels(projector, shape, stride)
         self._height = levels
-        nodes, count = _nodes(
+        nodes = np.full((*levels.shape, config.yaws), -1, np.int32)
+        count = _nodes(
             levels,
             self._corner,
             cell,
-            config.yaws,
             occupancy.corner,
             occupancy.cell,
             occupancy.below,
             np.array([box.half_depth, box.half_width, box.bottom, box.top]),
+            nodes,
         )
-        self._nodes = nodes
         self._distance = np.full(nodes.shape, np.inf, np.float64)
         middle = self._corner + cell * np.stack(np.meshgrid(*(np.arange(k) for k in shape), indexing="ij"), axis=-1)
         inside = np.hypot(*(middle - goal.position[:2]).transpose(2, 0, 1)) <= max(goal.radius, 0.75 * cell)
@@ -116,7 +116,11 @@ class GridDistance:
         targets = targets[targets >= 0]
         self.supported = bool((levels[inside] > -np.inf).any())
         if len(targets):
-            start, end, weight = _edges(nodes, levels, count, cell, config.climb, config.turn)
+            start, none = np.zeros(count + 1, np.int32), np.zeros(0)
+            grid = (nodes, levels, cell, config.climb, config.turn, start)
+            edges = _edges(*grid, none.astype(np.int32), none)
+            end, weight = np.empty(edges, np.int32), np.empty(edges)
+            _edges(*grid, end, weight)
             graph = csr_matrix((weight, end, start), shape=(count, count))
             distance = dijkstra(graph, directed=True, indices=targets, min_only=True)
             self._distance[nodes >= 0] = distance[nodes[nodes >= 0]]
@@ -124,30 +128,34 @@ class GridDistance:
     def _levels(self, projector: Projector, shape: np.ndarray, stride: float) -> np.ndarray:
         """(nx, ny, 4) float heights of ground in reach of each cell, -inf where there is none."""
         cell = self._cell
-        low = _sole_levels(
+        low = np.full((*shape, _LEVELS), -np.inf)
+        _sole_levels(
             self._corner,
             cell,
-            shape,
             projector.half_sizes[Limb.LEFT_FOOT],
             np.ascontiguousarray(projector.offsets),
             self.config.merge,
             projector.table,
+            low,
         )
         reach = stride / 2 / cell
         k = int(np.floor(reach))
         disc = [(i, j) for i in range(-k, k + 1) for j in range(-k, k + 1) if 0 < i * i + j * j <= reach**2]
         disc.sort(key=lambda ij: (ij[0] ** 2 + ij[1] ** 2, ij))
-        return _spread(low, np.array(disc, np.int64).reshape(-1, 2), self.config.merge)
+        levels = low.copy()
+        _spread(low, np.array(disc, np.int64).reshape(-1, 2), self.config.merge, levels)
+        return levels
 
     def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """See `Distance`; at least the straight line."""
         position, yaw = np.ascontiguousarray(position, dtype=float), np.ascontiguousarray(yaw, dtype=float)
-        grid = _query(position, yaw, self._corner, self._cell, self._height, self._distance)
+        grid = np.empty(len(position))
+        _query(position, yaw, self._corner, self._cell, self._height, self._distance, grid)
         straight = np.hypot(*(position[:, :2] - self._goal.position[:2]).T) - self._goal.radius
         return np.maximum(np.maximum(grid * _OCTILE - 0.5 * self._cell, straight), 0.0)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _add_level(levels, z, merge):
     """Note a height in a list that falls, -inf where free; of close heights the highest stays."""
     for k in range(len(levels)):
@@ -161,12 +169,11 @@ def _add_level(levels, z, merge):
             return
 
 
-@numba.njit(cache=True)
-def _sole_levels(corner, cell, shape, half, offsets, merge, table):
-    """(nx, ny, 4) heights at which a sole has room in each cell, in any of four headings and with a small shift."""
-    result = np.full((shape[0], shape[1], _LEVELS), -np.inf)
-    for a in range(shape[0]):
-        for b in range(shape[1]):
+@numba.njit(cache=True, error_model="numpy")
+def _sole_levels(corner, cell, half, offsets, merge, table, result):
+    """Fill heights (nx, ny, 4) at which a sole has room in each cell, in any of four headings, with a small shift."""
+    for a in range(result.shape[0]):
+        for b in range(result.shape[1]):
             for k in range(len(offsets)):
                 x, y = corner[0] + a * cell + offsets[k, 0], corner[1] + b * cell + offsets[k, 1]
                 place = cell_of(table, x, y)
@@ -184,13 +191,11 @@ def _sole_levels(corner, cell, shape, half, offsets, merge, table):
                         if sole_fits(table, place, entry, x, y, np.cos(angle), np.sin(angle), half):
                             _add_level(result[a, b], z, merge)
                             break
-    return result
 
 
-@numba.njit(cache=True)
-def _spread(levels, disc, merge):
-    """Heights of each cell and of the cells around it, its own first, the nearer before the farther."""
-    result = levels.copy()
+@numba.njit(cache=True, error_model="numpy")
+def _spread(levels, disc, merge, result):
+    """Add to a copy of the heights of each cell those of the cells around it, the nearer before the farther."""
     for a in range(levels.shape[0]):
         for b in range(levels.shape[1]):
             for k in range(len(disc)):
@@ -209,11 +214,11 @@ def _spread(levels, disc, merge):
     return result
 
 
-@numba.njit(cache=True)
-def _nodes(levels, corner, cell, yaws, body_corner, body_cell, below, box):
-    """(nx, ny, 4, yaws) index of each cell in which the body fits, -1 elsewhere, and how many there are."""
-    nodes = np.full((levels.shape[0], levels.shape[1], _LEVELS, yaws), -1, np.int32)
+@numba.njit(cache=True, error_model="numpy")
+def _nodes(levels, corner, cell, body_corner, body_cell, below, box, nodes):
+    """Number in (nx, ny, 4, yaws) nodes the cells in which the body fits; returns how many there are."""
     count = 0
+    yaws = nodes.shape[3]
     for a in range(levels.shape[0]):
         for b in range(levels.shape[1]):
             for m in range(_LEVELS):
@@ -225,17 +230,18 @@ def _nodes(levels, corner, cell, yaws, body_corner, body_cell, below, box):
                     if body_free(body_corner, body_cell, below, box, x, y, z, k * np.pi / yaws):
                         nodes[a, b, m, k] = count
                         count += 1
-    return nodes, count
+    return count
 
 
-@numba.njit(cache=True)
-def _edges(nodes, levels, count, cell, climb, turn):
-    """Compressed rows of the grid graph: starts, ends, lengths. Every edge goes both ways."""
-    start = np.zeros(count + 1, np.int32)
-    end = np.empty(count * (8 * 2 + 2), np.int32)
-    weight = np.empty(len(end))
+@numba.njit(cache=True, error_model="numpy")
+def _edges(nodes, levels, cell, climb, turn, start, end, weight):
+    """Compressed rows of the grid graph; every edge goes both ways.
+
+    Fills start (count + 1,) and returns the number of edges; with room for them also their ends and lengths.
+    """
     used = 0
     yaws = nodes.shape[3]
+    write = len(end) > 0
     for a in range(nodes.shape[0]):
         for b in range(nodes.shape[1]):
             for m in range(_LEVELS):
@@ -243,29 +249,28 @@ def _edges(nodes, levels, count, cell, climb, turn):
                     node = nodes[a, b, m, k]
                     if node < 0:
                         continue
-                    for step in (-1, 1):
+                    for step in range(-1, 2, 2):
                         other = nodes[a, b, m, (k + step) % yaws]
                         if other >= 0 and other != node:
-                            end[used], weight[used] = other, turn
+                            if write:
+                                end[used], weight[used] = other, turn
                             used += 1
                     for i in range(max(a - 1, 0), min(a + 2, nodes.shape[0])):
                         for j in range(max(b - 1, 0), min(b + 2, nodes.shape[1])):
                             if i == a and j == b:
                                 continue
-                            length = cell * np.sqrt((i - a) ** 2 + (j - b) ** 2)
                             for n in range(_LEVELS):
                                 other = nodes[i, j, n, k]
                                 if other >= 0 and abs(levels[i, j, n] - levels[a, b, m]) <= climb:
-                                    if used == len(end):
-                                        end = np.concatenate((end, np.empty(used, np.int32)))
-                                        weight = np.concatenate((weight, np.empty(used)))
-                                    end[used], weight[used] = other, length
+                                    if write:
+                                        end[used] = other
+                                        weight[used] = cell * np.sqrt(float((i - a) ** 2 + (j - b) ** 2))
                                     used += 1
                     start[node + 1] = used
-    return start, end[:used], weight[:used]
+    return used
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _cell_value(height, distance, i, j, z, layer, span):
     """Least distance of a cell over the yaw layers around one, at the level nearest to a height."""
     if i < 0 or j < 0 or i >= height.shape[0] or j >= height.shape[1]:
@@ -282,15 +287,14 @@ def _cell_value(height, distance, i, j, z, layer, span):
     return best
 
 
-@numba.njit(cache=True)
-def _query(position, yaw, corner, cell, height, distance):
-    """Distance (n,), interpolated between cells; near cells stand in where the four around a point are blocked."""
-    result = np.full(len(position), np.inf)
+@numba.njit(cache=True, error_model="numpy")
+def _query(position, yaw, corner, cell, height, distance, result):
+    """Fill distances (n,), interpolated between cells; others near stand in where the four around are blocked."""
     yaws = distance.shape[3]
     for row in range(len(position)):
         x, y = (position[row, 0] - corner[0]) / cell, (position[row, 1] - corner[1]) / cell
         z = position[row, 2]
-        layer = int(np.round(yaw[row] / np.pi * yaws)) % yaws
+        layer = int(np.floor(yaw[row] / np.pi * yaws + 0.5)) % yaws
         i, j = int(np.floor(x)), int(np.floor(y))
         fx, fy = x - i, y - j
         total, weights = 0.0, 0.0
@@ -304,10 +308,10 @@ def _query(position, yaw, corner, cell, height, distance):
         if weights > 0.0:
             result[row] = total / weights
             continue
+        result[row] = np.inf
         for di in range(-2, 4):
             for dj in range(-2, 4):
                 value = _cell_value(height, distance, i + di, j + dj, z, layer, 2)
                 if value < np.inf:
                     away = cell * np.sqrt((di - fx) ** 2 + (dj - fy) ** 2)
                     result[row] = min(result[row], value + away)
-    return result

@@ -57,12 +57,12 @@ def legs_of(robot: RobotModel, margins: ReachMargins) -> Legs:
     )
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _outside(ranges, k, angle):
     return angle < ranges[k, 0] or angle > ranges[k, 1]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def violated(legs, side, cx, cy, cz, yaw, position, rotation):
     """Index in `LIMITS` of the first limit that a leg breaks, -1 where it reaches.
 
@@ -116,8 +116,34 @@ def violated(legs, side, cx, cy, cz, yaw, position, rotation):
     return -1
 
 
-@numba.njit(cache=True)
-def stances_violated(legs, com, drops, yaw, left, left_rotation, right, right_rotation):
+@numba.njit(cache=True, error_model="numpy")
+def _stances_violated(legs, left_side, com, drops, yaw, left, left_rotation, right, right_rotation, result):
+    """Fill the result of `stances_violated`."""
+    for row in range(len(com)):
+        first = -1
+        for k in range(len(drops)):
+            x, y, z = com[row, 0], com[row, 1], com[row, 2] - drops[k]
+            broken = violated(legs, left_side, x, y, z, yaw[row], left[row], left_rotation[row])
+            if broken < 0:
+                broken = violated(legs, left_side + 1, x, y, z, yaw[row], right[row], right_rotation[row])
+            if broken < 0:
+                first = -1
+                break
+            if k == 0:
+                first = broken
+        result[row] = first
+
+
+def stances_violated(
+    legs: Legs,
+    com: np.ndarray,
+    drops: np.ndarray,
+    yaw: np.ndarray,
+    left: np.ndarray,
+    left_rotation: np.ndarray,
+    right: np.ndarray,
+    right_rotation: np.ndarray,
+) -> np.ndarray:
     """Per stance the first limit broken by either leg, -1 where both reach with some drop of the CoM.
 
     Args:
@@ -134,17 +160,5 @@ def stances_violated(legs, com, drops, yaw, left, left_rotation, right, right_ro
         (n,) int; index in `LIMITS` for the first drop, or -1.
     """
     result = np.empty(len(com), np.int64)
-    for row in range(len(com)):
-        first = -1
-        for k in range(len(drops)):
-            x, y, z = com[row, 0], com[row, 1], com[row, 2] - drops[k]
-            broken = violated(legs, 0, x, y, z, yaw[row], left[row], left_rotation[row])
-            if broken < 0:
-                broken = violated(legs, 1, x, y, z, yaw[row], right[row], right_rotation[row])
-            if broken < 0:
-                first = -1
-                break
-            if k == 0:
-                first = broken
-        result[row] = first
+    _stances_violated(legs, 0, com, drops, yaw, left, left_rotation, right, right_rotation, result)
     return result

@@ -139,11 +139,12 @@ class MoveGenerator:
     ) -> np.ndarray:
         """Codes (n,) of soles beside a standing foot; see `screen_steps`."""
         table, occupancy = self._table, self._occupancy
-        return screen.screen_steps(
-            surface,
-            position,
-            rotation,
-            yaw,
+        codes = np.empty(len(surface), np.int64)
+        screen.screen_steps(
+            np.asarray(surface, np.int64),
+            np.ascontiguousarray(position),
+            np.ascontiguousarray(rotation),
+            np.ascontiguousarray(yaw),
             int(limb),
             table.position[standing],
             table.rotation[standing],
@@ -158,12 +159,15 @@ class MoveGenerator:
             occupancy.corner,
             occupancy.cell,
             occupancy.below,
+            codes,
         )
+        return codes
 
     def swings(self, limb: Limb, numbers: np.ndarray, old: int, standing: int, longest: float) -> np.ndarray:
         """Codes (n,) of the ways of a foot from `old` to each new place; see `screen_swings`."""
         table, config = self._table, self._config
-        return screen.screen_swings(
+        codes = np.empty(len(numbers), np.int64)
+        screen.screen_swings(
             table.position[numbers],
             table.yaw[numbers],
             table.position[old],
@@ -174,7 +178,9 @@ class MoveGenerator:
             longest,
             config.still,
             config.still_yaw,
+            codes,
         )
+        return codes
 
     def palms(self, limb: Limb, left: int, right: int) -> Moves:
         """Places for a palm with the feet at `left` and `right`."""

@@ -98,7 +98,8 @@ class Occupancy:
         shape = np.ceil(extent / cell).astype(np.int64) + 1
         triangles = world_triangles(model, lower, upper)
         occupied = np.zeros(tuple(shape), np.bool_)
-        _rasterise(np.ascontiguousarray((triangles - lower) / cell), occupied)
+        scratch = np.empty((3, 12, 3))
+        _rasterise(np.ascontiguousarray((triangles - lower) / cell), occupied, *scratch)
         below = np.zeros((*shape[:2], shape[2] + 1), np.int16)
         np.cumsum(occupied, axis=2, out=below[:, :, 1:])
         return cls(np.asarray(lower, float), cell, below)
@@ -114,17 +115,20 @@ class Occupancy:
         Returns:
             (n,) bool; what lies outside the grid counts as free.
         """
-        return _free(
+        result = np.empty(len(position), bool)
+        _free(
             self.corner,
             self.cell,
             self.below,
             np.array([box.half_depth, box.half_width, box.bottom, box.top]),
             np.ascontiguousarray(position, dtype=float),
             np.ascontiguousarray(yaw, dtype=float),
+            result,
         )
+        return result
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def body_free(corner, cell, below, box, x, y, z, yaw):
     """Whether the box (half depth, half width, bottom, top) at a pose meets no occupied cell."""
     first = min(max(int(np.floor((z + box[2] - corner[2]) / cell)), 0), below.shape[2] - 1)
@@ -145,55 +149,60 @@ def body_free(corner, cell, below, box, x, y, z, yaw):
     return True
 
 
-@numba.njit(cache=True)
-def _free(corner, cell, below, box, position, yaw):
-    result = np.empty(len(position), np.bool_)
+@numba.njit(cache=True, error_model="numpy")
+def _free(corner, cell, below, box, position, yaw, result):
     for row in range(len(position)):
-        result[row] = body_free(
-            corner, cell, below, box, position[row, 0], position[row, 1], position[row, 2], yaw[row]
-        )
-    return result
+        x, y, z = position[row, 0], position[row, 1], position[row, 2]
+        result[row] = body_free(corner, cell, below, box, x, y, z, yaw[row])
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _clip(points, count, out, axis, bound, sign):
     """Polygon cut by sign * point[axis] <= sign * bound (Sutherland and Hodgman); returns the number of corners."""
     kept = 0
     for k in range(count):
-        a, b = points[k], points[(k + 1) % count]
-        da, db = sign * (a[axis] - bound), sign * (b[axis] - bound)
+        m = k + 1 if k + 1 < count else 0
+        da, db = sign * (points[k, axis] - bound), sign * (points[m, axis] - bound)
         if da <= 0.0:
-            out[kept] = a
+            for c in range(3):
+                out[kept, c] = points[k, c]
             kept += 1
-        if (da < 0.0 < db) or (db < 0.0 < da):
-            out[kept] = a + (b - a) * (da / (da - db))
+        if (da < 0.0 and db > 0.0) or (db < 0.0 and da > 0.0):
+            t = da / (da - db)
+            for c in range(3):
+                out[kept, c] = points[k, c] + t * (points[m, c] - points[k, c])
             kept += 1
     return kept
 
 
-@numba.njit(cache=True)
-def _rasterise(triangles, occupied):
-    """Mark the cells that triangles (in cell units) touch: clip each to a strip, to a column, then by height."""
-    nx, ny, nz = occupied.shape
-    strip, column = np.empty((12, 3)), np.empty((12, 3))
-    work = np.empty((12, 3))
+@numba.njit(cache=True, error_model="numpy")
+def _cells(points, count, axis, most):
+    """First and last cell, within 0 and `most`, that a polygon meets along an axis."""
+    low, high = points[0, axis], points[0, axis]
+    for k in range(1, count):
+        low, high = min(low, points[k, axis]), max(high, points[k, axis])
+    return max(int(np.floor(low)), 0), min(int(np.floor(high)), most)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _rasterise(triangles, occupied, work, strip, column):
+    """Mark the cells that triangles (in cell units) touch: clip each to a strip, to a column, then by height.
+
+    `work`, `strip` and `column` are (12, 3) scratch.
+    """
     for t in range(len(triangles)):
-        triangle = triangles[t]
-        i0 = max(int(np.floor(triangle[:, 0].min())), 0)
-        i1 = min(int(np.floor(triangle[:, 0].max())), nx - 1)
+        i0, i1 = _cells(triangles[t], 3, 0, occupied.shape[0] - 1)
         for i in range(i0, i1 + 1):
-            count = _clip(triangle, 3, work, 0, float(i), -1.0)
-            count = _clip(work, count, strip, 0, float(i + 1), 1.0)
+            count = _clip(triangles[t], 3, work, 0, 1.0 * i, -1.0)
+            count = _clip(work, count, strip, 0, i + 1.0, 1.0)
             if count == 0:
                 continue
-            j0 = max(int(np.floor(strip[:count, 1].min())), 0)
-            j1 = min(int(np.floor(strip[:count, 1].max())), ny - 1)
+            j0, j1 = _cells(strip, count, 1, occupied.shape[1] - 1)
             for j in range(j0, j1 + 1):
-                inner = _clip(strip, count, work, 1, float(j), -1.0)
-                inner = _clip(work, inner, column, 1, float(j + 1), 1.0)
+                inner = _clip(strip, count, work, 1, 1.0 * j, -1.0)
+                inner = _clip(work, inner, column, 1, j + 1.0, 1.0)
                 if inner == 0:
                     continue
-                k0 = max(int(np.floor(column[:inner, 2].min())), 0)
-                k1 = min(int(np.floor(column[:inner, 2].max())), nz - 1)
+                k0, k1 = _cells(column, inner, 2, occupied.shape[2] - 1)
                 for k in range(k0, k1 + 1):
                     occupied[i, j, k] = True

@@ -66,7 +66,7 @@ class PlannerConfig:
     projection: ProjectionConfig = field(default_factory=ProjectionConfig)
     grid: GridConfig = field(default_factory=GridConfig)
     acceptable_cost: float = 2500.0
-    search: AnaStarConfig = field(default_factory=lambda: AnaStarConfig(max_expansions=20_000, crowding=0.3))
+    search: AnaStarConfig = field(default_factory=lambda: AnaStarConfig(max_expansions=20_000))
 
     def __post_init__(self):
         for name, allowed in (("steps", (60, 38)), ("wide_steps", ("auto", "on", "off"))):

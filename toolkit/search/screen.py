@@ -35,7 +35,7 @@ PALM_REASONS = (14, 15, 16, 17)  # palms are an option: where they find no wall 
 CROSSES, FAST, STILL, NO_WALL, FAR, WRONG_SIDE, FACING, DYNAMICS, COSTLY, ARM, EXCLUDED = range(11, 22)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def rectangles_overlap(ax, ay, ayaw, bx, by, byaw, hx, hy):
     """Whether two rectangles of equal half extents overlap in XY (separating axes)."""
     dx, dy = bx - ax, by - ay
@@ -47,18 +47,18 @@ def rectangles_overlap(ax, ay, ayaw, bx, by, byaw, hx, hy):
     return abs(cb * dx + sb * dy) <= ex and abs(-sb * dx + cb * dy) <= ey
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def mean_yaw(a, b):
     """Circular mean of two headings."""
     return np.arctan2(np.sin(a) + np.sin(b), np.cos(a) + np.cos(b))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def screen_steps(
     surface, position, rotation, yaw, side, stand, stand_rotation, stand_yaw, half, climb, com_height, drops,
-    shifts, legs, box, body_corner, body_cell, below,
+    shifts, legs, box, body_corner, body_cell, below, codes,
 ):  # fmt: skip
-    """Codes (n,) of new soles beside a standing one, whatever the CoM may do.
+    """Fill codes of new soles beside a standing one, whatever the CoM may do.
 
     Args:
         surface: (n,) int; -1 where the projection found none.
@@ -79,9 +79,10 @@ def screen_steps(
         body_corner: of the occupancy grid.
         body_cell: of the occupancy grid.
         below: of the occupancy grid.
+        codes: (n,) int; filled.
     """
-    codes = np.zeros(len(surface), np.int64)
     for row in range(len(surface)):
+        codes[row] = 0
         if surface[row] < 0:
             codes[row] = 1
             continue
@@ -113,12 +114,11 @@ def screen_steps(
             codes[row] = code
         elif not body_free(body_corner, body_cell, below, box, x, y, z, heading):
             codes[row] = 4
-    return codes
 
 
-@numba.njit(cache=True)
-def screen_swings(position, yaw, old, old_yaw, stand, stand_yaw, half, longest, still, still_yaw):
-    """Codes (n,) of swings of a foot from its old place past the standing one.
+@numba.njit(cache=True, error_model="numpy")
+def screen_swings(position, yaw, old, old_yaw, stand, stand_yaw, half, longest, still, still_yaw, codes):
+    """Fill codes of swings of a foot from its old place past the standing one.
 
     Args:
         position: (n, 3) m; new soles.
@@ -131,12 +131,13 @@ def screen_swings(position, yaw, old, old_yaw, stand, stand_yaw, half, longest, 
         longest: m; longest way in XY.
         still: m; a shorter way is no movement, unless it turns by more than `still_yaw`.
         still_yaw: rad.
+        codes: (n,) int; filled.
     """
-    codes = np.zeros(len(yaw), np.int64)
     for row in range(len(yaw)):
         dx, dy, dz = position[row, 0] - old[0], position[row, 1] - old[1], position[row, 2] - old[2]
         turn = np.arctan2(np.sin(yaw[row] - old_yaw), np.cos(yaw[row] - old_yaw))
         way = np.sqrt(dx * dx + dy * dy)
+        codes[row] = 0
         if way > longest:
             codes[row] = 12
         elif way + abs(dz) < still and abs(turn) < still_yaw:
@@ -156,7 +157,6 @@ def screen_swings(position, yaw, old, old_yaw, stand, stand_yaw, half, longest, 
                 ):
                     codes[row] = 11
                     break
-    return codes
 
 
 def screen_palms(
