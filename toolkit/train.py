@@ -19,7 +19,7 @@ from toolkit.errors import DatasetError, InputError
 from toolkit.learning.collect import Progress as Collected
 from toolkit.learning.collect import collect
 from toolkit.learning.dataset import read_dataset
-from toolkit.learning.evaluate import Score, balanced, score
+from toolkit.learning.evaluate import Score, at_default, balanced, score
 from toolkit.learning.query import query_seconds
 from toolkit.learning.shard import CollectConfig
 from toolkit.prediction.networks import load_networks
@@ -143,13 +143,15 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
     robot = load_robot(args.robot, args.robots)
     networks = load_networks(robot, args.networks)
     data = read_dataset(args.data, robot.fingerprint)
-    rng = np.random.default_rng(args.seed)
-    scores: dict[Category, Score] = {}
-    for category, network in networks.items():
-        if category not in data or not len(data[category]):
-            raise DatasetError(f"{args.data}: holds no transitions of category {int(category)}; collect more")
-        scores[category] = score(network, balanced(data[category], args.count, rng))
-    console.print(score_table(scores))
+    for title, chosen in (("1 s + 1 s, friction 0.5", at_default), ("all timings and frictions", lambda group: group)):
+        rng = np.random.default_rng(args.seed)
+        scores: dict[Category, Score] = {}
+        for category, network in networks.items():
+            if category not in data or not len(chosen(data[category])):
+                raise DatasetError(f"{args.data}: too few transitions of category {int(category)}; collect more")
+            scores[category] = score(network, balanced(chosen(data[category]), args.count, rng))
+        console.print(f"{title}:")
+        console.print(score_table(scores))
     network = next(iter(networks.values()))
     alone, batch = query_seconds(network, 1), query_seconds(network, 60) / 60
     console.print(f"a query: {alone * 1e6:.0f} us alone, {batch * 1e6:.1f} us a transition in batches of 60")

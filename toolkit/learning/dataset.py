@@ -67,6 +67,10 @@ class Samples:
     def __len__(self) -> int:
         return len(self.features)
 
+    def select(self, rows: np.ndarray) -> Samples:
+        """The samples of these rows."""
+        return Samples(self.features[rows], self.feasible[rows], self.targets[rows])
+
 
 def read_manifest(folder: Path) -> Manifest:
     """Manifest of a data set.

@@ -6,8 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.errors import DatasetError
 from toolkit.learning.dataset import Samples
 from toolkit.prediction.network import TransitionNetwork
+from toolkit.world.timing import Timing
+
+DEFAULT_FRICTION = 0.5
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,13 @@ class Score:
 
 
 def score(network: TransitionNetwork, samples: Samples) -> Score:
-    """Score a network; the regressor is judged on the transitions that are feasible."""
+    """Score a network; the regressor is judged on the transitions that are feasible.
+
+    Raises:
+        DatasetError: none of the samples is feasible.
+    """
+    if not samples.feasible.any():
+        raise DatasetError(f"category {int(network.category)}: no feasible transition to test on; collect more")
     targets = samples.targets[samples.feasible]
     outputs = network.predict(samples.features[samples.feasible])
     return Score(
@@ -53,6 +63,13 @@ def score(network: TransitionNetwork, samples: Samples) -> Score:
     )
 
 
+def at_default(samples: Samples) -> Samples:
+    """The samples with the paper's timing (1 s + 1 s) and friction (0.5)."""
+    timing = Timing()
+    wanted = np.array([timing.shift, timing.swing, DEFAULT_FRICTION], np.float32)
+    return samples.select(np.flatnonzero(np.isclose(samples.features[:, -3:], wanted, rtol=0, atol=1e-5).all(1)))
+
+
 def balanced(samples: Samples, count: int, rng: np.random.Generator, *, least_share: float = 0.25) -> Samples:
     """A test set of `count` transitions in which neither label falls under `least_share`.
 
@@ -63,5 +80,4 @@ def balanced(samples: Samples, count: int, rng: np.random.Generator, *, least_sh
     head = labels[:count]
     least = int(np.ceil(least_share * count))
     wanted = int(np.clip(head.sum(), least, count - least))
-    chosen = np.concatenate([order[labels][:wanted], order[~labels][: count - wanted]])
-    return Samples(samples.features[chosen], samples.feasible[chosen], samples.targets[chosen])
+    return samples.select(np.concatenate([order[labels][:wanted], order[~labels][: count - wanted]]))
