@@ -35,7 +35,7 @@ class ControllerConfig:
         leg_posture: factor on the posture's weight for joints that carry a foot.
         angular_momentum: `weight |(dk/dt - dk_ref/dt - kp (k_ref - k)) / angular_momentum_scale|^2`; kd is unused.
         angular_momentum_scale: kg m^2/s per unit of the task.
-        divergence_scale: m; divergence of the CoM at which the weights of angular momentum and base orientation are halved.
+        divergence_scale: m; divergence of the CoM that halves the weights of angular momentum and base orientation.
         divergence_rate: 1/s; frequency of the pendulum in `(c - c_ref) + (v - v_ref) / rate`.
         force: weight on squared N of deviation from the planned force.
         moment: weight on squared N m of deviation from the planned moment.
