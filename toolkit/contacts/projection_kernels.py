@@ -1,0 +1,150 @@
+"""Compiled projection: does a patch fit on a surface, and which surface does it meet first?"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _meets_rectangle(ax, ay, bx, by, hx, hy):
+    """Whether the segment a-b meets the rectangle |x| <= hx, |y| <= hy."""
+    if min(ax, bx) > hx or max(ax, bx) < -hx or min(ay, by) > hy or max(ay, by) < -hy:
+        return False
+    dx, dy = bx - ax, by - ay
+    # The remaining separating axis: the segment's normal.
+    return abs(dx * ay - dy * ax) <= abs(dx) * hy + abs(dy) * hx
+
+
+@numba.njit(cache=True, error_model="numpy")
+def plane_height(table, q, x, y):
+    """Height of the plane of surface q at (x, y)."""
+    origin, normal = table.origin[q], table.rotation[q, :, 2]
+    return origin[2] - (normal[0] * (x - origin[0]) + normal[1] * (y - origin[1])) / normal[2]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def sole_axis(table, q, c, s):
+    """The x axis of a sole on surface q: the heading (c, s) dropped on the plane along the vertical."""
+    normal = table.rotation[q, :, 2]
+    ax, ay, az = c * normal[2], s * normal[2], -(c * normal[0] + s * normal[1])
+    length = np.sqrt(ax * ax + ay * ay + az * az)
+    return ax / length, ay / length, az / length
+
+
+@numba.njit(cache=True, error_model="numpy")
+def cell_of(table, x, y):
+    """Index of the cell of the table's grid at (x, y), -1 outside."""
+    i, j = int(np.floor((x - table.corner[0]) / table.cell)), int(np.floor((y - table.corner[1]) / table.cell))
+    return i * table.shape[1] + j if 0 <= i < table.shape[0] and 0 <= j < table.shape[1] else -1
+
+
+@numba.njit(cache=True, error_model="numpy")
+def sole_fits(table, cell, entry, x, y, c, s, half):
+    """Whether a sole with centre above (x, y) and heading (c, s) has room on the surface of an entry of that cell."""
+    q = table.entry_surface[entry]
+    r, origin, edges = table.rotation[q], table.origin[q], table.edges
+    ax, ay, az = sole_axis(table, q, c, s)
+    cx, sx = r[0, 0] * ax + r[1, 0] * ay + r[2, 0] * az, r[0, 1] * ax + r[1, 1] * ay + r[2, 1] * az
+    # The centre and the cell's reference point, both in the surface frame.
+    px, py, pz = x - origin[0], y - origin[1], plane_height(table, q, x, y) - origin[2]
+    i, j = cell // table.shape[1], cell % table.shape[1]
+    rx, ry = table.corner[0] + (i + 0.5) * table.cell, table.corner[1] + (j + 0.5) * table.cell
+    dx, dy, dz = px - rx + origin[0], py - ry + origin[1], pz - plane_height(table, q, rx, ry) + origin[2]
+    u, v = r[0, 0] * px + r[1, 0] * py + r[2, 0] * pz, r[0, 1] * px + r[1, 1] * py + r[2, 1] * pz
+    du, dv = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz, r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
+    inside = table.entry_inside[entry]
+    for k in range(table.near_start[entry], table.near_start[entry + 1]):
+        e = table.near[k]
+        au, av, bu, bv = edges[e, 0] - u, edges[e, 1] - v, edges[e, 2] - u, edges[e, 3] - v
+        if _meets_rectangle(
+            cx * au + sx * av, -sx * au + cx * av, cx * bu + sx * bv, -sx * bu + cx * bv, half[0], half[1]
+        ):
+            return False
+        # Does the edge cross the way from the reference to the centre? Sides of the line through both, half open.
+        side_a, side_b = du * av - dv * au, du * bv - dv * bu
+        if (side_a > 0.0) != (side_b > 0.0):
+            t = side_a / (side_a - side_b)
+            along = du * (au + t * (bu - au)) + dv * (av + t * (bv - av))  # 0 at the centre
+            if -(du * du + dv * dv) < along < 0.0:
+                inside = not inside
+    return inside
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _set_frame(frame, ax, ay, az, nx, ny, nz):
+    """Write the axes of a contact frame from its x and z."""
+    frame[0, 0], frame[1, 0], frame[2, 0] = ax, ay, az
+    frame[0, 1], frame[1, 1], frame[2, 1] = ny * az - nz * ay, nz * ax - nx * az, nx * ay - ny * ax
+    frame[0, 2], frame[1, 2], frame[2, 2] = nx, ny, nz
+
+
+@numba.njit(cache=True, error_model="numpy")
+def project_soles(pose, low, high, half, offsets, table, surface, position, orientation):
+    """Fill surface, position and orientation; see `Projector.project_soles`."""
+    for row in range(len(pose)):
+        c, s = np.cos(pose[row, 2]), np.sin(pose[row, 2])
+        surface[row] = -1
+        for k in range(len(offsets)):
+            x = pose[row, 0] + c * offsets[k, 0] - s * offsets[k, 1]
+            y = pose[row, 1] + s * offsets[k, 0] + c * offsets[k, 1]
+            cell = cell_of(table, x, y)
+            if cell < 0:
+                continue
+            best = low
+            for entry in range(table.entry_start[cell], table.entry_start[cell + 1]):
+                q = table.entry_surface[entry]
+                z = plane_height(table, q, x, y)
+                if best <= z <= high and sole_fits(table, cell, entry, x, y, c, s, half):
+                    best = z
+                    surface[row] = q
+                    position[row, 0], position[row, 1], position[row, 2] = x, y, z
+            q = surface[row]
+            if q >= 0:
+                ax, ay, az = sole_axis(table, q, c, s)
+                nx, ny, nz = table.rotation[q, 0, 2], table.rotation[q, 1, 2], table.rotation[q, 2, 2]
+                _set_frame(orientation[row], ax, ay, az, nx, ny, nz)
+                break
+
+
+@numba.njit(cache=True, error_model="numpy")
+def project_palms(shoulder, rays, yaw, reach, half, chosen, table, surface, distance, position, orientation):
+    """Fill surface, distance, position and orientation; see `Projector.project_palms`."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    for row in range(len(rays)):
+        surface[row] = -1
+        dx, dy, dz = rays[row, 0], rays[row, 1], rays[row, 2]
+        for index in range(len(chosen)):
+            q = chosen[index]
+            r, origin, edges = table.rotation[q], table.origin[q], table.edges
+            nx, ny, nz = r[0, 2], r[1, 2], r[2, 2]
+            along = nx * dx + ny * dy + nz * dz
+            if along > -1e-6:  # the surface faces away
+                continue
+            ox, oy, oz = shoulder[0] - origin[0], shoulder[1] - origin[1], shoulder[2] - origin[2]
+            t = -(nx * ox + ny * oy + nz * oz) / along
+            if t <= 0.0 or t > reach or t >= distance[row]:
+                continue
+            # The least rotation from z to n applied to the heading: v + w x v + w x (w x v) / (1 + n_z), w = z x n.
+            az = -ny * s - nx * c
+            ax, ay = c + nx * az / (1.0 + nz), s + ny * az / (1.0 + nz)
+            px, py, pz = ox + t * dx, oy + t * dy, oz + t * dz
+            u, v = r[0, 0] * px + r[1, 0] * py + r[2, 0] * pz, r[0, 1] * px + r[1, 1] * py + r[2, 1] * pz
+            cx, sx = r[0, 0] * ax + r[1, 0] * ay + r[2, 0] * az, r[0, 1] * ax + r[1, 1] * ay + r[2, 1] * az
+            inside = False
+            free = True
+            for e in range(table.edge_start[q], table.edge_start[q + 1]):
+                au, av, bu, bv = edges[e, 0] - u, edges[e, 1] - v, edges[e, 2] - u, edges[e, 3] - v
+                if _meets_rectangle(
+                    cx * au + sx * av, -sx * au + cx * av, cx * bu + sx * bv, -sx * bu + cx * bv, half[0], half[1]
+                ):
+                    free = False
+                    break
+                if (av > 0.0) != (bv > 0.0) and 0.0 < au - av / (bv - av) * (bu - au):
+                    inside = not inside
+            if free and inside:
+                surface[row] = q
+                distance[row] = t
+                for axis in range(3):
+                    position[row, axis] = shoulder[axis] + t * rays[row, axis]
+                _set_frame(orientation[row], ax, ay, az, nx, ny, nz)
