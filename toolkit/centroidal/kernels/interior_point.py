@@ -231,6 +231,7 @@ def solve(data, tolerance, max_iterations, u, x, w):
     enter_cones(residual, s)
     constraints.invert(s, max(0.01, INITIAL_GAP * objective.value(data, u, x, w) / degree), z)
 
+    iteration = 0
     for iteration in range(max_iterations):
         constraints.apply(data, u, x, residual)
         constraints.add(residual, 1.0, constant)
@@ -242,6 +243,8 @@ def solve(data, tolerance, max_iterations, u, x, w):
         gap = scale(s, z, scaling)
         mu = gap / degree
         value = linearise(data, u, x, w, y_rest, model, sweep)
+        if not (value < np.inf and gap < np.inf):
+            break
         constraints.add_hessian(data, scaling.inverse, scaling.w, scaling.eta, sweep.hessian, model.knot_hessian)
         riccati.factor_contacts(data, sweep)
         riccati.factor_steps(data, model.knot_hessian, model.step_hessian, sweep)
@@ -262,7 +265,11 @@ def solve(data, tolerance, max_iterations, u, x, w):
                 for a in range(3):
                     velocity[a] = x[n, 3 + a]
                 continue
-            step = min(1.0, 0.99 * min(constraints.longest_step(s, ds), constraints.longest_step(z, dz)))
+            step = min(constraints.longest_step(s, ds), constraints.longest_step(z, dz))
+            for j in range(contacts):  # the objective needs f_z > 0, also where the start is outside the cones
+                if du[j, 2] < 0.0:
+                    step = min(step, -u[j, 2] / du[j, 2])
+            step = min(1.0, 0.99 * step)
             # What full steps would change the Lagrangian by through the residual of the slacks.
             owed = constraints.dot(z, residual) + constraints.dot(dz, residual)
             lower = False
@@ -297,4 +304,4 @@ def solve(data, tolerance, max_iterations, u, x, w):
             y_refuting[a] = -y_rest[a]
         if constraints.refutes(data, z, y_refuting):
             return INFEASIBLE, iteration + 1
-    return UNDECIDED, max_iterations
+    return UNDECIDED, iteration

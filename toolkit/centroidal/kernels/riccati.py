@@ -245,9 +245,10 @@ def sweep_back(data, contact_gradient, knot_gradient, step_gradient, sweep):
 @compiled
 def step_forward(data, t, contact_gradient, sweep, dx, du):
     """Change of the wrenches of step t for a change dx (9,) of its first knot: fills du (C, 6) of its contacts."""
-    v, lower = sweep.control[t], sweep.total[t]
-    if t > 0:
-        for a in range(6):
+    v, lower = np.empty(6), sweep.total[t]
+    for a in range(6):
+        v[a] = sweep.control[t, a]
+        if t > 0:
             for c in range(9):
                 v[a] -= sweep.gain[t, a, c] * dx[c]
     solve_upper(sweep.theta[t], v, 6)

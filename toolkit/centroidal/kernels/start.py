@@ -1,4 +1,4 @@
-"""A start inside the contacts' cones whose CoM follows the feet.
+"""A start whose CoM follows the feet, inside the contacts' cones where that can be.
 
 A linear-quadratic tracking problem around a slow motion above the feet gives a feedback law; the wrenches it asks for
 are drawn into the cones step by step, so that later steps make up for what earlier ones could not do.
@@ -17,10 +17,14 @@ EFFORT = 10.0
 """Weight of wrenches that differ from sharing the weight."""
 INSIDE = 0.9
 """Part of the cones that the start uses."""
+LEAST_FORCE = 0.02
+"""Weights; normal force that every contact starts with at least."""
+ASTRAY = 20.0
+"""m; a start further than this from its guess is given up."""
 
 
 @compiled
-def share_weight(data, t, u):
+def share_weight(data, t, inside, u):
     """Fill u of step t with vertical forces that add up to the weight where the contacts' normals allow."""
     total = 0.0
     for j in range(data.first[t], data.first[t + 1]):
@@ -30,13 +34,15 @@ def share_weight(data, t, u):
         for a in range(3):
             u[j, a] = share * data.rotation[j, 2, a]
             u[j, 3 + a] = 0.0
-        pull_inside(data.mu[j], data.force_bound[j], data.rows[j], u[j])
+        pull_inside(data.mu[j], data.force_bound[j], data.rows[j], inside, u[j])
 
 
 @compiled
-def pull_inside(mu, bound, rows, u):
-    """Shrink a wrench (6,) of a contact until it lies inside its cones."""
-    u[2] = min(max(u[2], 0.02), INSIDE * bound)
+def pull_inside(mu, bound, rows, inside, u):
+    """Pull a wrench (6,) of a contact in: the normal force into its range; if `inside`, all into the cones."""
+    u[2] = min(max(u[2], LEAST_FORCE), INSIDE * bound)
+    if not inside:
+        return
     factor = 1.0
     lateral = math.sqrt(u[0] * u[0] + u[1] * u[1])
     if lateral > INSIDE * mu * u[2]:
@@ -64,7 +70,7 @@ def follow(data, sweep, u, x, w):
     w_guess[2] = 1.0
     # Everything below is the quadratic model around the guess, taken at x = 0, w = 0 plus the sharing wrenches' own.
     for t in range(n):
-        share_weight(data, t, u)
+        share_weight(data, t, True, u)
         riccati.total_wrench(data.first, data.wrench, t, u, w[t])
         for k in range(2):
             for a in range(3):
@@ -103,15 +109,21 @@ def follow(data, sweep, u, x, w):
     riccati.factor_contacts(data, sweep)
     riccati.factor_steps(data, knot_hessian, step_hessian, sweep)
     riccati.sweep_back(data, contact_gradient, knot_gradient, step_gradient, sweep)
-    dx, du = np.empty(9), np.zeros((contacts, 6))
-    before = x.copy()
-    for t in range(n):
-        for a in range(9):
-            dx[a] = x[t, a] - before[t, a]
-        riccati.step_forward(data, t, contact_gradient, sweep, dx, du)
-        for j in range(data.first[t], data.first[t + 1]):
-            for a in range(6):
-                u[j, a] += du[j, a]
-            pull_inside(data.mu[j], data.force_bound[j], data.rows[j], u[j])
-        riccati.total_wrench(data.first, data.wrench, t, u, w[t])
-        objective.advance(data.h[t], x[t], w[t], x[t + 1])
+    dx, du, before, planned = np.empty(9), np.zeros((contacts, 6)), x.copy(), u.copy()
+    for attempt in range(2):
+        # Where the cones do not let the CoM follow at all (steep or slippery stones), the wrenches start outside.
+        inside, furthest = attempt == 0, 0.0
+        for t in range(n):
+            for a in range(9):
+                dx[a] = x[t, a] - before[t, a]
+            riccati.step_forward(data, t, contact_gradient, sweep, dx, du)
+            for j in range(data.first[t], data.first[t + 1]):
+                for a in range(6):
+                    u[j, a] = planned[j, a] + du[j, a]
+                pull_inside(data.mu[j], data.force_bound[j], data.rows[j], inside, u[j])
+            riccati.total_wrench(data.first, data.wrench, t, u, w[t])
+            objective.advance(data.h[t], x[t], w[t], x[t + 1])
+            for a in range(3):
+                furthest = max(furthest, abs(x[t + 1, a] - data.guess[t + 1, a]))
+        if furthest < ASTRAY:
+            break
