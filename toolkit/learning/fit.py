@@ -15,10 +15,11 @@ from torch import nn
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
 from toolkit.learning.dataset import Samples
-from toolkit.prediction.features import TARGETS
-from toolkit.prediction.network import HIDDEN, LAYERS, SCHEMA, network_path
+from toolkit.prediction.features import COM, TARGETS
+from toolkit.prediction.network import HIDDEN, LAYERS, SCHEMA, Perceptron, feasibility, network_path, outcome
 
 Progress = Callable[[str, int, float, float], None]
+_SILENT: Progress = lambda name, epoch, training, validation: None  # noqa: E731
 
 
 @dataclass(frozen=True)
@@ -31,20 +32,24 @@ class FitConfig:
         learning_rate: peak of the one-cycle schedule.
         weight_decay: of AdamW.
         dropout: in the classifier.
-        validation: share of the data held out for early stopping.
+        width: of the smooth L1 loss, below which it is quadratic, in standard deviations of an output.
+        validation: share of the data held out for early stopping: the last ones, which come from other terrain.
         patience: epochs without a better validation loss before stopping.
+        coarse: share of the epochs that compute in bfloat16, twice as fast on processors that have it.
         objective_limit: transitions with a larger objective do not teach the regressor.
         minimum: fewest samples with each label.
-        seed: of the split, the initial weights and the shuffling.
+        seed: of the initial weights and the shuffling.
     """
 
     epochs: int = 60
-    batch: int = 1024
+    batch: int = 256
     learning_rate: float = 2e-3
     weight_decay: float = 1e-4
     dropout: float = 0.0
-    validation: float = 0.1
+    width: float = 0.05
+    validation: float = 0.05
     patience: int = 15
+    coarse: float = 0.8
     objective_limit: float = 5e4
     minimum: int = 50
     seed: int = 0
@@ -57,6 +62,23 @@ class Curve:
     training: np.ndarray
     validation: np.ndarray
     best: int
+
+
+@dataclass(frozen=True)
+class TrainedNetworks:
+    """A classifier and a regressor, and how they learnt."""
+
+    classifier: Perceptron
+    regressor: Perceptron
+    curves: dict[str, Curve]
+
+    def feasible(self, features: np.ndarray) -> np.ndarray:
+        """(n,) bool for features (n, d)."""
+        return feasibility(self.classifier, features)
+
+    def predict(self, features: np.ndarray) -> np.ndarray:
+        """(n, 7) objective, CoM and velocity for features (n, d)."""
+        return outcome(self.regressor, features)
 
 
 def _perceptron(inputs: int, outputs: int, dropout: float) -> nn.Sequential:
@@ -77,11 +99,10 @@ def _train(
     """Train in place with early stopping; the weights of the best epoch are kept."""
     inputs, targets = data
     generator = torch.Generator().manual_seed(config.seed)
-    order = torch.randperm(len(inputs), generator=generator)
-    held = max(1, int(config.validation * len(inputs)))
-    check, train = order[:held], order[held:]
-    steps = max(1, len(train) // config.batch)
-    optimiser = torch.optim.AdamW(net.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
+    count = len(inputs) - max(1, int(config.validation * len(inputs)))
+    size = min(config.batch, count)
+    steps = count // size
+    optimiser = torch.optim.AdamW(net.parameters(), config.learning_rate, weight_decay=config.weight_decay, fused=True)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, config.learning_rate, total_steps=steps * config.epochs, pct_start=0.15
     )
@@ -89,24 +110,26 @@ def _train(
     training, validation = [], []
     for epoch in range(config.epochs):
         net.train()
-        shuffled = train[torch.randperm(len(train), generator=generator)]
+        order = torch.randperm(count, generator=generator)
         total = 0.0
         for step in range(steps):
-            rows = shuffled[step * config.batch : (step + 1) * config.batch]
+            rows = order[step * size : (step + 1) * size]
             optimiser.zero_grad(set_to_none=True)
-            value = loss(net(inputs[rows]), targets[rows])
+            with torch.autocast("cpu", torch.bfloat16, enabled=epoch < config.coarse * config.epochs):
+                outputs = net(inputs[rows])
+            value = loss(outputs.float(), targets[rows])
             value.backward()
             optimiser.step()
             schedule.step()
             total += float(value.detach())
         net.eval()
         with torch.no_grad():
-            held_loss = float(loss(net(inputs[check]), targets[check]))
+            held = float(loss(net(inputs[count:]), targets[count:]))
         training.append(total / steps)
-        validation.append(held_loss)
-        progress(epoch, training[-1], held_loss)
-        if held_loss < best:
-            best, best_epoch = held_loss, epoch
+        validation.append(held)
+        progress(epoch, training[-1], held)
+        if held < best:
+            best, best_epoch = held, epoch
             kept = {k: v.clone() for k, v in net.state_dict().items()}
         elif epoch - best_epoch >= config.patience:
             break
@@ -115,10 +138,10 @@ def _train(
     return Curve(np.array(training), np.array(validation), best_epoch)
 
 
-def _export(
-    name: str, net: nn.Sequential, mean: np.ndarray, std: np.ndarray, out_mean: np.ndarray, out_std: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Weights (inputs, outputs) with both z-scorings folded in."""
+def _folded(
+    net: nn.Sequential, mean: np.ndarray, std: np.ndarray, out_mean: np.ndarray, out_std: np.ndarray
+) -> Perceptron:
+    """The layers with both z-scorings folded in."""
     linear = [layer for layer in net if isinstance(layer, nn.Linear)]
     weights = [layer.weight.detach().double().numpy().T for layer in linear]
     biases = [layer.bias.detach().double().numpy() for layer in linear]
@@ -126,11 +149,60 @@ def _export(
     weights[0] = weights[0] / std[:, None]
     weights[-1] = weights[-1] * out_std
     biases[-1] = biases[-1] * out_std + out_mean
-    tensors = {}
-    for layer, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
-        tensors[f"{name}.{layer}.weight"] = np.ascontiguousarray(weight, np.float32)
-        tensors[f"{name}.{layer}.bias"] = np.ascontiguousarray(bias, np.float32)
-    return tensors
+    return Perceptron(
+        tuple(np.ascontiguousarray(weight, np.float32) for weight in weights),
+        tuple(np.ascontiguousarray(bias, np.float32) for bias in biases),
+    )
+
+
+def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SILENT) -> TrainedNetworks:
+    """Train both networks on samples, in any encoding whose last columns are those of `features.encode`.
+
+    The classifier minimises the logistic loss, the regressor the smooth L1 loss of its scaled outputs: the root of the
+    objective, not centred, as in the original; way of the CoM and velocity z-scored.
+
+    Args:
+        samples: labelled transitions of one category.
+        config: settings.
+        progress: called with ("classifier" or "regressor", epoch, training loss, validation loss).
+    """
+    torch.manual_seed(config.seed)
+    feasible = samples.feasible
+    features = samples.features.astype(np.float64)
+    mean, std = features.mean(0), np.maximum(features.std(0), 1e-3)
+    inputs = torch.from_numpy(((features - mean) / std).astype(np.float32))
+    size = features.shape[1]
+
+    classifier = _perceptron(size, 1, config.dropout)
+    curves = {
+        "classifier": _train(
+            classifier,
+            (inputs, torch.from_numpy(feasible.astype(np.float32)[:, None])),
+            nn.functional.binary_cross_entropy_with_logits,
+            config,
+            lambda *state: progress("classifier", *state),
+        )
+    }
+
+    kept = feasible & (samples.targets[:, 0] < config.objective_limit)
+    targets = samples.targets[kept].astype(np.float64)
+    targets[:, 0] = np.sqrt(targets[:, 0])
+    targets[:, 1:4] -= features[kept, COM]
+    out_mean = np.concatenate([[0.0], targets[:, 1:].mean(0)])
+    out_std = np.maximum(targets.std(0), 1e-4)
+    regressor = _perceptron(size, TARGETS, 0.0)
+    curves["regressor"] = _train(
+        regressor,
+        (inputs[torch.from_numpy(kept)], torch.from_numpy(((targets - out_mean) / out_std).astype(np.float32))),
+        nn.SmoothL1Loss(beta=config.width),
+        config,
+        lambda *state: progress("regressor", *state),
+    )
+    return TrainedNetworks(
+        _folded(classifier, mean, std, np.zeros(1), np.ones(1)),
+        _folded(regressor, mean, std, out_mean, out_std),
+        curves,
+    )
 
 
 def fit_category(
@@ -140,12 +212,9 @@ def fit_category(
     fingerprint: str,
     folder: Path,
     config: FitConfig,
-    progress: Progress = lambda name, epoch, training, validation: None,
+    progress: Progress = _SILENT,
 ) -> dict[str, Curve]:
     """Train both networks of a category and write its file.
-
-    The classifier minimises the logistic loss, the regressor the smooth L1 loss of its scaled outputs: the objective
-    by its mean (not centred, as in the original), CoM and velocity z-scored.
 
     Args:
         category: which one.
@@ -168,43 +237,16 @@ def fit_category(
             f"category {int(category)} has {counts[0]} feasible and {counts[1]} infeasible transitions; "
             f"{config.minimum} of each are needed: collect more"
         )
-    torch.manual_seed(config.seed)
-    features = samples.features.astype(np.float64)
-    mean, std = features.mean(0), np.maximum(features.std(0), 1e-3)
-    inputs = torch.from_numpy(((features - mean) / std).astype(np.float32))
-    size = features.shape[1]
-
-    classifier = _perceptron(size, 1, config.dropout)
-    labels = torch.from_numpy(feasible.astype(np.float32)[:, None])
-    curves = {
-        "classifier": _train(
-            classifier,
-            (inputs, labels),
-            nn.functional.binary_cross_entropy_with_logits,
-            config,
-            lambda *state: progress("classifier", *state),
-        )
+    trained = train_networks(samples, config, progress)
+    tensors = {
+        f"{name}.{layer}.{part}": array
+        for name, net in (("classifier", trained.classifier), ("regressor", trained.regressor))
+        for part, arrays in (("weight", net.weights), ("bias", net.biases))
+        for layer, array in enumerate(arrays)
     }
-
-    kept = feasible & (samples.targets[:, 0] < config.objective_limit)
-    targets = samples.targets[kept].astype(np.float64)
-    out_mean = np.concatenate([[0.0], targets[:, 1:].mean(0)])
-    out_std = np.concatenate([[targets[:, 0].mean()], np.maximum(targets[:, 1:].std(0), 1e-4)])
-    scaled = torch.from_numpy(((targets - out_mean) / out_std).astype(np.float32))
-    regressor = _perceptron(size, TARGETS, 0.0)
-    curves["regressor"] = _train(
-        regressor,
-        (inputs[torch.from_numpy(kept)], scaled),
-        lambda output, target: nn.functional.smooth_l1_loss(output, target, beta=0.05),
-        config,
-        lambda *state: progress("regressor", *state),
-    )
-
-    one, zero = np.ones(1), np.zeros(1)
-    tensors = _export("classifier", classifier, mean, std, zero, one)
-    tensors |= _export("regressor", regressor, mean, std, out_mean, out_std)
-    tensors["features.lower"] = features.min(0).astype(np.float32)
-    tensors["features.upper"] = features.max(0).astype(np.float32)
+    tensors["features.lower"] = samples.features.min(0)
+    tensors["features.upper"] = samples.features.max(0)
+    curves = trained.curves
     summary = {
         "samples": len(samples),
         "feasible": counts[0],

@@ -25,6 +25,8 @@ from toolkit.geometry.pose import Pose
 MIRROR = np.array([1.0, -1.0, 1.0])
 CONTACT = 9  # numbers per contact
 TARGETS = 7  # objective, CoM, CoM velocity
+COM = slice(-9, -6)  # columns of the initial CoM
+TIMING_AND_FRICTION = slice(-3, None)
 
 # Limbs in contact before the transition, in canonical (mirrored) form, and the limb that moves; None: broken.
 LAYOUT: dict[Category, tuple[tuple[Limb, ...], bool]] = {

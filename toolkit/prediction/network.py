@@ -11,9 +11,9 @@ from safetensors import SafetensorError, safe_open
 
 from toolkit.contacts.category import Category
 from toolkit.errors import NetworkError
-from toolkit.prediction.features import TARGETS, feature_size
+from toolkit.prediction.features import COM, TARGETS, feature_size
 
-SCHEMA = "transition-network-1"
+SCHEMA = "transition-network-2"
 HIDDEN = 256
 LAYERS = 4  # three hidden ones and the output
 
@@ -40,6 +40,23 @@ class Perceptron:
         return x @ self.weights[-1] + self.biases[-1]
 
 
+def feasibility(classifier: Perceptron, features: np.ndarray) -> np.ndarray:
+    """(n,) bool; whether the classifier calls transitions (n, d) feasible."""
+    return classifier(features)[:, 0] > 0.0
+
+
+def outcome(regressor: Perceptron, features: np.ndarray) -> np.ndarray:
+    """(n, 7) float32 objective, CoM and velocity of transitions (n, d), canonical.
+
+    The regressor gives the root of the objective (its ReLU is taken, so that objectives are not negative), and where
+    the CoM goes from where it is: what spans four orders of magnitude, or hardly changes, is easier to learn so.
+    """
+    outputs = regressor(features)
+    outputs[:, 0] = np.square(np.maximum(outputs[:, 0], 0.0))
+    outputs[:, 1:4] += features[:, COM]
+    return outputs
+
+
 @dataclass(frozen=True)
 class TransitionNetwork:
     """The two networks of one category.
@@ -47,7 +64,7 @@ class TransitionNetwork:
     Attributes:
         category: which transitions they judge.
         classifier: features -> (n, 1) log-odds of being feasible (a softmax over two classes is their logistic).
-        regressor: features -> (n, 7): objective (before its ReLU), CoM (m) and CoM velocity (m/s), canonical frame.
+        regressor: features -> (n, 7), see `outcome`.
         lower, upper: (d,) range of the training features; timing and friction outside it are extrapolation.
         metadata: what the file says of its training.
     """
@@ -61,13 +78,11 @@ class TransitionNetwork:
 
     def feasible(self, features: np.ndarray) -> np.ndarray:
         """(n,) bool for features (n, d)."""
-        return self.classifier(features)[:, 0] > 0.0
+        return feasibility(self.classifier, features)
 
     def predict(self, features: np.ndarray) -> np.ndarray:
         """(n, 7) float32 objective (not negative), CoM and velocity for features (n, d)."""
-        outputs = self.regressor(features)
-        np.maximum(outputs[:, 0], 0.0, out=outputs[:, 0])
-        return outputs
+        return outcome(self.regressor, features)
 
 
 def network_path(folder: Path, category: Category) -> Path:

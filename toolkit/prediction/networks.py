@@ -13,11 +13,9 @@ from toolkit.contacts.stance import Stance
 from toolkit.errors import NetworkError
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
-from toolkit.prediction.features import encode
+from toolkit.prediction.features import TIMING_AND_FRICTION, encode
 from toolkit.prediction.network import TransitionNetwork, load_network, network_path
 from toolkit.robot.model import RobotModel
-
-TIMING_AND_FRICTION = slice(-3, None)
 
 
 def load_networks(robot: RobotModel, folder: Path | None = None) -> dict[Category, TransitionNetwork]:

@@ -1,0 +1,91 @@
+"""Training: networks learn what can be learnt, files hold what was trained, and bad data are refused."""
+
+import numpy as np
+import pytest
+
+from toolkit.contacts.category import Category
+from toolkit.errors import DatasetError
+from toolkit.learning.dataset import Samples
+from toolkit.learning.fit import FitConfig, fit_category, train_networks
+from toolkit.prediction.features import COM, feature_size
+from toolkit.prediction.network import load_network, network_path, training_summary
+
+CATEGORY = Category.MOVE_FOOT
+CONFIG = FitConfig(epochs=12, batch=64, seed=1)
+
+
+def samples(n=2500, seed=0):
+    """Transitions of a made-up robot: feasible on one side of a plane, simple outcomes; columns of odd scales."""
+    rng = np.random.default_rng(seed)
+    features = rng.normal(size=(n, feature_size(CATEGORY))) * np.geomspace(0.01, 10, feature_size(CATEGORY))
+    unit = features / np.geomspace(0.01, 10, feature_size(CATEGORY))
+    feasible = unit[:, 0] + 0.5 * unit[:, 5] < 0.4
+    targets = np.zeros((n, 7))
+    targets[:, 0] = 10 * (1 + unit[:, 1]) ** 2
+    targets[:, 1:4] = features[:, COM] + 0.05 * unit[:, 2:5]
+    targets[:, 4:7] = 0.1 * unit[:, 3:6]
+    targets[~feasible] = 0
+    return Samples(features.astype(np.float32), feasible, targets.astype(np.float32))
+
+
+@pytest.fixture(scope="module")
+def trained():
+    return train_networks(samples(), CONFIG)
+
+
+def test_networks_learn(trained):
+    fresh = samples(500, seed=9)
+    good = fresh.feasible
+    assert (trained.feasible(fresh.features) == good).mean() > 0.95
+    outputs, targets = trained.predict(fresh.features[good]), fresh.targets[good]
+    for columns in ([0], [1, 2, 3], [4, 5, 6]):
+        spread = np.abs(targets[:, columns] - targets[:, columns].mean(0)).mean()
+        assert np.abs(outputs[:, columns] - targets[:, columns]).mean() < 0.25 * spread
+    for curve in trained.curves.values():
+        assert curve.training[-1] < 0.5 * curve.training[0]
+        assert curve.validation[curve.best] == curve.validation.min()
+
+
+def test_the_same_seed_gives_the_same_networks(trained):
+    again, other = train_networks(samples(), CONFIG), train_networks(samples(), FitConfig(epochs=12, batch=64, seed=2))
+    features = samples(50, seed=3).features
+    np.testing.assert_array_equal(again.predict(features), trained.predict(features))
+    assert not np.array_equal(other.predict(features), trained.predict(features))
+
+
+def test_a_file_holds_what_was_trained(tmp_path, trained):
+    seen = []
+    curves = fit_category(
+        CATEGORY,
+        samples(),
+        fingerprint="abc",
+        folder=tmp_path,
+        config=CONFIG,
+        progress=lambda *state: seen.append(state),
+    )
+    assert {state[0] for state in seen} == {"classifier", "regressor"} == set(curves)
+    network = load_network(network_path(tmp_path, CATEGORY), CATEGORY, "abc")
+    features = samples(50, seed=3).features
+    np.testing.assert_array_equal(network.predict(features), trained.predict(features))
+    np.testing.assert_array_equal(network.feasible(features), trained.feasible(features))
+    np.testing.assert_array_equal(network.upper, samples().features.max(0))
+    assert training_summary(network)["samples"] == 2500
+    assert network_path(tmp_path, CATEGORY).stat().st_size < 1.5e6  # ten of them in 15 MB
+
+
+def test_too_few_of_a_label_are_refused(tmp_path):
+    few = samples()
+    few.feasible[:] = True
+    few.feasible[:7] = False
+    with pytest.raises(DatasetError, match="7 infeasible transitions; 50 of each are needed"):
+        fit_category(CATEGORY, few, fingerprint="abc", folder=tmp_path, config=CONFIG)
+
+
+def test_training_stops_early_without_progress():
+    rng = np.random.default_rng(0)
+    noise = samples(600)
+    noise.feasible[:] = rng.random(600) < 0.5
+    noise.targets[:] = rng.random((600, 7))
+    curves = train_networks(noise, FitConfig(epochs=60, batch=64, patience=3)).curves
+    assert len(curves["classifier"].training) < 60
+    assert curves["classifier"].best == len(curves["classifier"].training) - 4

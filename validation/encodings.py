@@ -1,0 +1,102 @@
+"""Two encodings of contact orientations compared: axes of the frames (ours) against Tait-Bryan angles (the paper's)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from toolkit.contacts.category import Category
+from toolkit.errors import InputError
+from toolkit.learning.dataset import Samples
+from toolkit.prediction.features import contact_count, tait_bryan
+
+AXES, ANGLES = "axes of each contact's frame", "Tait-Bryan angles with copies at ±2π"
+NEAR = 0.5  # rad; angles so near to ±π are copied
+MOST_COPIES = 3  # of one sample
+
+
+@dataclass(frozen=True)
+class EncodingScore:
+    """How well networks learn from an encoding.
+
+    Attributes:
+        inputs: length of the feature vector.
+        rows: training samples, copies included.
+        accuracy: of the feasibility.
+        relative_objective_error, com_error (m), velocity_error (m/s): mean, of the feasible ones.
+    """
+
+    inputs: int
+    rows: int
+    accuracy: float
+    relative_objective_error: float
+    com_error: float
+    velocity_error: float
+
+
+def with_copies(features: np.ndarray, contacts: int, *, near: float = NEAR) -> tuple[np.ndarray, np.ndarray]:
+    """Samples and their copies with each angle near ±π turned by 2π (paper, Sec. VI).
+
+    Args:
+        features: (n, d) as `tait_bryan` gives them.
+        contacts: number of them.
+        near: rad; how near to ±π an angle is copied.
+
+    Returns:
+        (m, d) features and (m,) rows that they come from, the n samples first.
+    """
+    angles = [6 * contact + 3 + axis for contact in range(contacts) for axis in range(3)]
+    parts, sources = [features], [np.arange(len(features))]
+    for column in angles:
+        rows = np.flatnonzero(np.abs(features[:, column]) > np.pi - near)
+        copies = features[rows].copy()
+        copies[:, column] -= 2 * np.pi * np.sign(copies[:, column])
+        parts.append(copies)
+        sources.append(rows)
+    copies, rows = np.concatenate(parts[1:]), np.concatenate(sources[1:])
+    kept = np.arange(len(rows)) < MOST_COPIES * len(features)
+    return np.concatenate([features, copies[kept]]), np.concatenate([sources[0], rows[kept]])
+
+
+def compare_encodings(
+    train: Samples, test: Samples, category: Category, *, epochs: int, seed: int = 0
+) -> dict[str, EncodingScore]:
+    """Train the same two networks on the same samples in both encodings.
+
+    Args:
+        train: samples to learn from.
+        test: samples to be judged on.
+        category: which one.
+        epochs: of each training.
+        seed: of weights and shuffling.
+
+    Raises:
+        InputError: torch is not installed.
+    """
+    try:
+        from toolkit.learning.fit import FitConfig, train_networks
+    except ImportError:
+        raise InputError("the comparison of encodings needs torch: pip install -e '.[train]'") from None
+    config = FitConfig(epochs=epochs, seed=seed)
+    contacts = contact_count(category)
+    results = {}
+    for name in (AXES, ANGLES):
+        learnt, asked = train, test
+        if name == ANGLES:
+            features, rows = with_copies(tait_bryan(train.features, category), contacts)
+            learnt = Samples(features.astype(np.float32), train.feasible[rows], train.targets[rows])
+            asked = replace(test, features=tait_bryan(test.features, category).astype(np.float32))
+        trained = train_networks(learnt, config)
+        feasible = trained.feasible(asked.features)
+        good = asked.feasible
+        outputs, targets = trained.predict(asked.features[good]), asked.targets[good]
+        results[name] = EncodingScore(
+            inputs=learnt.features.shape[1],
+            rows=len(learnt),
+            accuracy=float((feasible == good).mean()),
+            relative_objective_error=float(np.abs(outputs[:, 0] - targets[:, 0]).mean() / targets[:, 0].mean()),
+            com_error=float(np.linalg.norm(outputs[:, 1:4] - targets[:, 1:4], axis=1).mean()),
+            velocity_error=float(np.linalg.norm(outputs[:, 4:7] - targets[:, 4:7], axis=1).mean()),
+        )
+    return results

@@ -1,0 +1,67 @@
+"""Labelled transitions that no network has seen."""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from toolkit.contacts.category import Category
+from toolkit.errors import DatasetError
+from toolkit.learning.collect import collect
+from toolkit.learning.dataset import Samples, read_dataset, read_manifest
+from toolkit.learning.evaluate import at_default, balanced
+from toolkit.learning.shard import CollectConfig
+from toolkit.robot.model import RobotModel
+
+DEFAULT, ALL = "1 s + 1 s, friction 0.5", "all timings and frictions"
+
+
+def fresh(folder: Path, robot: RobotModel, *, count: int, seed: int, workers: int) -> dict[Category, Samples]:
+    """A data set with its own seed, collected here unless it is there already.
+
+    Args:
+        folder: where it goes; an interrupted collection goes on.
+        robot: the robot.
+        count: transitions per category that the tables need.
+        seed: not that of the training data.
+        workers: processes.
+    """
+    config = CollectConfig(
+        robot=robot.name,
+        robots=str(robot.folder.parent.resolve()),
+        seed=seed,
+        samples_per_category=4 * count,  # a bit less than half of them have the default timing
+    )
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        collect(folder, robot, config, pool)
+    return read_dataset(folder, robot.fingerprint)
+
+
+def seed_of(folder: Path) -> int:
+    """Seed of a data set."""
+    return read_manifest(folder).seed
+
+
+def test_sets(
+    data: dict[Category, Samples], categories: list[Category], count: int, rng: np.random.Generator
+) -> dict[str, dict[Category, Samples]]:
+    """Sets of `count` transitions by title and category in which neither label falls under 25 %.
+
+    Raises:
+        DatasetError: too few transitions of a category.
+    """
+    sets: dict[str, dict[Category, Samples]] = {DEFAULT: {}, ALL: {}}
+    for category in categories:
+        group = data.get(category)
+        for title, chosen in ((DEFAULT, None if group is None else at_default(group)), (ALL, group)):
+            if chosen is None or len(chosen) < count:
+                found = 0 if chosen is None else len(chosen)
+                raise DatasetError(
+                    f"category {int(category)}: {found} transitions ({title}), {count} are needed; lower --count or "
+                    "collect more"
+                )
+            sets[title][category] = balanced(chosen, count, rng)
+    return sets
