@@ -68,3 +68,24 @@ def test_yaw_factor_shrinks_the_yaw_moment_in_proportion():
 
     np.testing.assert_allclose(most(1.0), FRICTION * HALF.sum(), atol=1e-4)
     np.testing.assert_allclose(most(0.7), 0.7 * most(1.0), atol=2e-4)
+
+
+def test_less_yaw_friction_gives_a_smaller_cone():
+    rng = np.random.default_rng(3)
+    full, reduced = sole_rows(FRICTION, HALF), sole_rows(FRICTION, HALF, 0.7)
+    scale = np.r_[FRICTION, FRICTION, 1.0, HALF[1], HALF[0], FRICTION * HALF.sum()]
+    wrenches = rng.uniform(-1.0, 1.0, (20000, 6)) * scale
+    wrenches[:, 2] = 1.0
+    inside = (wrenches @ reduced.T <= 0.0).all(1)
+    assert inside.sum() > 100
+    assert (wrenches[inside] @ full.T <= 1e-12).all()
+
+
+def test_a_force_at_a_corner_keeps_its_own_yaw_moment_whatever_the_margin():
+    """A tangential force at an off-centre CoP turns the sole about its centre: that moment is no yaw torque."""
+    rng = np.random.default_rng(4)
+    rows = sole_rows(FRICTION, HALF, 0.7)
+    for point in CORNERS:
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        force = np.array([0.65 * FRICTION * np.cos(angle), 0.65 * FRICTION * np.sin(angle), 1.0])
+        assert (rows @ np.r_[force, np.cross(point, force)] <= 1e-12).all()

@@ -28,12 +28,15 @@ def sole_rows(friction: float, half_size: np.ndarray, yaw: float = 1.0, sides: i
     Friction as in `friction_rows`; the centre of pressure inside the rectangle, |mx| <= Y fz and |my| <= X fz; and the
     yaw moment that corner forces can hold under friction,
 
-        -mu (X + Y) fz + |Y fx - mu mx| + |X fy - mu my| <= mz / yaw <= mu (X + Y) fz - |Y fx + mu mx| - |X fy + mu my|.
+        -nu (X + Y) fz + |Y fx - nu mx| + |X fy - nu my| <= mz <= nu (X + Y) fz - |Y fx + nu mx| - |X fy + nu my|,
+
+    with nu = yaw * mu. (Scaling mz instead would be wrong near an edge: the tangential force at the CoP has a moment
+    about the centre, and what friction adds to it vanishes at the corners.)
 
     Args:
         friction: Coulomb coefficient.
         half_size: (2,) m; X along x and Y along y of the contact frame.
-        yaw: factor on the yaw moment that may be used.
+        yaw: factor on the friction that may be used for the yaw moment.
         sides: of the friction polygon.
 
     Returns:
@@ -48,8 +51,8 @@ def sole_rows(friction: float, half_size: np.ndarray, yaw: float = 1.0, sides: i
     pressure[:, 2] = -np.array([y, y, x, x])
     pressure[0, 3], pressure[1, 3], pressure[2, 4], pressure[3, 4] = 1.0, -1.0, 1.0, -1.0
     rows.append(pressure)
-    reach = -friction * (x + y)
+    turning = yaw * friction
     for a, b in itertools.product((-1.0, 1.0), repeat=2):
-        rows.append(np.array([[a * y, b * x, reach, -a * friction, -b * friction, -1.0 / yaw]]))
-        rows.append(np.array([[a * y, b * x, reach, a * friction, b * friction, 1.0 / yaw]]))
+        rows.append(np.array([[a * y, b * x, -turning * (x + y), -a * turning, -b * turning, -1.0]]))
+        rows.append(np.array([[a * y, b * x, -turning * (x + y), a * turning, b * turning, 1.0]]))
     return np.vstack(rows)

@@ -41,7 +41,8 @@ class ControllerConfig:
         moment: weight on squared N m of deviation from the planned moment.
         acceleration: weight on squared joint accelerations (regularisation).
         nesting: where the controller's margins lie between the plan's (1) and the simulation's (0).
-        urgent_nesting: the same once the CoM diverges by `divergence_scale`.
+        urgent_nesting: the same for the CoP once the CoM diverges by `divergence_scale`.
+        max_friction, max_yaw: bounds on the factors on friction and yaw moment, also where the plan has no margin.
         min_foot_force, min_palm_force: N; wanted in every settled contact.
         foot_ramp, palm_ramp: s; the bound on the normal force rises after contact is made.
         release_ramp: s; it falls before contact is broken.
@@ -73,6 +74,8 @@ class ControllerConfig:
     acceleration: float = 1e-4
     nesting: float = 0.5
     urgent_nesting: float = 0.05
+    max_friction: float = 1.0
+    max_yaw: float = 0.9
     min_foot_force: float = 10.0
     min_palm_force: float = 2.0
     foot_ramp: float = 0.06
@@ -119,7 +122,8 @@ class StepAdjustmentConfig:
     """Moving a landing point with the deviation of the CoM from its plan.
 
     Attributes:
-        enabled: whether feet land where the deviation asks.
+        enabled: whether feet land where the deviation asks. Off by default: the walks and pushes tried did not need
+            it, and fast descents were worse with it.
         max_swing: s; only swings at most this long are adjusted.
         frequency: 1/s; of the pendulum in `xi = (c - c_ref) + (v - v_ref) / frequency`.
         deadband: m; deviations below it move nothing.
@@ -130,7 +134,7 @@ class StepAdjustmentConfig:
         gap: m; distance of the sole from the other one, seen from above.
     """
 
-    enabled: bool = True
+    enabled: bool = False
     max_swing: float = 0.6
     frequency: float = 3.4
     deadband: float = 0.01

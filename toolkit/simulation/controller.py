@@ -27,15 +27,6 @@ class _ConeLimits:
     yaw: float
     half_size: np.ndarray
 
-    @classmethod
-    def between(cls, margins: Margins, half_size: np.ndarray, nesting: float) -> _ConeLimits:
-        """Limits between the simulation's (nesting 0) and the plan's (nesting 1)."""
-        return cls(
-            1.0 + nesting * (margins.friction - 1.0),
-            1.0 + nesting * (margins.yaw - 1.0),
-            half_size - nesting * np.minimum(margins.cop, half_size / 2.0),
-        )
-
 
 class Controller:
     """Tracks a reference with an inverse-dynamics QP, once per control tick.
@@ -80,9 +71,14 @@ class Controller:
         self.targets = LimbTargets(reference, self.tracker, config.controller)
         self._box = JointBox(robot, config.controller)
         self._torque_limit = config.controller.torque_fraction * robot.torque_limit
+        nesting, urgent_nesting = config.controller.nesting, config.controller.urgent_nesting
         self._limits = {
-            urgent: _ConeLimits.between(margins, robot.half_sizes, nesting)
-            for urgent, nesting in ((False, config.controller.nesting), (True, config.controller.urgent_nesting))
+            urgent: _ConeLimits(
+                min(1.0 + nesting * (margins.friction - 1.0), config.controller.max_friction),
+                min(1.0 + nesting * (margins.yaw - 1.0), config.controller.max_yaw),
+                robot.half_sizes - shrink * np.minimum(margins.cop, robot.half_sizes / 2.0),
+            )
+            for urgent, shrink in ((False, nesting), (True, urgent_nesting))
         }
         self._urgent, self._calm = False, 1.0
         legs = np.zeros(len(robot.joint_names), bool)
@@ -189,8 +185,8 @@ class Controller:
     def _sense_urgency(self) -> None:
         """See how far the CoM diverges from its plan.
 
-        A robot about to fall uses its feet to their edges and swings its body: the margins of the wrench cones shrink,
-        and so do the weights of angular momentum and of the base's orientation.
+        A robot about to fall uses its feet to their edges and swings its body: the margins of the CoP shrink, and so do
+        the weights of angular momentum and of the base's orientation. Friction keeps its margin: a slip saves nobody.
         """
         gains, dynamics = self._config, self.dynamics
         x, y = (dynamics.com - self._com + (dynamics.com_velocity - self._com_velocity) / gains.divergence_rate)[:2]

@@ -64,7 +64,7 @@ class StepAdjuster:
                 targets.shift_velocity[foot] = 0.0
                 continue
             share = (reference.times[index] - swing.start) / (swing.end - swing.start)
-            if swing.end - swing.start <= config.max_swing and share <= config.fraction:
+            if swing.end - swing.start <= config.max_swing + 1e-9 and share <= config.fraction:
                 self._choose(foot, swing.contact, self._divergence(index, dynamics), dynamics)
             step = self._goal[foot] - targets.shift[foot]
             length = float(np.linalg.norm(step))
