@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -15,17 +15,19 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from toolkit import cli
 from toolkit.contacts.category import Category
-from toolkit.errors import DatasetError, InputError
+from toolkit.errors import DatasetError, InputError, NetworkError
 from toolkit.learning.collect import Progress as Collected
 from toolkit.learning.collect import collect
 from toolkit.learning.dataset import read_dataset
 from toolkit.learning.evaluate import Score, at_default, balanced, score
 from toolkit.learning.query import query_seconds
 from toolkit.learning.shard import CollectConfig
+from toolkit.prediction.network import load_network, network_path, training_summary
 from toolkit.prediction.networks import load_networks
 from toolkit.report.console import make_console
 from toolkit.report.scores import score_table
 from toolkit.robot.loader import load_robot
+from toolkit.robot.model import RobotModel
 
 DESCRIPTION = """\
 Make the networks with which the contact search judges transitions.
@@ -115,8 +117,12 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
     out = args.out or robot.folder / "networks"
     data = read_dataset(args.data, robot.fingerprint, limit=args.limit)
     wanted = [Category(index) for index in args.categories] if args.categories else list(data)
-    config = FitConfig(epochs=args.epochs, seed=args.seed)
-    curves = {}
+    try:
+        torch.zeros(1, device=args.device)
+    except (RuntimeError, AssertionError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(f"--device {args.device}: torch cannot compute there ({reason}); use --device cpu") from None
+    config = FitConfig(epochs=args.epochs, device=args.device, seed=args.seed)
     with progress_bar(console) as progress:
         task = progress.add_task("epochs", total=2 * config.epochs * len(wanted))
         for number, category in enumerate(wanted):
@@ -127,15 +133,26 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
                 done = (2 * number + (name == "regressor")) * config.epochs + epoch + 1
                 progress.update(task, completed=done, description=f"{int(category)} {name} {training:.4f} {held:.4f}")
 
-            curves[category] = fit_category(
+            curves = fit_category(
                 category, data[category], fingerprint=robot.fingerprint, folder=out, config=config, progress=tick
             )
             if not console.is_terminal:
-                losses = {name: round(float(curve.validation.min()), 4) for name, curve in curves[category].items()}
+                losses = {name: round(float(curve.validation.min()), 4) for name, curve in curves.items()}
                 console.print(f"category {int(category)}: {len(data[category])} transitions, validation {losses}")
-            draw_curves(curves, out / "learning_curves.png")
+            draw_curves(_saved_curves(robot, out), out / "learning_curves.png")
     console.print(str(out))
     return 0
+
+
+def _saved_curves(robot: RobotModel, folder: Path) -> dict[Category, dict]:
+    """Learning curves of the networks in a folder, also of those that were trained before."""
+    found = {}
+    for category in Category:
+        path = network_path(folder, category)
+        if path.is_file():
+            with suppress(NetworkError):  # of another robot, or older than this format
+                found[category] = training_summary(load_network(path, category, robot.fingerprint))["curves"]
+    return found
 
 
 def run_evaluate(args: argparse.Namespace, console: Console) -> int:
@@ -183,6 +200,7 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument("--limit", type=cli.positive(int), help="transitions per category at most")
     sub.add_argument("--categories", type=int, nargs="+", choices=range(10), metavar="0..9", help="only these")
     sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="threads (default: all cores)")
+    sub.add_argument("--device", default="cpu", help="where torch computes, such as cuda (default: %(default)s)")
     sub.set_defaults(run=run_fit)
 
     sub = add("evaluate", "score the networks on transitions that they have not seen")

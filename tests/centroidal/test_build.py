@@ -44,10 +44,13 @@ def test_the_heading_turns_the_short_way_across_pi(robot, feet):
 
 
 def test_the_final_box_stands_above_the_new_feet(robot, feet):
-    config = ProblemConfig(final_half_size=(0.1, 0.2, 0.3))
-    problem = transition_problem(robot, feet, initial_com(robot, feet), np.zeros(3), step(), config=config)
-    np.testing.assert_allclose(problem.final_center, [0.15, 0.0, 0.025 + robot.com_height], rtol=1e-12, atol=1e-12)
-    np.testing.assert_array_equal(problem.final_half_size, [0.1, 0.2, 0.3])
+    config = ProblemConfig(final_half_size=(0.1, 0.2, 0.3), moving_half_size=(0.4, 0.5, 0.6))
+    for at_rest, size in ((True, [0.1, 0.2, 0.3]), (False, [0.4, 0.5, 0.6])):
+        problem = transition_problem(
+            robot, feet, initial_com(robot, feet), np.zeros(3), step(), config=config, final_at_rest=at_rest
+        )
+        np.testing.assert_allclose(problem.final_center, [0.15, 0.0, 0.025 + robot.com_height], rtol=1e-12, atol=1e-12)
+        np.testing.assert_array_equal(problem.final_half_size, size)
 
 
 def test_breaking_a_palm_swings_without_it(robot, feet):

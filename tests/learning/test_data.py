@@ -17,7 +17,7 @@ from toolkit.learning.dataset import (
 )
 from toolkit.learning.evaluate import balanced, score
 from toolkit.prediction.features import feature_size
-from toolkit.prediction.network import load_network, network_path
+from toolkit.prediction.network import OBJECTIVE_SCALE, load_network, network_path
 from toolkit.prediction.networks import NetworkEvaluator
 
 CATEGORY = Category.BREAK_ONLY_PALM
@@ -42,7 +42,7 @@ def test_a_network_computes_what_its_layers_say(saved):
     for layer in range(4):
         y = y @ values[f"regressor.{layer}.weight"] + values[f"regressor.{layer}.bias"]
         y = y if layer == 3 else np.maximum(y, 0)
-    y[:, 0] = np.maximum(y[:, 0], 0) ** 2
+    y[:, 0] = OBJECTIVE_SCALE * np.expm1(np.maximum(y[:, 0], 0))
     y[:, 1:4] += x[:, -9:-6]  # where the CoM is, from which it goes on
     np.testing.assert_allclose(network.predict(x), y, rtol=1e-4, atol=1e-4)  # float32 sums
     assert (network.predict(x)[:, 0] >= 0).all()

@@ -29,7 +29,10 @@ class ProblemConfig:
     Attributes:
         steps: intervals per phase (the paper: 1 s in steps of 0.2 s).
         max_dt: s; long phases of a schedule get more steps than `steps` to stay below this.
-        final_half_size: (3,) m; half sizes of the box for the last CoM, around the home height above the mean feet.
+        final_half_size: (3,) m; half sizes of the box for the last CoM, around the home height above the mean feet,
+            where the robot is to rest.
+        moving_half_size: (3,) m; the same after a transition that others follow: long strides leave the CoM before or
+            behind the middle of the feet, and lower.
         min_height: the CoM stays this part of the home height above the lowest foot in contact.
         max_normal_force: bound on the normal force of each limb in multiples of the robot's weight, applied on top of
             the limb's own limit: legs do not push with arbitrary force, however short the step.
@@ -41,6 +44,7 @@ class ProblemConfig:
     steps: int = 5
     max_dt: float = 0.2
     final_half_size: tuple[float, float, float] = (0.15, 0.10, 0.10)
+    moving_half_size: tuple[float, float, float] = (0.25, 0.12, 0.15)
     min_height: float = 0.7
     max_normal_force: float = 3.0
     max_velocity: float = 20.0
@@ -221,7 +225,7 @@ def _problem(
         max_reach=reach,
         min_height=config.min_height * robot.com_height,
         final_center=np.array([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2 + robot.com_height]),
-        final_half_size=np.array(config.final_half_size, float),
+        final_half_size=np.array(config.final_half_size if final_at_rest else config.moving_half_size, float),
         final_at_rest=final_at_rest,
         weights=config.weights,
         margins=config.margins,

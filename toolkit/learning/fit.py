@@ -16,7 +16,16 @@ from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
 from toolkit.learning.dataset import Samples
 from toolkit.prediction.features import COM, TARGETS
-from toolkit.prediction.network import HIDDEN, LAYERS, SCHEMA, Perceptron, feasibility, network_path, outcome
+from toolkit.prediction.network import (
+    HIDDEN,
+    LAYERS,
+    SCHEMA,
+    Perceptron,
+    compressed,
+    feasibility,
+    network_path,
+    outcome,
+)
 
 Progress = Callable[[str, int, float, float], None]
 _SILENT: Progress = lambda name, epoch, training, validation: None  # noqa: E731
@@ -33,9 +42,11 @@ class FitConfig:
         weight_decay: of AdamW.
         dropout: in the classifier.
         width: of the smooth L1 loss, below which it is quadratic, in standard deviations of an output.
+        objective_weight: of the objective's loss beside those of the six other outputs.
         validation: share of the data held out for early stopping: the last ones, which come from other terrain.
         patience: epochs without a better validation loss before stopping.
         coarse: share of the epochs that compute in bfloat16, twice as fast on processors that have it.
+        device: torch's name of where to compute.
         objective_limit: transitions with a larger objective do not teach the regressor.
         minimum: fewest samples with each label.
         seed: of the initial weights and the shuffling.
@@ -46,12 +57,14 @@ class FitConfig:
     learning_rate: float = 2e-3
     weight_decay: float = 1e-4
     dropout: float = 0.0
-    width: float = 0.05
+    width: float = 0.02
+    objective_weight: float = 3.0
     validation: float = 0.05
     patience: int = 15
     coarse: float = 0.8
     objective_limit: float = 5e4
     minimum: int = 50
+    device: str = "cpu"
     seed: int = 0
 
 
@@ -97,8 +110,10 @@ def _train(
     progress: Callable[[int, float, float], None],
 ) -> Curve:
     """Train in place with early stopping; the weights of the best epoch are kept."""
-    inputs, targets = data
-    generator = torch.Generator().manual_seed(config.seed)
+    device = torch.device(config.device)
+    inputs, targets = (part.to(device) for part in data)
+    net.to(device)
+    generator = torch.Generator(device).manual_seed(config.seed)
     count = len(inputs) - max(1, int(config.validation * len(inputs)))
     size = min(config.batch, count)
     steps = count // size
@@ -110,22 +125,23 @@ def _train(
     training, validation = [], []
     for epoch in range(config.epochs):
         net.train()
-        order = torch.randperm(count, generator=generator)
-        total = 0.0
+        order = torch.randperm(count, generator=generator, device=device)
+        total = torch.zeros((), device=device)
+        coarse = device.type == "cpu" and epoch < config.coarse * config.epochs
         for step in range(steps):
             rows = order[step * size : (step + 1) * size]
             optimiser.zero_grad(set_to_none=True)
-            with torch.autocast("cpu", torch.bfloat16, enabled=epoch < config.coarse * config.epochs):
+            with torch.autocast("cpu", torch.bfloat16, enabled=coarse):
                 outputs = net(inputs[rows])
             value = loss(outputs.float(), targets[rows])
             value.backward()
             optimiser.step()
             schedule.step()
-            total += float(value.detach())
+            total += value.detach()
         net.eval()
         with torch.no_grad():
             held = float(loss(net(inputs[count:]), targets[count:]))
-        training.append(total / steps)
+        training.append(float(total) / steps)
         validation.append(held)
         progress(epoch, training[-1], held)
         if held < best:
@@ -134,8 +150,20 @@ def _train(
         elif epoch - best_epoch >= config.patience:
             break
     net.load_state_dict(kept)
-    net.eval()
+    net.cpu().eval()
     return Curve(np.array(training), np.array(validation), best_epoch)
+
+
+def _weighted(config: FitConfig) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
+    """The smooth L1 loss with the objective's own weight."""
+    weights = torch.ones(TARGETS, device=config.device)
+    weights[0] = config.objective_weight
+
+    def loss(outputs: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
+        each = nn.functional.smooth_l1_loss(outputs, targets, beta=config.width, reduction="none")
+        return (each.mean(0) * weights).mean()
+
+    return loss
 
 
 def _folded(
@@ -158,8 +186,8 @@ def _folded(
 def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SILENT) -> TrainedNetworks:
     """Train both networks on samples, in any encoding whose last columns are those of `features.encode`.
 
-    The classifier minimises the logistic loss, the regressor the smooth L1 loss of its scaled outputs: the root of the
-    objective, not centred, as in the original; way of the CoM and velocity z-scored.
+    The classifier minimises the logistic loss, the regressor the smooth L1 loss of its scaled outputs: the
+    compressed objective, not centred, as in the original; way of the CoM and velocity z-scored.
 
     Args:
         samples: labelled transitions of one category.
@@ -186,7 +214,7 @@ def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SI
 
     kept = feasible & (samples.targets[:, 0] < config.objective_limit)
     targets = samples.targets[kept].astype(np.float64)
-    targets[:, 0] = np.sqrt(targets[:, 0])
+    targets[:, 0] = compressed(targets[:, 0])
     targets[:, 1:4] -= features[kept, COM]
     out_mean = np.concatenate([[0.0], targets[:, 1:].mean(0)])
     out_std = np.maximum(targets.std(0), 1e-4)
@@ -194,7 +222,7 @@ def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SI
     curves["regressor"] = _train(
         regressor,
         (inputs[torch.from_numpy(kept)], torch.from_numpy(((targets - out_mean) / out_std).astype(np.float32))),
-        nn.SmoothL1Loss(beta=config.width),
+        _weighted(config),
         config,
         lambda *state: progress("regressor", *state),
     )
@@ -253,6 +281,10 @@ def fit_category(
         "config": asdict(config),
         "epochs": {name: len(curve.training) for name, curve in curves.items()},
         "validation_loss": {name: float(curve.validation.min()) for name, curve in curves.items()},
+        "curves": {
+            name: [[float(f"{value:.3g}") for value in losses] for losses in (curve.training, curve.validation)]
+            for name, curve in curves.items()
+        },
         "torch": torch.__version__,
     }
     metadata = {

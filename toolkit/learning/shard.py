@@ -4,10 +4,14 @@ The planner walks at random through tilted tiles with one or two walls (paper, S
 state some are labelled, preferring categories of which the shard still lacks samples, and the search goes on from
 those that are feasible. What a planner meets is mostly feasible, and the networks must know where that ends: so many
 initial states are disturbed, each by its own amount, that the wanted share of the labels is "infeasible".
+
+Ground on which nothing rests has to be crossed in motion. Therefore a part of each shard is collected on slopes, with
+quick steps, from states that already run (`slope_samples`).
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -21,7 +25,7 @@ from toolkit.errors import PlanningError
 from toolkit.geometry.limb import PALMS
 from toolkit.learning.dataset import Samples
 from toolkit.learning.label import label
-from toolkit.learning.terrain import TerrainConfig, random_terrain
+from toolkit.learning.terrain import SlopeConfig, TerrainConfig, random_slope, random_terrain
 from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.prediction.features import LAYOUT, TARGETS, encode, feature_size
 from toolkit.robot.loader import load_robot
@@ -37,6 +41,7 @@ PALMS_BEFORE = {category: len(limbs) - 2 for category, (limbs, _) in LAYOUT.item
 _NOWHERE = Goal(np.array([20.0, 0.0, 0.0]), 0.1)  # a search that finds its goal goes no further
 _REPEATS = 4  # times that one transition is labelled, from as many states
 _TO_GO_ON = 4  # labelled per state where no category lacks samples
+_DEFAULT, _VARIED, _SLOPE = "default", "varied", "slope"  # terrain: the paper's, any tilts and timings, a slope
 
 
 @dataclass(frozen=True)
@@ -49,23 +54,27 @@ class CollectConfig:
         seed: of everything random.
         samples_per_category: at least so many.
         per_shard: of each category in a shard, at least.
+        slope_share: further steps on slopes, as part of `per_shard`.
         default_share: of terrains with the paper's timing (1 s + 1 s), friction (0.5) and tiles; the others draw all.
-        shift, swing: s, ranges that timings are drawn from (uniformly in their logarithm), one for each transition.
+        shift, swing: s, ranges that timings are drawn from (uniformly in their logarithm), one for each transition;
+        slope_shift, slope_swing: the same on slopes.
         friction: range of the coefficient, drawn for each state.
         tilt: deg, and
         rise: m; ranges from which the largest tilt and height of the tiles of a terrain are drawn.
         two_walls: share of the terrains with walls on both sides.
         considered: transitions of a state that are labelled, and
         children: of them that the search goes on from.
-        expansions: states of a terrain that are expanded.
-        infeasible: share of this label that is aimed at in every category, apart for default and other terrains.
+        expansions: states of a terrain that are expanded; slope_expansions: the same of a slope.
+        infeasible: share of this label that is aimed at in every category and kind of terrain.
         com_spread: (3,) m; velocity_spread: (3,) m/s; standard deviations of a disturbance of the initial state in the
             frame of the feet, before it is scaled.
         far: range of the scale of large disturbances, as many as make `infeasible` true.
         near: share of small disturbances, scaled by a number drawn from [0, 1], among the other states.
+        run_share: share of the states on slopes that are replaced by a running one.
+        run_speed: m/s, range of its speed; run_spread: (3,) m; how far the CoM may lie from over the mean of the feet.
         objective_limit: feasible transitions with a larger objective are left out, as in the original;
-        disturbed_limit: the same where the initial state was disturbed: what can just be recovered, at any price, is
-            of no use to a planner.
+        disturbed_limit: the same where a resting robot's state was disturbed by much: what can just be recovered, at
+            any price, is of no use to a planner.
     """
 
     robot: str
@@ -73,9 +82,12 @@ class CollectConfig:
     seed: int = 0
     samples_per_category: int = 100_000
     per_shard: int = 500
+    slope_share: float = 0.5
     default_share: float = 0.45
-    shift: tuple[float, float] = (0.05, 1.0)
-    swing: tuple[float, float] = (0.3, 1.0)
+    shift: tuple[float, float] = (0.04, 1.0)
+    swing: tuple[float, float] = (0.25, 1.0)
+    slope_shift: tuple[float, float] = (0.04, 0.2)
+    slope_swing: tuple[float, float] = (0.25, 0.5)
     friction: tuple[float, float] = (0.3, 0.9)
     tilt: tuple[float, float] = (10.0, 32.0)
     rise: tuple[float, float] = (0.02, 0.15)
@@ -83,13 +95,17 @@ class CollectConfig:
     considered: int = 24
     children: int = 4
     expansions: int = 40
+    slope_expansions: int = 12
     infeasible: float = 0.33
-    com_spread: tuple[float, float, float] = (0.05, 0.045, 0.025)
-    velocity_spread: tuple[float, float, float] = (0.2, 0.16, 0.08)
-    far: tuple[float, float] = (3.5, 9.0)
+    com_spread: tuple[float, float, float] = (0.03, 0.03, 0.015)
+    velocity_spread: tuple[float, float, float] = (0.12, 0.1, 0.05)
+    far: tuple[float, float] = (5.0, 15.0)
     near: float = 0.35
-    objective_limit: float = 5e4
-    disturbed_limit: float = 5e3
+    run_share: float = 0.3
+    run_speed: tuple[float, float] = (0.0, 2.5)
+    run_spread: tuple[float, float, float] = (0.3, 0.06, 0.08)
+    objective_limit: float = 2e4
+    disturbed_limit: float = 1e3
 
     @property
     def shards(self) -> int:
@@ -97,9 +113,9 @@ class CollectConfig:
         return -(-self.samples_per_category // self.per_shard)
 
     @property
-    def shard_total(self) -> int:
-        """Fewest transitions in a shard of a robot with arms."""
-        return self.per_shard * len(Category)
+    def per_slope(self) -> int:
+        """Steps on slopes in a shard, at least."""
+        return round(self.slope_share * self.per_shard)
 
 
 @dataclass
@@ -125,7 +141,7 @@ class Quota:
 
     def lack(self, category: Category) -> int:
         """Samples still wanted."""
-        return max(self.wanted - self.counts[category], 0)
+        return max(self.wanted - self.counts[category], 0) if category in self.counts else 0
 
     @property
     def full(self) -> bool:
@@ -133,7 +149,9 @@ class Quota:
         return all(count >= self.wanted for count in self.counts.values())
 
     def add(self, category: Category, features: np.ndarray, feasible: np.ndarray, targets: np.ndarray) -> None:
-        """Enter samples (n, d), (n,), (n, 7)."""
+        """Enter samples (n, d), (n,), (n, 7); those of other categories are dropped."""
+        if category not in self.counts:
+            return
         self.features[category].append(features.astype(np.float32))
         self.feasible[category].append(feasible)
         self.targets[category].append(targets.astype(np.float32))
@@ -156,15 +174,15 @@ class _Balance:
     """Decides which initial states to disturb, so that the label "infeasible" reaches its share."""
 
     wanted: float
-    counts: dict[tuple[Category, bool], list[int]] = field(default_factory=dict)
+    counts: dict[tuple[Category, str], list[int]] = field(default_factory=dict)
 
-    def probability(self, category: Category, is_default: bool) -> float:
-        infeasible, total = self.counts.get((category, is_default), (0, 0))
+    def probability(self, category: Category, kind: str) -> float:
+        infeasible, total = self.counts.get((category, kind), (0, 0))
         share = (infeasible + 1.0) / (total + 1.0 / self.wanted)
         return float(np.clip(0.4 + 4.0 * (self.wanted - share), 0.02, 0.9))
 
-    def count(self, category: Category, is_default: bool, feasible: np.ndarray) -> None:
-        pair = self.counts.setdefault((category, is_default), [0, 0])
+    def count(self, category: Category, kind: str, feasible: np.ndarray) -> None:
+        pair = self.counts.setdefault((category, kind), [0, 0])
         pair[0] += int((~feasible).sum())
         pair[1] += len(feasible)
 
@@ -179,10 +197,10 @@ class _Recorder:
         balance: _Balance,
         config: CollectConfig,
         rng: np.random.Generator,
-        is_default: bool,
+        kind: str,
     ):
         self._robot, self._quota, self._balance, self._config, self._rng = robot, quota, balance, config, rng
-        self._is_default = is_default
+        self._kind = kind
 
     def evaluate(
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
@@ -197,7 +215,7 @@ class _Recorder:
             groups.setdefault((item.limb, item.contact is None), []).append(index)
         categories = [category_of(stance, transitions[rows[0]]) for rows in groups.values()]
         chosen = self._choose([np.array(rows) for rows in groups.values()], categories)
-        friction = None if self._is_default else float(self._rng.uniform(*self._config.friction))
+        friction = None if self._kind == _DEFAULT else float(self._rng.uniform(*self._config.friction))
         old = _with_friction(stance, friction)
         for rows, category in zip(chosen, categories, strict=True):
             if len(rows):
@@ -220,14 +238,17 @@ class _Recorder:
         n, rng, config = len(items), self._rng, self._config
         again = np.concatenate([[False], rows[1:] == rows[:-1]])  # the same transition from another state
         near = rng.random(n) * (again | (rng.random(n) < config.near))
-        is_far = rng.random(n) < self._balance.probability(category, self._is_default)
+        is_far = rng.random(n) < self._balance.probability(category, self._kind)
         scale = np.where(is_far, rng.uniform(*config.far, n), near)
         turn = scale[:, None] * (rng.normal(size=(2, n, 3)))
         forward = stance.mean_feet.rotation.T
         start = com + (turn[0] * config.com_spread) @ forward
         velocity = com_velocity + (turn[1] * config.velocity_spread) @ forward
+        if self._kind == _SLOPE:
+            runs = rng.random(n) < config.run_share
+            start[runs], velocity[runs], is_far = *self._running(stance, int(runs.sum())), is_far & ~runs
         batch = label(self._robot, stance, start, velocity, items)
-        limit = np.where(scale > 0.0, config.disturbed_limit, config.objective_limit)
+        limit = np.where(is_far, config.disturbed_limit, config.objective_limit)
         kept = ~batch.feasible | (batch.objective <= limit)
         frame, features = encode(stance, start, velocity, items)
         targets = np.zeros((n, TARGETS))
@@ -236,9 +257,22 @@ class _Recorder:
         targets[good, 1:4] = frame.point(batch.com[good])
         targets[good, 4:7] = frame.vector(batch.com_velocity[good])
         self._quota.add(category, features[kept], batch.feasible[kept], targets[kept])
-        self._balance.count(category, self._is_default, batch.feasible[kept])
+        self._balance.count(category, self._kind, batch.feasible[kept])
         result.feasible[rows[good]], result.objective[rows[good]] = True, batch.objective[good]
         result.com[rows[good]], result.com_velocity[rows[good]] = batch.com[good], batch.com_velocity[good]
+
+    def _running(self, stance: Stance, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """CoM (n, 3) and velocity (n, 3) of a robot that runs the way its feet point, along the ground."""
+        config, rng, feet = self._config, self._rng, stance.mean_feet
+        ahead = feet.rotation[:, 0]
+        normal = np.sum([contact.pose.rotation[:, 2] for contact in stance.contacts[:2]], axis=0)
+        ahead = ahead - normal * (ahead @ normal) / (normal @ normal)
+        ahead /= np.linalg.norm(ahead)
+        spread = rng.uniform(-1.0, 1.0, (count, 3)) * config.run_spread
+        spread[:, 2] -= config.run_spread[2] / 2  # rather low than high
+        com = feet.position + [0.0, 0.0, self._robot.com_height] + spread @ feet.rotation.T
+        speed = rng.uniform(*config.run_speed, (count, 1))
+        return com, speed * ahead + (rng.normal(size=(count, 3)) * config.velocity_spread) @ feet.rotation.T
 
     def _pass_on(self, stance: Stance, transitions: list[ContactTransition], result: TransitionBatch) -> None:
         """Keep a few of the feasible transitions, most of those into stances from which samples are lacking."""
@@ -246,7 +280,7 @@ class _Recorder:
         if len(rows) <= self._config.children:
             return
         lack = [
-            max(self._quota.lack(category) for category in self._quota.categories if PALMS_BEFORE[category] == count)
+            max((self._quota.lack(c) for c in self._quota.categories if PALMS_BEFORE[c] == count), default=0)
             for count in range(3)
         ]
         palms = len(stance.palms)
@@ -265,7 +299,9 @@ class _Recorder:
         if friction is None:
             return transition
         config, contact = self._config, transition.contact
-        shift, swing = (float(np.exp(self._rng.uniform(*np.log(bounds)))) for bounds in (config.shift, config.swing))
+        quick = self._kind == _SLOPE
+        ranges = (config.slope_shift, config.slope_swing) if quick else (config.shift, config.swing)
+        shift, swing = (float(np.exp(self._rng.uniform(*np.log(bounds)))) for bounds in ranges)
         new = None if contact is None else replace(contact, friction=friction)
         return ContactTransition(transition.limb, new, Timing(shift, swing))
 
@@ -314,26 +350,39 @@ def collect_shard(config: CollectConfig, index: int) -> dict[Category, Samples]:
     """
     rng = np.random.default_rng([config.seed, index])
     robot = _robot(config.robot, config.robots)
-    quota, balance = Quota(config.per_shard, categories_of(robot)), _Balance(config.infeasible)
-    while not quota.full:
-        is_default = bool(rng.random() < config.default_share)
+    balance = _Balance(config.infeasible)
+    tilted, slopes = Quota(config.per_shard, categories_of(robot)), Quota(config.per_slope, [Category.MOVE_FOOT])
+    while not tilted.full:
+        kind = _DEFAULT if rng.random() < config.default_share else _VARIED
         walls = 1 + int(rng.random() < config.two_walls)
         terrain = TerrainConfig(walls=walls)
-        if not is_default:
+        if kind == _VARIED:
             tilt, rise = rng.uniform(*config.tilt), rng.uniform(*config.rise)
             terrain = TerrainConfig(tilt=tilt, rise=rise, walls=walls)
-        planner = ContactPlanner(
-            robot,
-            replace(load_world("training.xml", mjcf=random_terrain(rng, terrain)), goal=_NOWHERE),
-            _Recorder(robot, quota, balance, config, rng, is_default),
-            PlannerConfig(
-                heuristic="euclidean",
-                wide_steps="on",
-                search=AnaStarConfig(epsilon=0.9, max_expansions=config.expansions),
-            ),
-        )
-        try:
-            planner.search(rng, np.inf)
-        except PlanningError:  # the tile at the start is too steep to stand on: another terrain
-            continue
-    return quota.samples()
+        recorder = _Recorder(robot, tilted, balance, config, rng, kind)
+        _walk(robot, random_terrain(rng, terrain), recorder, config.expansions, rng)
+    while not slopes.full:
+        recorder = _Recorder(robot, slopes, balance, config, rng, _SLOPE)
+        _walk(robot, random_slope(rng, SlopeConfig()), recorder, config.slope_expansions, rng)
+    samples = tilted.samples()
+    for category, more in slopes.samples().items():
+        samples[category] = _mixed(samples[category], more, rng)
+    return samples
+
+
+def _walk(robot: RobotModel, text: str, recorder: _Recorder, expansions: int, rng: np.random.Generator) -> None:
+    """Let the planner walk at random on one terrain."""
+    world = replace(load_world("training.xml", mjcf=text), goal=_NOWHERE)
+    search = AnaStarConfig(epsilon=0.9, max_expansions=expansions)
+    planner = ContactPlanner(
+        robot, world, recorder, PlannerConfig(heuristic="euclidean", wide_steps="on", search=search)
+    )
+    with suppress(PlanningError):  # the ground at the start is too steep to stand on: another terrain
+        planner.search(rng, np.inf)
+
+
+def _mixed(first: Samples, second: Samples, rng: np.random.Generator) -> Samples:
+    """Both in random order."""
+    parts = ("features", "feasible", "targets")
+    joined = Samples(*(np.concatenate([getattr(first, part), getattr(second, part)]) for part in parts))
+    return joined.select(rng.permutation(len(joined)))

@@ -1,4 +1,4 @@
-"""Terrain to collect transitions on: tilted tiles around the start and walls within reach of the palms."""
+"""Terrain to collect transitions on: tilted tiles and walls within reach of the palms, and slopes to run down."""
 
 from __future__ import annotations
 
@@ -29,6 +29,35 @@ class TerrainConfig:
     walls: int = 2
     distance: tuple[float, float] = (0.45, 0.8)
     bearing: float = 45.0
+
+
+@dataclass(frozen=True)
+class SlopeConfig:
+    """Ranges of a slope with level ground above and below it.
+
+    Attributes:
+        angle: deg; range.
+        length: m; range.
+        width: m.
+    """
+
+    angle: tuple[float, float] = (5.0, 35.0)
+    length: tuple[float, float] = (0.8, 3.0)
+    width: float = 1.2
+
+
+def random_slope(rng: np.random.Generator, config: SlopeConfig) -> str:
+    """MJCF text of a slope that descends along x; the start is anywhere on it or shortly above it."""
+    angle, length = np.radians(rng.uniform(*config.angle)), rng.uniform(*config.length)
+    along = np.array([np.cos(angle), 0.0, -np.sin(angle)])
+    down = rng.uniform(-0.4, 0.8 * length)  # from the upper edge to the start
+    start = down * along if down > 0.0 else np.array([down, 0.0, 0.0])
+    end = length * along
+    world = WorldText("training", "a slope", 0.5, (0.05, 0.35), tuple(start), (20.0, 0.0, 0.0), abyss=None)
+    world.platform("above", (-1.5, 0.0), config.width)
+    world.tile("slope", (length, config.width), end / 2, material="slope", rotation=Rotation.from_euler("y", angle))
+    world.platform("below", (end[0], end[0] + 3.0), config.width, end[2])
+    return world.render()
 
 
 def random_terrain(rng: np.random.Generator, config: TerrainConfig) -> str:

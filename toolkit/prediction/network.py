@@ -13,9 +13,10 @@ from toolkit.contacts.category import Category
 from toolkit.errors import NetworkError
 from toolkit.prediction.features import COM, TARGETS, feature_size
 
-SCHEMA = "transition-network-2"
+SCHEMA = "transition-network-3"
 HIDDEN = 256
 LAYERS = 4  # three hidden ones and the output
+OBJECTIVE_SCALE = 10.0  # objectives below it are learnt in proportion to themselves, larger ones to their logarithm
 
 
 @dataclass(frozen=True)
@@ -45,14 +46,24 @@ def feasibility(classifier: Perceptron, features: np.ndarray) -> np.ndarray:
     return classifier(features)[:, 0] > 0.0
 
 
+def compressed(objective: np.ndarray) -> np.ndarray:
+    """What the regressor gives for an objective: log(1 + objective / scale)."""
+    return np.log1p(objective / OBJECTIVE_SCALE)
+
+
+def expanded(output: np.ndarray) -> np.ndarray:
+    """The objective (not negative) of what the regressor gives."""
+    return OBJECTIVE_SCALE * np.expm1(np.clip(output, 0.0, 20.0))
+
+
 def outcome(regressor: Perceptron, features: np.ndarray) -> np.ndarray:
     """(n, 7) float32 objective, CoM and velocity of transitions (n, d), canonical.
 
-    The regressor gives the root of the objective (its ReLU is taken, so that objectives are not negative), and where
-    the CoM goes from where it is: what spans four orders of magnitude, or hardly changes, is easier to learn so.
+    The regressor gives the compressed objective and where the CoM goes from where it is: what spans four orders of
+    magnitude, or hardly changes, is easier to learn so.
     """
     outputs = regressor(features)
-    outputs[:, 0] = np.square(np.maximum(outputs[:, 0], 0.0))
+    outputs[:, 0] = expanded(outputs[:, 0])
     outputs[:, 1:4] += features[:, COM]
     return outputs
 

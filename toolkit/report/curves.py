@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -14,30 +13,15 @@ from toolkit.contacts.category import Category
 from toolkit.report.colors import EXECUTED, OPTIMISED, unit
 
 
-class CurveLike(Protocol):
-    """Losses per epoch, and the epoch that was kept; see `toolkit.learning.fit.Curve` (which needs torch)."""
-
-    @property
-    def training(self) -> np.ndarray:
-        """(epochs,) losses on the training set."""
-        ...
-
-    @property
-    def validation(self) -> np.ndarray:
-        """(epochs,) losses on the validation set."""
-        ...
-
-    @property
-    def best(self) -> int:
-        """The epoch that was kept."""
-        ...
+Losses = tuple[Sequence[float], Sequence[float]]
 
 
-def draw_curves(curves: Mapping[Category, Mapping[str, CurveLike]], path: Path) -> None:
+def draw_curves(curves: Mapping[Category, Mapping[str, Losses]], path: Path) -> None:
     """Write a picture of learning curves: a row per category, a column per network.
 
     Args:
-        curves: category -> name of the network -> its curve.
+        curves: category -> name of the network -> its losses per epoch on the training and on the validation set; the
+            weights of the epoch with the lowest of the latter were kept.
         path: file; the ending gives the format (png, pdf, svg).
     """
     columns = sorted({name for networks in curves.values() for name in networks})
@@ -55,11 +39,12 @@ def draw_curves(curves: Mapping[Category, Mapping[str, CurveLike]], path: Path) 
     FigureCanvasAgg(figure).print_figure(str(path), dpi=100)
 
 
-def _draw(axes, curve: CurveLike) -> None:
+def _draw(axes, losses: Losses) -> None:
     """One panel."""
-    axes.semilogy(curve.training, color=unit(OPTIMISED), label="training")
-    axes.semilogy(curve.validation, color=unit(EXECUTED), label="validation")
-    axes.axvline(curve.best, color="0.5", lw=0.8, ls="--", label="kept")
+    training, validation = losses
+    axes.semilogy(training, color=unit(OPTIMISED), label="training")
+    axes.semilogy(validation, color=unit(EXECUTED), label="validation")
+    axes.axvline(int(np.argmin(validation)), color="0.5", lw=0.8, ls="--", label="kept")
     axes.grid(alpha=0.3)
     axes.tick_params(labelsize=7)
     axes.legend(fontsize=7)
