@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from toolkit.errors import InputError
 from toolkit.simulation.disturbance import Disturbance
+from toolkit.simulation.replan_config import ReplanConfig
 
 
 @dataclass(frozen=True)
@@ -118,34 +119,6 @@ class TouchdownConfig:
 
 
 @dataclass(frozen=True)
-class StepAdjustmentConfig:
-    """Moving a landing point with the deviation of the CoM from its plan.
-
-    Attributes:
-        enabled: whether feet land where the deviation asks. Off by default: the walks and pushes tried did not need
-            it, and fast descents were worse with it.
-        max_swing: s; only swings at most this long are adjusted.
-        frequency: 1/s; of the pendulum in `xi = (c - c_ref) + (v - v_ref) / frequency`.
-        deadband: m; deviations below it move nothing.
-        max_shift: m; of one landing point.
-        slew: m/s; of the landing point.
-        fraction: of the swing, after which the landing point is kept.
-        margin: m; distance of the sole from the edge of its surface.
-        gap: m; distance of the sole from the other one, seen from above.
-    """
-
-    enabled: bool = False
-    max_swing: float = 0.6
-    frequency: float = 3.4
-    deadband: float = 0.01
-    max_shift: float = 0.12
-    slew: float = 1.0
-    fraction: float = 0.75
-    margin: float = 0.01
-    gap: float = 0.02
-
-
-@dataclass(frozen=True)
 class ExecutionConfig:
     """The simulated run.
 
@@ -160,7 +133,7 @@ class ExecutionConfig:
         min_height: fraction of the home CoM height above the lowest foot, below which the robot has fallen.
         slip_limit, com_rms_limit: m; of the verdict.
         range_tolerance: rad; of the verdict on joint ranges.
-        controller, touchdown, step_adjustment, disturbance: see the classes.
+        controller, touchdown, replanning, disturbance: see the classes.
     """
 
     timestep: float = 0.002
@@ -176,7 +149,7 @@ class ExecutionConfig:
     range_tolerance: float = 1e-3
     controller: ControllerConfig = field(default_factory=ControllerConfig)
     touchdown: TouchdownConfig = field(default_factory=TouchdownConfig)
-    step_adjustment: StepAdjustmentConfig = field(default_factory=StepAdjustmentConfig)
+    replanning: ReplanConfig = field(default_factory=ReplanConfig)
     disturbance: Disturbance = field(default_factory=Disturbance)
 
     def __post_init__(self):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from toolkit.centroidal.problem import Margins
@@ -15,17 +13,9 @@ from toolkit.simulation.joint_box import JointBox
 from toolkit.simulation.limb_target import LimbTargets
 from toolkit.simulation.qp import FORCE_UNIT, ContactQP
 from toolkit.simulation.reference import Reference
-from toolkit.simulation.step_adjustment import StepAdjuster
+from toolkit.simulation.replan import MotionTarget, Replanner
+from toolkit.simulation.replan_problem import Cones
 from toolkit.simulation.touchdown import ContactTracker, LimbState
-
-
-@dataclass(frozen=True)
-class _ConeLimits:
-    """Factors on friction and yaw moment, and (4, 2) m half extents of the patches, that wrench cones are made of."""
-
-    friction: float
-    yaw: float
-    half_size: np.ndarray
 
 
 class Controller:
@@ -47,7 +37,7 @@ class Controller:
         reference: Reference,
         margins: Margins,
         config: ExecutionConfig,
-        adjuster: StepAdjuster | None = None,
+        replanner: Replanner | None = None,
     ):
         """Prepare for a run.
 
@@ -56,9 +46,10 @@ class Controller:
             reference: the plan at the control ticks.
             margins: the plan's margins; the controller's lie between them and none.
             config: settings.
-            adjuster: moves landing points; they stay as planned where None.
+            replanner: optimises motion and landing points anew; they stay as planned where None.
         """
-        self._adjuster, self._com, self._com_velocity = adjuster, np.zeros(3), np.zeros(3)
+        self._replanner, self._aim = replanner, MotionTarget.zeros()
+        self._com, self._com_velocity = np.zeros(3), np.zeros(3)
         self._robot, self._reference, self._config = robot, reference, config.controller
         self._period = config.control_period
         self.dynamics = RobotDynamics(robot)
@@ -73,7 +64,7 @@ class Controller:
         self._torque_limit = config.controller.torque_fraction * robot.torque_limit
         nesting, urgent_nesting = config.controller.nesting, config.controller.urgent_nesting
         self._limits = {
-            urgent: _ConeLimits(
+            urgent: Cones(
                 min(1.0 + nesting * (margins.friction - 1.0), config.controller.max_friction),
                 min(1.0 + nesting * (margins.yaw - 1.0), config.controller.max_yaw),
                 robot.half_sizes - shrink * np.minimum(margins.cop, robot.half_sizes / 2.0),
@@ -113,10 +104,11 @@ class Controller:
         self.dynamics.update(qpos, qvel)
         self.tracker.update(float(self._reference.times[index]), self._period, normal_force)
         self._com[:], self._com_velocity[:] = self._reference.com[index], self._reference.com_velocity[index]
-        if self._adjuster is not None:
-            self._adjuster.update(index, self._period, self.dynamics, self.tracker, self.targets)
-            self._com += self._adjuster.com_offset
-            self._com_velocity += self._adjuster.com_offset_velocity
+        self._aim.follow(self._reference, index)
+        if self._replanner is not None:
+            cones = self._limits[self._urgent]
+            self._replanner.update(index, self._period, self.dynamics, self.tracker, self.targets, cones, self._aim)
+            self._com += self._replanner.com_shift
         self.targets.update(index, self.dynamics)
         limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
         qp = self._qps.get(limbs)
@@ -155,16 +147,16 @@ class Controller:
     def _pursue(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in the objective."""
         reference, dynamics, gains, nv = self._reference, self.dynamics, self._config, self.dynamics.nv
-        tasks, wanted, target = self._tasks, self._wanted, self._target
+        tasks, wanted, target, aim = self._tasks, self._wanted, self._target, self._aim
         root = gains.com.weight**0.5
         np.multiply(dynamics.com_jacobian, root, out=tasks[:3])
-        error = gains.com.kp * (self._com - dynamics.com)
-        error += gains.com.kd * (self._com_velocity - dynamics.com_velocity)
-        wanted[:3] = root * (error + reference.com_acceleration[index] - dynamics.com_drift)
+        error = gains.com.kp * (aim.com - dynamics.com)
+        error += gains.com.kd * (aim.com_velocity - dynamics.com_velocity)
+        wanted[:3] = root * (error + aim.com_acceleration - dynamics.com_drift)
         root = (gains.angular_momentum.weight * self._calm) ** 0.5 / gains.angular_momentum_scale
         np.multiply(dynamics.momentum_jacobian, root, out=tasks[3:6])
-        error = gains.angular_momentum.kp * (reference.angular_momentum[index] - dynamics.angular_momentum)
-        wanted[3:6] = root * (error + reference.angular_momentum_rate[index] - dynamics.momentum_drift)
+        error = gains.angular_momentum.kp * (aim.angular_momentum - dynamics.angular_momentum)
+        wanted[3:6] = root * (error + aim.angular_momentum_rate - dynamics.momentum_drift)
         rows = 6
         for limb in self.limbs:
             rows = self._pursue_limb(limb, rows)
@@ -179,7 +171,7 @@ class Controller:
             moments = slice(slot.start + 3, slot.stop)
             diagonal[slot] = gains.force * FORCE_UNIT**2
             diagonal[moments] = gains.moment * FORCE_UNIT**2
-            target[slot] = reference.wrench[index, limb, : slot.stop - slot.start] / FORCE_UNIT
+            target[slot] = aim.wrench[limb, : slot.stop - slot.start] / FORCE_UNIT
         qp.set_objective(tasks[:rows], wanted[:rows], diagonal, target[: qp.size])
 
     def _sense_urgency(self) -> None:

@@ -35,6 +35,9 @@ class Execution:
         fell: base too low, tilted, or body contact with the world.
         fall_reason: one line, "" if it did not fall.
         solver_failures: control ticks whose QP was not solved.
+        replans, replan_failures: motions optimised again during the run; those that gave no answer, so that the one
+            before went on.
+        replan_seconds: wall-clock of a replan, on average.
         unplanned_contacts: distinct (robot geom, world geom) names that touched outside the patches.
         tick_seconds: (C,) wall-clock of each control tick.
         simulated_seconds, real_time_factor: of the whole loop.
@@ -82,3 +85,6 @@ class Execution:
     checks: tuple[Check, ...]
     replayable: bool = True
     failure_time: float | None = None
+    replans: int = 0
+    replan_failures: int = 0
+    replan_seconds: float = 0.0

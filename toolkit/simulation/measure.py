@@ -28,6 +28,7 @@ class RunLog:
         ctrl: (S, nu). tick_seconds: (C,) s. wall_seconds: of the loop.
         finished: the loop reached its end.
         solver_failures: ticks.
+        replans, replan_failures: how many were tried, how many gave no answer. replan_seconds: of one, on average.
     """
 
     scene: mujoco.MjModel
@@ -40,6 +41,9 @@ class RunLog:
     wall_seconds: float
     finished: bool
     solver_failures: int
+    replans: int = 0
+    replan_failures: int = 0
+    replan_seconds: float = 0.0
 
 
 def measure(
@@ -127,6 +131,9 @@ def measure(
         max_velocity_ratio=measured.max_velocity_ratio,
         com_rms_error=measured.com_rms_error,
         solver_failures=log.solver_failures,
+        replans=log.replans,
+        replan_failures=log.replan_failures,
+        replan_seconds=log.replan_seconds,
         unplanned_contacts=recorder.meter.unplanned_names,
         tick_seconds=log.tick_seconds,
         simulated_seconds=simulated,

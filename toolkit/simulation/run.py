@@ -20,8 +20,9 @@ from toolkit.simulation.execution import Execution
 from toolkit.simulation.measure import RunLog, measure
 from toolkit.simulation.recorder import Recorder
 from toolkit.simulation.reference import LimbPathSampler, sample_reference
+from toolkit.simulation.replan import Replanner
+from toolkit.simulation.replan_nominal import Nominal
 from toolkit.simulation.scene_index import SceneIndex
-from toolkit.simulation.step_adjustment import StepAdjuster
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.scene import compose_scene
@@ -82,10 +83,11 @@ def execute(
     reference = sample_reference(
         period * np.arange(ticks), sequence, schedule, motion, trajectory, paths, index.limbs()
     )
-    adjuster = None
-    if config.step_adjustment.enabled:
-        adjuster = StepAdjuster(reference, world.surfaces, robot, config.step_adjustment)
-    controller = Controller(robot, reference, motion.problem.margins, config, adjuster)
+    replanner = None
+    if config.replanning.enabled:
+        nominal = Nominal.of(motion, reference.swings, robot, config.replanning)
+        replanner = Replanner(reference, nominal, robot, world.surfaces, config.replanning)
+    controller = Controller(robot, reference, motion.problem.margins, config, replanner)
     recorder = Recorder(ticks, scene, robot, index, config)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(schedule.duration, rng)
@@ -128,6 +130,9 @@ def execute(
         wall_seconds=wall,
         finished=recorder.count == ticks and not recorder.fall,
         solver_failures=controller.failures,
+        replans=replanner.replans if replanner else 0,
+        replan_failures=replanner.failures if replanner else 0,
+        replan_seconds=replanner.mean_seconds if replanner else 0.0,
     )
     return measure(log, recorder, reference, robot, world, sequence, config)
 

@@ -1,0 +1,200 @@
+"""Replanner: the centroidal motion of the next contacts, optimised again from the measured state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import process_time
+
+import numpy as np
+
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.robot.model import RobotModel
+from toolkit.simulation.dynamics import RobotDynamics
+from toolkit.simulation.limb_target import LimbTargets
+from toolkit.simulation.reference import Reference
+from toolkit.simulation.replan_config import ReplanConfig
+from toolkit.simulation.replan_kernel import solve
+from toolkit.simulation.replan_nominal import Nominal
+from toolkit.simulation.replan_problem import Cones, Replan, ReplanProblem, Situation
+from toolkit.simulation.touchdown import ContactTracker, LimbState
+from toolkit.world.surface import Surface
+
+
+@dataclass
+class MotionTarget:
+    """What the controller tracks at a tick; world frame, SI units.
+
+    Attributes:
+        com, com_velocity, com_acceleration: (3,).
+        angular_momentum, angular_momentum_rate: (3,) about the CoM.
+        wrench: (4, 6) about the patches' centres in the contact frames.
+    """
+
+    com: np.ndarray
+    com_velocity: np.ndarray
+    com_acceleration: np.ndarray
+    angular_momentum: np.ndarray
+    angular_momentum_rate: np.ndarray
+    wrench: np.ndarray
+
+    @classmethod
+    def zeros(cls) -> MotionTarget:
+        """Room for one."""
+        return cls(*np.zeros((5, 3)), np.zeros((4, 6)))
+
+    def follow(self, reference: Reference, index: int) -> None:
+        """Fill in a row of the plan."""
+        self.com[:], self.com_velocity[:] = reference.com[index], reference.com_velocity[index]
+        self.com_acceleration[:] = reference.com_acceleration[index]
+        self.angular_momentum[:] = reference.angular_momentum[index]
+        self.angular_momentum_rate[:] = reference.angular_momentum_rate[index]
+        self.wrench[:] = reference.wrench[index]
+
+
+class Replanner:
+    """Solves a tracking problem over the next contacts at a fixed rate and says what to track.
+
+    Attributes:
+        replans, failures: how many were tried; how many of them gave no answer, so that the one before went on.
+        seconds: of all of them together (of the processor; never decides anything).
+        com_shift: (3,) m; by how much the feet that bear the plan have been moved from it.
+    """
+
+    def __init__(
+        self, reference: Reference, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...], config: ReplanConfig
+    ):
+        self._reference, self._nominal, self._config = reference, nominal, config
+        self._problem = ReplanProblem(nominal, robot, surfaces, config)
+        self._mass = nominal.mass
+        self._weight = self._mass * 9.81
+        self._due = 0.0
+        self._plan: Replan | None = None
+        self._made: dict[Limb, int] = {}
+        self._goal: dict[int, np.ndarray] = {}
+        self._shift, self._rate, self._moved = np.zeros((3, 4, 3))
+        self.replans = self.failures = 0
+        self.seconds = 0.0
+        self.com_shift = np.zeros(3)
+
+    def update(
+        self,
+        index: int,
+        period: float,
+        dynamics: RobotDynamics,
+        tracker: ContactTracker,
+        targets: LimbTargets,
+        cones: Cones,
+        aim: MotionTarget,
+    ) -> None:
+        """Replan where it is due, then say what to track.
+
+        Args:
+            index: row of the reference.
+            period: s since the last tick.
+            dynamics: measured state.
+            tracker: contact states at this tick.
+            targets: whose landing points are moved.
+            cones: what the controller allows now.
+            aim: overwritten where a replan says otherwise.
+        """
+        time = float(self._reference.times[index])
+        for limb in dynamics.limbs:
+            if tracker.made[limb]:
+                swing = tracker.current[limb]
+                self._made[limb] = self._nominal.swings.index(swing) if swing is not None else -1
+                if swing is not None and swing.contact is not None:
+                    self._moved[limb] = dynamics.limb_position[limb] - swing.contact.pose.position
+        if time >= self._due - 1e-9:
+            self._due = time + self._config.period
+            self._replan(time, dynamics, tracker, cones)
+        self._follow_feet(index, period)
+        self._track(time, aim)
+        self._move_landings(time, period, tracker, targets)
+
+    def _replan(self, time: float, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones) -> None:
+        """Solve once; where that fails the last answer goes on."""
+        if time >= self._nominal.times[-1] - self._config.horizon:
+            return
+        began = process_time()
+        plan = self._problem.solve(self._situation(time, dynamics, tracker, cones), solve)
+        self.replans += 1
+        if plan is None:
+            self.failures += 1
+        else:
+            self._plan = plan
+            self._goal.update(plan.landing)
+        self.seconds += process_time() - began
+
+    def _follow_feet(self, index: int, period: float) -> None:
+        """Let the plan's shift follow the feet that bear it."""
+        load = np.maximum(self._reference.wrench[index, :2, 2], 0.0)
+        total = float(load.sum())
+        if total > 0.0:
+            wanted = load @ self._moved[:2] / total
+            self.com_shift += period * self._config.frequency * (wanted - self.com_shift)
+
+    @property
+    def mean_seconds(self) -> float:
+        """Wall clock of one replan, on average; 0 before the first."""
+        return self.seconds / self.replans if self.replans else 0.0
+
+    def _situation(self, time: float, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones) -> Situation:
+        """What is measured, as the problem wants it."""
+        standing, fixed, moving = {}, {}, {}
+        for limb in dynamics.limbs:
+            if tracker.in_contact[limb]:
+                pose = dynamics.limb_position[limb].copy(), dynamics.limb_rotation[limb].copy()
+                standing[limb] = (self._made.get(limb, -1), *pose)
+                continue
+            swing = tracker.current[limb]
+            if swing is None or swing.contact is None:
+                continue
+            index = self._nominal.swings.index(swing)
+            over = (time - swing.start) / (swing.end - swing.start)
+            if tracker.state[limb] is not LimbState.SWING or over > self._config.fraction:
+                fixed[index] = self._goal.get(index, np.zeros(3))
+            else:
+                moving[index] = self._shift[limb].copy()
+        return Situation(
+            time=time,
+            com=dynamics.com.copy(),
+            velocity=dynamics.com_velocity.copy(),
+            spin=dynamics.angular_momentum / self._mass,
+            standing=standing,
+            fixed=fixed,
+            moving=moving,
+            goal=self._goal,
+            cones=cones,
+        )
+
+    def _track(self, time: float, target: MotionTarget) -> None:
+        """Overwrite what to track by the last replan, where it reaches so far."""
+        plan = self._plan
+        if plan is None or time >= plan.times[-1]:
+            return
+        k = int(np.searchsorted(plan.times, time + 1e-9, side="right")) - 1
+        tau = time - plan.times[k]
+        acceleration = plan.acceleration[k]
+        target.com[:] = plan.com[k] + tau * plan.velocity[k] + 0.5 * tau * tau * acceleration
+        target.com_velocity[:] = plan.velocity[k] + tau * acceleration
+        target.com_acceleration[:] = acceleration
+        target.angular_momentum_rate[:] = self._mass * plan.spin_rate[k]
+        target.angular_momentum[:] = self._mass * (plan.spin[k] + tau * plan.spin_rate[k])
+        target.wrench[:] = self._weight * plan.wrench[k]
+
+    def _move_landings(self, time: float, period: float, tracker: ContactTracker, targets: LimbTargets) -> None:
+        """Move the landing point of the feet in the air smoothly to where the last replan wants it."""
+        for foot in FEET:
+            if tracker.begun[foot]:
+                self._shift[foot] = self._rate[foot] = 0.0
+            swing = tracker.current[foot]
+            if swing is None or tracker.state[foot] is not LimbState.SWING or tracker.begun[foot]:
+                self._rate[foot] = 0.0
+                targets.shift_velocity[foot] = 0.0
+                continue
+            goal = self._goal.get(self._nominal.swings.index(swing), self._shift[foot])
+            left = max(swing.start + 0.9 * (swing.end - swing.start) - time, 0.05)
+            pull = 6.0 * (goal - self._shift[foot]) / left**2 - 4.0 * self._rate[foot] / left
+            self._rate[foot] += period * pull
+            self._shift[foot] += period * self._rate[foot]
+            targets.shift[foot], targets.shift_velocity[foot] = self._shift[foot], self._rate[foot]

@@ -1,0 +1,58 @@
+"""Settings of replanning during the execution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from toolkit.centroidal.body import BodyMargins
+
+
+@dataclass(frozen=True)
+class ReplanConfig:
+    """The centroidal motion is optimised again over the next contacts from the measured state.
+
+    Attributes:
+        enabled: whether that is done at all.
+        period: s between replans.
+        horizon: s that a replan looks ahead.
+        max_dt: s; longest step of its grid.
+        landings: contacts to be made whose places are free, at most.
+        max_shift: m; of one landing point.
+        slew: m/s; by how much a landing point may still move per second that is left.
+        fraction: of the swing, after which the landing point is kept.
+        margin: m; distance of the sole from the edge of its surface.
+        gap: m; distance of a landing sole from the other one.
+        frequency: 1/s; of the pendulum in the divergence `(c - c_plan) + (v - v_plan) / frequency`.
+        com, velocity, spin: weights of the deviations from the plan, m^2 s, m^2/s and (m^2/s)^2 s (spin: angular
+            momentum per mass).
+        final: weight of the divergence at the end of the horizon, m^2.
+        force, moment: weights of the wrenches' deviations, in weights and weights times 1 m.
+        landing: weight of a landing point's shift, m^2; landing_change: of its change since the last replan.
+        price: of exceeding the body's limits by 1 m or 1 rad.
+        body: margins kept inside the body's limits; smaller than the plan's.
+        max_iterations, tolerance: of the solver.
+    """
+
+    enabled: bool = False
+    period: float = 0.04
+    horizon: float = 1.6
+    max_dt: float = 0.1
+    landings: int = 2
+    max_shift: float = 0.15
+    slew: float = 0.6
+    fraction: float = 0.75
+    margin: float = 0.01
+    gap: float = 0.02
+    frequency: float = 3.4
+    com: float = 50.0
+    velocity: float = 5.0
+    spin: float = 50.0
+    final: float = 2000.0
+    force: float = 1.0
+    moment: float = 5.0
+    landing: float = 20.0
+    landing_change: float = 20.0
+    price: float = 10.0
+    body: BodyMargins = BodyMargins(length=0.007, ankle=0.05, hip=0.025, height=0.01, torque=0.92)
+    max_iterations: int = 25
+    tolerance: float = 1e-6

@@ -1,0 +1,64 @@
+"""LandingRegion: where a contact to be made may go, as half planes in its own plane."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.contacts.stance import Contact
+from toolkit.geometry.pose import Pose
+from toolkit.world.surface import Surface
+
+CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+
+
+def landing_rows(contact: Contact, half_size: np.ndarray, surface: Surface, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Shifts of a contact that keep its whole patch on one convex piece of its surface.
+
+    Args:
+        contact: as planned.
+        half_size: (2,) m; of the patch.
+        surface: that it lies on.
+        margin: m; distance to the piece's edges. Where the planned contact is closer, it may not come closer still.
+
+    Returns:
+        (k, 2) unit rows and (k,) bounds of at least 0: `rows @ shift <= bounds`, with the shift in m along x and y of
+        the contact frame.
+    """
+    corners = (CORNERS * half_size) @ contact.pose.rotation[:, :2].T + contact.pose.position
+    local = ((corners - surface.pose.position) @ surface.pose.rotation)[:, :2]
+    plane_from_contact = (surface.pose.rotation.T @ contact.pose.rotation[:, :2])[:2]
+    best: tuple[float, np.ndarray, np.ndarray] | None = None
+    for piece in surface.pieces:
+        edge = np.roll(piece, -1, 0) - piece
+        length = np.linalg.norm(edge, axis=1)
+        edge, start = edge[length > 1e-9], piece[length > 1e-9]
+        outward = np.stack([edge[:, 1], -edge[:, 0]], 1) / length[length > 1e-9, None]
+        room = (outward * start).sum(1) - (outward @ local.T).max(1)
+        if best is None or room.min() > best[0]:
+            best = float(room.min()), outward @ plane_from_contact, room
+    if best is None:
+        return np.zeros((0, 2)), np.zeros(0)
+    return best[1], np.maximum(best[2] - margin, 0.0)
+
+
+def apart_row(pose: Pose, half_size: np.ndarray, other: Pose, other_half: np.ndarray, gap: float) -> tuple[np.ndarray, float]:
+    """The half plane that keeps a patch beside another one, seen along its normal.
+
+    Args:
+        pose, half_size: of the patch that may be shifted; (2,) m.
+        other, other_half: of the one that rests.
+        gap: m between them; where the planned gap is smaller, it may not shrink.
+
+    Returns:
+        (2,) row and bound of at least 0: `row @ shift <= bound`.
+    """
+    own = CORNERS * half_size
+    corners = (CORNERS * other_half) @ other.rotation[:, :2].T + other.position
+    theirs = ((corners - pose.position) @ pose.rotation)[:, :2]
+    axes = (pose.rotation.T @ other.rotation)[:2, :2].T
+    axes = axes / np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), 1e-9)
+    axes = np.concatenate([np.eye(2), axes])
+    axes = np.concatenate([axes, -axes])
+    room = (theirs @ axes.T).min(0) - (own @ axes.T).max(0)  # how far the patch may go along each axis
+    best = int(np.argmax(room))
+    return axes[best], max(float(room[best]) - gap, 0.0)

@@ -1,0 +1,351 @@
+"""ReplanProblem: the quadratic program of a replan.
+
+States are deviations from the plan: of the CoM, of its velocity, of the angular momentum per mass about a fixed point
+near it, then two shifts along its plane for each landing point that is free. Wrenches are deviations too, in weights.
+The dynamics are those of `toolkit.centroidal.problem`, exact but for the product of a landing's shift with the change
+of its force; the limits of the body are linear about the plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.pose import Pose
+from toolkit.robot.model import RobotModel
+from toolkit.simulation.cone import friction_rows, sole_rows
+from toolkit.simulation.replan_config import ReplanConfig
+from toolkit.simulation.replan_kernel import GIVEN, Program
+from toolkit.simulation.replan_landing import apart_row, landing_rows
+from toolkit.simulation.replan_nominal import Nominal
+from toolkit.world.surface import Surface
+
+G = 9.81
+SIDES = 8
+ROWS = SIDES + 12 + 10 + 1
+HARD = 1e4  # price of a landing point outside its region, per m
+ROOM = 1e-3  # of the plan's own wrenches inside their rows
+PALM_MOMENT = 1e3  # weight that keeps a palm's moments as planned: the controller has none
+
+
+@dataclass(frozen=True)
+class Cones:
+    """What the controller allows: factors on friction and yaw moment, (4, 2) m half extents of the patches."""
+
+    friction: float
+    yaw: float
+    half_size: np.ndarray
+
+
+@dataclass(frozen=True)
+class Situation:
+    """Measured state at a replan, world frame, SI units.
+
+    Attributes:
+        time: s.
+        com, velocity, spin: (3,); spin: angular momentum about the CoM per mass.
+        standing: limbs in contact: the swing that made it (-1: none), (3,) position and (3, 3) rotation of the patch.
+        fixed: swings under way whose landing point is kept -> (3,) m shift from the plan.
+        moving: swings under way whose landing point may still move -> (3,) m shift of the limb by now.
+        goal: swings -> (3,) m shift that was decided last.
+        cones: what the controller allows.
+    """
+
+    time: float
+    com: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    standing: dict[Limb, tuple[int, np.ndarray, np.ndarray]]
+    fixed: dict[int, np.ndarray]
+    moving: dict[int, np.ndarray]
+    goal: dict[int, np.ndarray]
+    cones: Cones
+
+
+@dataclass(frozen=True)
+class Replan:
+    """A replanned motion at N + 1 knots; world frame, SI units.
+
+    Attributes:
+        times: (N + 1,) s.
+        com, velocity, spin: (N + 1, 3). acceleration, spin_rate: (N, 3).
+        wrench: (N, 4, 6) in the contact frames, in weights.
+        landing: swing -> (3,) m shift of its contact.
+        iterations: of the solver.
+    """
+
+    times: np.ndarray
+    com: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    acceleration: np.ndarray
+    spin_rate: np.ndarray
+    wrench: np.ndarray
+    landing: dict[int, np.ndarray]
+    iterations: int
+
+
+class ReplanProblem:
+    """Builds and solves the programs of one run."""
+
+    def __init__(self, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...], config: ReplanConfig):
+        self._nominal, self._config, self._surfaces = nominal, config, surfaces
+        self._half_sizes = robot.half_sizes
+        self._regions: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._cone_rows: dict[tuple, np.ndarray] = {}
+        self._size = GIVEN + 2 * config.landings
+
+    def solve(self, situation: Situation, solver: Callable) -> Replan | None:
+        """The best motion from a measured state; None where the solver gives no answer."""
+        nominal, config, size = self._nominal, self._config, self._size
+        first = int(np.searchsorted(nominal.times, situation.time + 1e-6, side="right")) - 1
+        last = int(np.searchsorted(nominal.times, situation.time + config.horizon, side="left"))
+        last = min(last, len(nominal.times) - 1)
+        span, knots = slice(first, last), slice(first, last + 1)
+        steps = last - first
+        times = nominal.times[knots].copy()
+        times[0] = situation.time
+        dt = np.diff(times)
+        inside = situation.time - nominal.times[first]
+        com, velocity, spin = nominal.com[knots].copy(), nominal.velocity[knots].copy(), nominal.spin[knots].copy()
+        com[0] += inside * (velocity[0] + 0.5 * inside * nominal.acceleration[first])
+        velocity[0] += inside * nominal.acceleration[first]
+        spin[0] += inside / (nominal.times[first + 1] - nominal.times[first]) * (spin[1] - spin[0])
+        origin = com[0].copy()
+
+        active = nominal.active[span].copy()
+        for limb in range(4):
+            if active[0, limb] and limb not in situation.standing:
+                active[0, limb] = False  # late: it bears nothing yet
+        planned, rotation = nominal.position[span], nominal.rotation[span].copy()
+        shift = np.zeros((steps, 4, 3))
+        free = self._free_landings(situation, first, last)
+        column = np.full((steps, 4), -1)
+        for limb, (event, position, turned) in situation.standing.items():
+            here = nominal.landing[span, limb] == event
+            rotation[here, limb] = turned
+            shift[here, limb] = position - planned[here, limb]
+        for event, moved in situation.fixed.items():
+            shift[nominal.landing[span, nominal.swings[event].limb] == event, nominal.swings[event].limb] = moved
+        planes = []
+        for index, event in enumerate(free):
+            swing = nominal.swings[event]
+            column[nominal.landing[span, swing.limb] == event, swing.limb] = index
+            planes.append(swing.contact.pose.rotation[:, :2])
+
+        # contacts
+        step, limb = np.nonzero(active)
+        count = np.concatenate([[0], np.cumsum(active.sum(1))]).astype(np.int64)
+        turn, base = rotation[step, limb], nominal.wrench[span][step, limb]
+        lever = planned[step, limb] + shift[step, limb] - origin
+        spread = np.zeros((len(step), 6, 6))
+        spread[:, :3, :3] = spread[:, 3:, 3:] = G * turn
+        spread[:, 3:, :3] = G * np.cross(lever[:, None], turn.swapaxes(1, 2)).swapaxes(1, 2)
+        pull = np.einsum("cij,cj->ci", spread, base)
+        pulls = np.zeros((steps, 6))
+        np.add.at(pulls, step, pull)
+        pulls[:, 2] -= G
+        # The plan's own rates: its acceleration, and its angular momentum about the origin.
+        about = spin + np.cross(com - origin, velocity)
+        wanted = np.zeros((steps, 6))
+        wanted[:, :3] = np.diff(velocity, axis=0) / dt[:, None]
+        weight_moment = np.zeros((steps, 3))
+        mean = com[:-1] + dt[:, None] * (velocity[:-1] / 2 + dt[:, None] * wanted[:, :3] / 6) - origin
+        weight_moment[:, 0], weight_moment[:, 1] = -G * mean[:, 1], G * mean[:, 0]
+        wanted[:, 3:] = np.diff(about, axis=0) / dt[:, None] - weight_moment
+        rate = pulls - wanted
+
+        # dynamics
+        a, b = np.tile(np.eye(size), (steps, 1, 1)), np.zeros((steps, size, 6))
+        axis = np.arange(3)
+        half, cube = dt**2 / 2, dt**3 / 6
+        a[:, axis, 3 + axis] = dt[:, None]
+        a[:, 6, 1], a[:, 6, 4], a[:, 7, 0], a[:, 7, 3] = -G * dt, -G * half, G * dt, G * half
+        b[:, axis, axis], b[:, 3 + axis, axis], b[:, 6 + axis, 3 + axis] = half[:, None], dt[:, None], dt[:, None]
+        b[:, 6, 1], b[:, 7, 0] = -G * cube, G * cube
+        for c in np.flatnonzero(column[step, limb] >= 0):
+            t, index = step[c], column[step[c], limb[c]]
+            force = pull[c, :3]
+            a[t, 6:9, GIVEN + 2 * index : GIVEN + 2 * index + 2] += dt[t] * np.cross(planes[index].T, force).T
+        drift = np.einsum("tij,tj->ti", b, rate)
+
+        cost, slope = self._objective(dt, com - origin, velocity, shift, column, planes, situation, free, span)
+        rows, bound = self._contact_rows(step, limb, base, situation.cones, first)
+        knot, soft, soft_bound, price = self._soft_rows(first, last, shift, column, planes, free, situation)
+        start = np.concatenate(
+            [
+                situation.com - com[0],
+                situation.velocity - velocity[0],
+                situation.spin + np.cross(situation.com - origin, situation.velocity) - about[0],
+            ]
+        )
+        weight = np.empty((len(step), 6))
+        weight[:, :3] = (config.force * dt[step])[:, None]
+        weight[:, 3:] = (np.where(limb < 2, config.moment, PALM_MOMENT) * dt[step])[:, None]
+        program = Program(
+            a, b, drift, cost, slope, count, spread, weight, rows, bound, knot, soft, soft_bound, price, 0.05, start
+        )
+        u = np.zeros((len(step), 6))
+        guess = np.zeros(size - GIVEN)
+        for index, event in enumerate(free):
+            guess[2 * index : 2 * index + 2] = planes[index].T @ situation.goal.get(event, np.zeros(3))
+        x, iterations, residual, gap = solver(program, u, guess, config.max_iterations, config.tolerance)
+        if not (np.isfinite(x).all() and np.isfinite(u).all() and residual < 1e-3 and gap < 1e-3):
+            return None
+        com, velocity = com + x[:, :3], velocity + x[:, 3:6]
+        spin = about + x[:, 6:9] - np.cross(com - origin, velocity)
+        wrench = np.zeros((steps, 4, 6))
+        wrench[step, limb] = base + u
+        landing = {event: planes[index] @ x[0, GIVEN + 2 * index : GIVEN + 2 * index + 2] for index, event in enumerate(free)}
+        return Replan(
+            times=times,
+            com=com,
+            velocity=velocity,
+            spin=spin,
+            acceleration=np.diff(velocity, axis=0) / dt[:, None],
+            spin_rate=np.diff(spin, axis=0) / dt[:, None],
+            wrench=wrench,
+            landing=landing,
+            iterations=iterations,
+        )
+
+    def _free_landings(self, situation: Situation, first: int, last: int) -> list[int]:
+        """Swings of feet whose landing point is free, the next ones first."""
+        nominal = self._nominal
+        standing = {event for event, _, _ in situation.standing.values()}
+        free = []
+        for event, swing in enumerate(nominal.swings):
+            contact = swing.contact
+            if contact is None or not swing.limb.is_foot or contact.surface < 0:
+                continue
+            if event in standing or event in situation.fixed or swing.end <= situation.time:
+                continue
+            if swing.end >= nominal.times[last] - 1e-6 or len(free) == self._config.landings:
+                break
+            free.append(event)
+        return free
+
+    def _objective(self, dt, com, velocity, shift, column, planes, situation, free, span):
+        """Quadratic costs of the knots."""
+        config, size, steps = self._config, self._size, len(dt)
+        share = self._nominal.share[span]
+        follow, offset = np.zeros((steps, 3, size)), np.zeros((steps, 3))
+        follow[:, np.arange(3), np.arange(3)] = 1.0
+        for foot in FEET:
+            offset += share[:, foot, None] * shift[:, foot]
+            for index, plane in enumerate(planes):
+                here = column[:, foot] == index
+                follow[here, :, GIVEN + 2 * index : GIVEN + 2 * index + 2] -= share[here, foot, None, None] * plane
+        cost, slope = np.zeros((steps + 1, size, size)), np.zeros((steps + 1, size))
+        duration = dt[:, None, None]
+        cost[1:] += config.com * duration * np.einsum("tki,tkj->tij", follow, follow)
+        slope[1:] -= config.com * dt[:, None] * np.einsum("tki,tk->ti", follow, offset)
+        axis = np.arange(3)
+        cost[1:, 3 + axis, 3 + axis] += config.velocity * dt[:, None]
+        spin = np.zeros((steps, 3, size))
+        spin[:, :, :3], spin[:, :, 3:6] = _skew(velocity[1:]), -_skew(com[1:])
+        spin[:, axis, 6 + axis] = 1.0
+        cost[1:] += config.spin * duration * np.einsum("tki,tkj->tij", spin, spin)
+        end = follow[-1].copy()
+        end[axis, 3 + axis] += 1.0 / config.frequency
+        cost[-1] += config.final * end.T @ end + 0.1 * config.final * spin[-1].T @ spin[-1]
+        slope[-1] -= config.final * end.T @ offset[-1]
+        cost[0, GIVEN:, GIVEN:] += 1e-3 * np.eye(size - GIVEN)
+        for index, event in enumerate(free):
+            own = slice(GIVEN + 2 * index, GIVEN + 2 * index + 2)
+            cost[0, own, own] += (config.landing + config.landing_change) * np.eye(2)
+            slope[0, own] -= config.landing_change * planes[index].T @ situation.goal.get(event, np.zeros(3))
+        return cost, slope
+
+    def _contact_rows(self, step, limb, base, cones: Cones, first: int):
+        """Rows and bounds of the wrenches' deviations."""
+        nominal = self._nominal
+        rows, limit = np.zeros((len(step), ROWS, 6)), np.zeros((len(step), ROWS))
+        friction = nominal.friction[first + step, limb]
+        for c in range(len(step)):
+            foot = limb[c] < 2
+            rows[c, : SIDES + 12] = self._cone(int(limb[c]), float(friction[c]), cones)
+            rows[c, -1, 2], limit[c, -1] = 1.0, 3.0
+            if foot:
+                torque = nominal.torque[first + step[c], limb[c]]
+                rows[c, SIDES + 12 : -1] = np.concatenate([torque, -torque])
+                limit[c, SIDES + 12 : -1] = self._config.body.torque
+        bound = np.maximum(limit - np.einsum("cri,ci->cr", rows, base), ROOM)
+        return rows, bound
+
+    def _cone(self, limb: int, friction: float, cones: Cones) -> np.ndarray:
+        """(SIDES + 12, 6) rows of a contact's cone."""
+        key = limb, friction, cones.friction, cones.yaw, float(cones.half_size[limb, 0])
+        rows = self._cone_rows.get(key)
+        if rows is None:
+            rows = np.zeros((SIDES + 12, 6))
+            if limb < 2:
+                rows[:] = sole_rows(friction * cones.friction, cones.half_size[limb], cones.yaw, SIDES)
+            else:
+                rows[:SIDES, :3] = friction_rows(friction * cones.friction, SIDES)
+            self._cone_rows[key] = rows
+        return rows
+
+    def _soft_rows(self, first: int, last: int, shift, column, planes, free: list[int], situation: Situation):
+        """Limits of the body after the first knot, then regions of the landing points."""
+        table, size, config = self._nominal.rows, self._size, self._config
+        begin, end = np.searchsorted(table.knot, [first + 1, last + 1])
+        knot, limb = table.knot[begin:end] - first, table.limb[begin:end]
+        gradient, clearance = table.gradient[begin:end], table.clearance[begin:end]
+        rows = np.zeros((end - begin, size))
+        rows[:, :3] = -gradient
+        # The contact of the step before the knot, or where there is none of the one after it.
+        step = np.where(self._nominal.active[first + knot - 1, limb] | (knot >= len(shift)), knot - 1, knot)
+        contact = limb >= 0
+        bound = clearance - np.where(contact, (gradient * shift[step, limb]).sum(1), 0.0)
+        for index, plane in enumerate(planes):
+            here = contact & (column[step, limb] == index)
+            rows[here, GIVEN + 2 * index : GIVEN + 2 * index + 2] = gradient[here] @ plane
+        blocks, bounds = [rows], [bound]
+        for index, event in enumerate(free):
+            region, room = self._region(event, situation)
+            block = np.zeros((len(region), size))
+            block[:, GIVEN + 2 * index : GIVEN + 2 * index + 2] = region
+            blocks.append(block)
+            bounds.append(room)
+        landing = sum(len(block) for block in blocks[1:])
+        price = np.concatenate([np.full(len(rows), config.price), np.full(landing, HARD)])
+        knot = np.concatenate([knot, np.zeros(landing, int)]).astype(np.int64)
+        return knot, np.concatenate(blocks), np.concatenate(bounds), price
+
+    def _region(self, event: int, situation: Situation) -> tuple[np.ndarray, np.ndarray]:
+        """Half planes of a landing point's shift."""
+        swing, config = self._nominal.swings[event], self._config
+        contact = swing.contact
+        found = self._regions.get(event)
+        if found is None:
+            half = self._half_sizes[swing.limb]
+            found = landing_rows(contact, half, self._surfaces[contact.surface], config.margin)
+            self._regions[event] = found
+        rows, bounds = [found[0]], [found[1]]
+        axes = np.concatenate([np.eye(2), -np.eye(2)])
+        rows.append(axes)
+        reach = np.full(4, config.max_shift)
+        if event in situation.moving:
+            moved = contact.pose.rotation[:, :2].T @ situation.moving[event]
+            left = config.slew * max(swing.end - situation.time - 0.1, 0.0)
+            reach = np.minimum(reach, np.maximum(axes @ moved + left, 0.0))
+        bounds.append(reach)
+        other = situation.standing.get(swing.limb.mirrored)
+        if other is not None and swing.start <= situation.time + 1e-9:
+            half = self._half_sizes[swing.limb]
+            row, room = apart_row(contact.pose, half, Pose(other[2], other[1]), half, config.gap)
+            rows.append(row[None])
+            bounds.append(np.array([room]))
+        return np.concatenate(rows), np.concatenate(bounds)
+
+
+def _skew(v: np.ndarray) -> np.ndarray:
+    """(n, 3, 3) matrices of the cross product with (n, 3) vectors."""
+    matrix = np.zeros((len(v), 3, 3))
+    matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
+    matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = v[:, 2], -v[:, 1], v[:, 0]
+    return matrix
