@@ -258,8 +258,9 @@ class _Recorder:
         targets[good, 4:7] = frame.vector(batch.com_velocity[good])
         self._quota.add(category, features[kept], batch.feasible[kept], targets[kept])
         self._balance.count(category, self._kind, batch.feasible[kept])
-        result.feasible[rows[good]], result.objective[rows[good]] = True, batch.objective[good]
-        result.com[rows[good]], result.com_velocity[rows[good]] = batch.com[good], batch.com_velocity[good]
+        on = good[~is_far[good]]  # what follows a large disturbance is nothing that a planner meets
+        result.feasible[rows[on]], result.objective[rows[on]] = True, batch.objective[on]
+        result.com[rows[on]], result.com_velocity[rows[on]] = batch.com[on], batch.com_velocity[on]
 
     def _running(self, stance: Stance, count: int) -> tuple[np.ndarray, np.ndarray]:
         """CoM (n, 3) and velocity (n, 3) of a robot that runs the way its feet point, along the ground."""
