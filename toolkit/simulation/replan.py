@@ -61,8 +61,22 @@ class Replanner:
     """
 
     def __init__(
-        self, reference: Reference, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...], config: ReplanConfig
+        self,
+        reference: Reference,
+        nominal: Nominal,
+        robot: RobotModel,
+        surfaces: tuple[Surface, ...],
+        config: ReplanConfig,
     ):
+        """Prepare for a run.
+
+        Args:
+            reference: the plan at the control ticks.
+            nominal: the plan on the grid of the replans.
+            robot: the robot.
+            surfaces: that contacts lie on, by their index.
+            config: settings.
+        """
         self._reference, self._nominal, self._config = reference, nominal, config
         self._problem = ReplanProblem(nominal, robot, surfaces, config)
         self._mass = nominal.mass
@@ -164,6 +178,7 @@ class Replanner:
             fixed=fixed,
             moving=moving,
             goal=self._goal,
+            com_shift=self.com_shift.copy(),
             cones=cones,
         )
 

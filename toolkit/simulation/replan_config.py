@@ -22,6 +22,7 @@ class ReplanConfig:
         fraction: of the swing, after which the landing point is kept.
         margin: m; distance of the sole from the edge of its surface.
         gap: m; distance of a landing sole from the other one.
+        deadband: m; divergence from the plan that the controller's gains settle without a replan.
         frequency: 1/s; of the pendulum in the divergence `(c - c_plan) + (v - v_plan) / frequency`.
         com, velocity, spin: weights of the deviations from the plan, m^2 s, m^2/s and (m^2/s)^2 s (spin: angular
             momentum per mass).
@@ -43,6 +44,7 @@ class ReplanConfig:
     fraction: float = 0.75
     margin: float = 0.01
     gap: float = 0.02
+    deadband: float = 0.005
     frequency: float = 3.4
     com: float = 50.0
     velocity: float = 5.0
@@ -50,8 +52,8 @@ class ReplanConfig:
     final: float = 2000.0
     force: float = 1.0
     moment: float = 5.0
-    landing: float = 20.0
-    landing_change: float = 20.0
+    landing: float = 4.0
+    landing_change: float = 4.0
     price: float = 10.0
     body: BodyMargins = BodyMargins(length=0.007, ankle=0.05, hip=0.025, height=0.01, torque=0.92)
     max_iterations: int = 25

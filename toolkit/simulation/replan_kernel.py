@@ -351,8 +351,8 @@ def solve(p, u, free, max_iterations, tolerance):
     dslack, ddual, target = np.zeros(size), np.zeros(size), np.empty(size)
     dx, du = np.zeros((steps + 1, n)), np.zeros((contacts, 6))
     largest = gap = np.inf
-    iteration = 0
-    for iteration in range(max_iterations):
+    iterations = 0
+    for _ in range(max_iterations):
         _residuals(p, u, x, slack[hard + soft :], slack, residual)
         largest = np.abs(residual).max() if residual.size else 0.0
         gap = (slack * dual).sum() / max(size, 1)
@@ -373,7 +373,8 @@ def solve(p, u, free, max_iterations, tolerance):
         dual += reach * ddual
         u += reach * du
         x += reach * dx
-    return x, iteration, largest, gap
+        iterations += 1
+    return x, iterations, largest, gap
 
 
 @compiled

@@ -11,7 +11,9 @@ from toolkit.world.surface import Surface
 CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 
 
-def landing_rows(contact: Contact, half_size: np.ndarray, surface: Surface, margin: float) -> tuple[np.ndarray, np.ndarray]:
+def landing_rows(
+    contact: Contact, half_size: np.ndarray, surface: Surface, margin: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Shifts of a contact that keep its whole patch on one convex piece of its surface.
 
     Args:
@@ -41,12 +43,16 @@ def landing_rows(contact: Contact, half_size: np.ndarray, surface: Surface, marg
     return best[1], np.maximum(best[2] - margin, 0.0)
 
 
-def apart_row(pose: Pose, half_size: np.ndarray, other: Pose, other_half: np.ndarray, gap: float) -> tuple[np.ndarray, float]:
+def apart_row(
+    pose: Pose, half_size: np.ndarray, other: Pose, other_half: np.ndarray, gap: float
+) -> tuple[np.ndarray, float]:
     """The half plane that keeps a patch beside another one, seen along its normal.
 
     Args:
-        pose, half_size: of the patch that may be shifted; (2,) m.
-        other, other_half: of the one that rests.
+        pose: of the patch that may be shifted.
+        half_size: (2,) m; of that patch.
+        other: pose of the patch that rests.
+        other_half: (2,) m.
         gap: m between them; where the planned gap is smaller, it may not shrink.
 
     Returns:

@@ -72,7 +72,9 @@ class Nominal:
     swings: tuple[Swing, ...]
 
     @classmethod
-    def of(cls, motion: CentroidalMotion, swings: tuple[Swing, ...], robot: RobotModel, config: ReplanConfig) -> Nominal:
+    def of(
+        cls, motion: CentroidalMotion, swings: tuple[Swing, ...], robot: RobotModel, config: ReplanConfig
+    ) -> Nominal:
         """The grid of a planned motion.
 
         Args:

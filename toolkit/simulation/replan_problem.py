@@ -51,6 +51,7 @@ class Situation:
         fixed: swings under way whose landing point is kept -> (3,) m shift from the plan.
         moving: swings under way whose landing point may still move -> (3,) m shift of the limb by now.
         goal: swings -> (3,) m shift that was decided last.
+        com_shift: (3,) m; of the plan with the feet that bear it.
         cones: what the controller allows.
     """
 
@@ -62,6 +63,7 @@ class Situation:
     fixed: dict[int, np.ndarray]
     moving: dict[int, np.ndarray]
     goal: dict[int, np.ndarray]
+    com_shift: np.ndarray
     cones: Cones
 
 
@@ -182,6 +184,10 @@ class ReplanProblem:
                 situation.spin + np.cross(situation.com - origin, situation.velocity) - about[0],
             ]
         )
+        start[:3] -= situation.com_shift
+        divergence = float(np.linalg.norm(start[:3] + start[3:6] / config.frequency))
+        start *= max(1.0 - config.deadband / max(divergence, 1e-9), 0.0)
+        start[:3] += situation.com_shift
         weight = np.empty((len(step), 6))
         weight[:, :3] = (config.force * dt[step])[:, None]
         weight[:, 3:] = (np.where(limb < 2, config.moment, PALM_MOMENT) * dt[step])[:, None]
@@ -199,7 +205,7 @@ class ReplanProblem:
         spin = about + x[:, 6:9] - np.cross(com - origin, velocity)
         wrench = np.zeros((steps, 4, 6))
         wrench[step, limb] = base + u
-        landing = {event: planes[index] @ x[0, GIVEN + 2 * index : GIVEN + 2 * index + 2] for index, event in enumerate(free)}
+        landing = {event: plane @ x[0, own] for event, plane, own in zip(free, planes, _columns(free), strict=True)}
         return Replan(
             times=times,
             com=com,
@@ -341,6 +347,11 @@ class ReplanProblem:
             rows.append(row[None])
             bounds.append(np.array([room]))
         return np.concatenate(rows), np.concatenate(bounds)
+
+
+def _columns(free: list[int]) -> list[slice]:
+    """States of the shifts of free landing points."""
+    return [slice(GIVEN + 2 * index, GIVEN + 2 * index + 2) for index in range(len(free))]
 
 
 def _skew(v: np.ndarray) -> np.ndarray:
