@@ -6,8 +6,10 @@ import argparse
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
+from dataclasses import asdict
 from multiprocessing import get_context
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
@@ -28,6 +30,9 @@ from toolkit.report.console import make_console
 from toolkit.report.scores import score_table
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
+
+if TYPE_CHECKING:
+    from toolkit.learning.fit import FitConfig
 
 DESCRIPTION = """\
 Make the networks with which the contact search judges transitions.
@@ -133,6 +138,9 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
                 done = (2 * number + (name == "regressor")) * config.epochs + epoch + 1
                 progress.update(task, completed=done, description=f"{int(category)} {name} {training:.4f} {held:.4f}")
 
+            if args.resume and _is_trained(robot, out, category, config, len(data[category])):
+                console.print(f"category {int(category)}: trained already")
+                continue
             curves = fit_category(
                 category, data[category], fingerprint=robot.fingerprint, folder=out, config=config, progress=tick
             )
@@ -142,6 +150,15 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
             draw_curves(_saved_curves(robot, out), out / "learning_curves.png")
     console.print(str(out))
     return 0
+
+
+def _is_trained(robot: RobotModel, folder: Path, category: Category, config: FitConfig, samples: int) -> bool:
+    """Whether the folder holds networks of a category, trained with these settings on as many samples."""
+    try:
+        summary = training_summary(load_network(network_path(folder, category), category, robot.fingerprint))
+    except NetworkError:
+        return False
+    return summary.get("config") == asdict(config) and summary.get("samples") == samples
 
 
 def _saved_curves(robot: RobotModel, folder: Path) -> dict[Category, dict]:
@@ -198,6 +215,7 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument("--out", type=Path, help="folder for the networks (default: the robot's networks/)")
     sub.add_argument("--epochs", type=cli.positive(int), default=60, help="at most (default: %(default)s)")
     sub.add_argument("--limit", type=cli.positive(int), help="transitions per category at most")
+    sub.add_argument("--resume", action="store_true", help="keep what was trained with the same settings before a stop")
     sub.add_argument("--categories", type=int, nargs="+", choices=range(10), metavar="0..9", help="only these")
     sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="threads (default: all cores)")
     sub.add_argument("--device", default="cpu", help="where torch computes, such as cuda (default: %(default)s)")

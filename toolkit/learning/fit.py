@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +36,8 @@ class FitConfig:
     """Settings of the training.
 
     Attributes:
-        epochs: most passes over the data; the learning rate falls to zero over them.
+        epochs: most passes over the data for the regressor; the learning rate falls to zero over them.
+        classifier_share: the same for the classifier, as a part of `epochs`: it learns faster.
         batch: samples per gradient step.
         learning_rate: peak of the one-cycle schedule.
         weight_decay: of AdamW.
@@ -53,8 +54,9 @@ class FitConfig:
     """
 
     epochs: int = 60
+    classifier_share: float = 0.5
     batch: int = 256
-    learning_rate: float = 2e-3
+    learning_rate: float = 4e-3
     weight_decay: float = 1e-4
     dropout: float = 0.0
     width: float = 0.02
@@ -207,7 +209,7 @@ def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SI
             classifier,
             (inputs, torch.from_numpy(feasible.astype(np.float32)[:, None])),
             nn.functional.binary_cross_entropy_with_logits,
-            config,
+            replace(config, epochs=max(1, round(config.classifier_share * config.epochs))),
             lambda *state: progress("classifier", *state),
         )
     }

@@ -16,7 +16,7 @@ from toolkit.prediction.features import COM, TARGETS, feature_size
 SCHEMA = "transition-network-3"
 HIDDEN = 256
 LAYERS = 4  # three hidden ones and the output
-OBJECTIVE_SCALE = 10.0  # objectives below it are learnt in proportion to themselves, larger ones to their logarithm
+OBJECTIVE_SCALE = 30.0  # objectives below it are learnt in proportion to themselves, larger ones to their logarithm
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,41 @@
+"""`python -m toolkit.train fit`: what a user sees of it."""
+
+import pytest
+
+from tests.learning.test_fit import samples
+from toolkit import train
+from toolkit.contacts.category import Category
+from toolkit.errors import InputError
+from toolkit.learning.dataset import SCHEMA, Manifest, write_shard
+from toolkit.robot.loader import load_robot
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder, robot = tmp_path_factory.mktemp("data"), load_robot(None)
+    Manifest(SCHEMA, robot.name, robot.fingerprint, 0, {}, {}).write(folder)
+    for index in range(2):
+        write_shard(folder, index, {category: samples(300, seed=index) for category in (Category.MOVE_FOOT,)})
+    return folder
+
+
+def fit(dataset, out, *more):
+    return train.main(["fit", "--data", str(dataset), "--out", str(out), "--epochs", "2", "--categories", "0", *more])
+
+
+def test_fit_writes_networks_and_curves_and_goes_on_after_a_stop(dataset, tmp_path, capsys):
+    assert fit(dataset, tmp_path) == 0
+    first = (tmp_path / "category_0.safetensors").read_bytes()
+    assert (tmp_path / "learning_curves.png").stat().st_size > 5000
+    assert str(tmp_path) in capsys.readouterr().out.replace("\n", "")
+    assert fit(dataset, tmp_path, "--resume") == 0
+    assert "category 0: trained already" in capsys.readouterr().out
+    assert fit(dataset, tmp_path, "--resume", "--seed", "1") == 0
+    assert "trained already" not in capsys.readouterr().out
+    assert (tmp_path / "category_0.safetensors").read_bytes() != first
+
+
+def test_a_device_that_is_not_there_is_refused(dataset, tmp_path):
+    with pytest.raises(InputError, match="--device nonsense: torch cannot compute there .*; use --device cpu"):
+        fit(dataset, tmp_path / "new", "--device", "nonsense")
+    assert not (tmp_path / "new").exists()
