@@ -108,7 +108,9 @@ def test_judge_forbids_and_changes_the_last_edge():
     best = AnaStar(graph, np.random.default_rng(0)).run().paths[-1]
     forbidden = best.states[-1]
 
-    def judge(state, edge):
+    def judge(states, payloads, edge):
+        assert states[0] == 0 and list(payloads) == list(zip(states, states[1:], strict=False))
+        assert edge.payload == (states[-1], edge.state)
         return None if edge.state == forbidden else edge._replace(cost=edge.cost + 10, payload="judged")
 
     judged = AnaStar(graph, np.random.default_rng(0), judge=judge).run()
@@ -151,3 +153,31 @@ def test_start_at_the_goal_is_a_path_without_edges():
     graph.goals = {0}
     result = AnaStar(graph, np.random.default_rng(0)).run()
     assert result.paths[0].states == (0,) and result.paths[0].cost == 0.0 and result.stopped_by == "exhausted"
+
+
+def test_the_search_goes_on_from_a_goal_that_was_refused():
+    """0 -> 1 -> 2, both 1 and 2 goals, 1 refused: the way to 2 leads through 1."""
+    graph = Graph(np.random.default_rng(0), nodes=6)
+    graph.graph = nx.DiGraph([(0, 1, {"weight": 1.0}), (1, 2, {"weight": 1.0})])
+    graph.goals, graph.h = {1, 2}, [0.0] * 6
+    result = AnaStar(graph, np.random.default_rng(0), judge=lambda states, _, edge: edge if states[1:] else None).run()
+    assert [path.states for path in result.paths] == [(0, 1, 2)] and result.paths[0].cost == 2.0
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.3])
+def test_delays_change_the_order_and_nothing_else(epsilon):
+    class Delayed(Graph):
+        def expand(self, state, slack):
+            return [edge._replace(delay=float(edge.state % 5)) for edge in super().expand(state, slack)]
+
+    orders = set()
+    for seed in range(10):
+        config = AnaStarConfig(epsilon=epsilon)
+        plain, delayed = (
+            AnaStar(kind(np.random.default_rng(seed)), np.random.default_rng(seed), config).run()
+            for kind in (Graph, Delayed)
+        )
+        assert plain.lower_bound == pytest.approx(delayed.lower_bound)
+        assert [path.cost for path in plain.paths[-1:]] == pytest.approx([path.cost for path in delayed.paths[-1:]])
+        orders.add(plain.expanded == delayed.expanded)
+    assert False in orders

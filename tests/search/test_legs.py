@@ -7,7 +7,9 @@ from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z, rotation_on_surface
 from toolkit.robot.loader import load_robot
-from toolkit.search.legs import LIMITS, legs_of, stances_violated, violated
+from toolkit.search.legs import LIMITS, legs_of, violated
+from toolkit.search.shanks import shanks_of
+from toolkit.search.stances import ENTANGLED, stances_violated
 
 ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
 
@@ -45,6 +47,22 @@ def test_a_lower_com_brings_long_strides_into_reach():
     y = robot.legs[FEET[0]].hip_in_com[1]
     left, right = np.array([[reach, y, 0.0]]), np.array([[-reach, -y, 0.0]])
     com, turn = np.array([[0.0, 0.0, robot.com_height]]), np.eye(3)[None]
-    high = stances_violated(legs, com, np.array([0.0]), np.zeros(1), left, turn, right, turn)
-    low = stances_violated(legs, com, np.array([0.0, 0.05, 0.1, 0.15, 0.2]), np.zeros(1), left, turn, right, turn)
+    shanks = shanks_of(robot)
+    high = stances_violated(legs, shanks, com, np.array([0.0]), np.zeros(1), left, turn, right, turn)
+    low = stances_violated(
+        legs, shanks, com, np.array([0.0, 0.05, 0.1, 0.15, 0.2]), np.zeros(1), left, turn, right, turn
+    )
     assert LIMITS[high[0]] == "leg length" and low[0] == -1
+
+
+def test_legs_in_each_others_way_are_no_stance():
+    robot = load_robot(ROBOTS[0])
+    legs, shanks = legs_of(robot, ReachMargins(ankle=0.0, hip=-0.5)), shanks_of(robot)
+    com, drop = np.array([[0.0, 0.0, robot.com_height]]), np.array([0.1])
+
+    def verdict(turn, apart):
+        left, right = (np.array([[0.0, sign * apart / 2, 0.0]]) for sign in (1, -1))
+        turns = [rotation_about_z(np.array([-sign * turn])) for sign in (1, -1)]
+        return int(stances_violated(legs, shanks, com, drop, np.zeros(1), left, turns[0], right, turns[1])[0])
+
+    assert verdict(0.0, 0.2) == -1 and verdict(0.5, 0.24) == ENTANGLED and verdict(0.5, 0.5) == -1

@@ -23,6 +23,7 @@ from toolkit.contacts.projection_kernels import project_palms, project_soles
 from toolkit.contacts.surface_table import surface_table
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
+from toolkit.world.source import RAY_GROUPS
 from toolkit.world.surface import Surface
 
 
@@ -180,10 +181,10 @@ class Projector:
         return Projected(surface, position, rotation)
 
     def _blocked(self, origin: np.ndarray, rays: np.ndarray, distance: np.ndarray, reach: float) -> np.ndarray:
-        """(n,) bool; whether anything that is drawn or collides lies before `distance` (n,) on a ray."""
+        """(n,) bool; whether anything that collides lies before `distance` (n,) on a ray."""
         n = len(rays)
         geom, hit = np.empty(n, np.int32), np.empty(n)
         mujoco.mj_multiRay(
-            self._model, self._data, origin, rays.ravel(), None, True, -1, geom, hit, None, n, reach + 1.0
+            self._model, self._data, origin, rays.ravel(), RAY_GROUPS, True, -1, geom, hit, None, n, reach + 1.0
         )
         return (geom >= 0) & (hit < distance - self.config.block_tolerance)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from toolkit.centroidal import fast
-from toolkit.centroidal.build import ProblemConfig, transition_problem
-from toolkit.contacts.sequence import ContactTransition
+from toolkit.centroidal.build import ProblemConfig, sequence_problem, transition_problem
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.prediction.reach import within_reach
@@ -21,7 +24,12 @@ class OptimiserEvaluator:
         config: what the problems assume.
         solver: settings of the fast solver.
         final_at_rest: whether the CoM must be at rest after the transition, as at the goal.
+
+    Attributes:
+        costly: a search had better ask about one transition at a time.
     """
+
+    costly = True
 
     def __init__(
         self,
@@ -61,3 +69,26 @@ class OptimiserEvaluator:
                 feasible[index], objective[index] = True, motion.objective
                 final_com[index], velocity[index] = motion.com[-1], motion.linear_momentum[-1] / problem.mass
         return TransitionBatch(feasible, objective, final_com, velocity)
+
+    def halt(
+        self,
+        stance: Stance,
+        com: np.ndarray,
+        com_velocity: np.ndarray,
+        transitions: Sequence[ContactTransition],
+        rest: float,
+    ) -> float | None:
+        """Objective of coming to rest by several transitions in a row; None where that is infeasible.
+
+        Args:
+            stance: before the first.
+            com: (3,) m; before it.
+            com_velocity: (3,) m/s.
+            transitions: in order.
+            rest: s on the last stance, at whose end the CoM is at rest.
+        """
+        com = within_reach(self._robot, stance, np.asarray(com, float)[None], self._config)[0]
+        schedule = ContactSchedule.of(ContactSequence(stance, tuple(transitions)), final_rest=rest)
+        problem = sequence_problem(self._robot, schedule, com, com_velocity, config=self._config)
+        motion = fast.solve(problem, config=self._solver)
+        return motion.objective if motion.feasible else None

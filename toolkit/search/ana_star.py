@@ -44,6 +44,7 @@ class AnaStarConfig:
         crowding: added to h for the order of expansion, per state already expanded in the same crowd. While there is no
             solution it grows, by as much again with every `patience` expansions.
         patience: see `crowding`.
+        refusal: added to h for the order of expansion where the judge refused a goal.
         max_expansions: ends the search; None for no limit.
         max_states: ends the search, to bound memory.
         report_interval: s between calls of the observer, solutions apart.
@@ -53,6 +54,7 @@ class AnaStarConfig:
     initial_cost: float = math.inf
     crowding: float = 0.3
     patience: int = 200
+    refusal: float = 3.0
     max_expansions: int | None = None
     max_states: int = 700_000
     report_interval: float = 0.1
@@ -87,7 +89,7 @@ class AnaStar(Generic[State]):
         rng: for the random expansions.
         config: settings.
         judge: has the last word on an edge that reaches a goal: returns it, or another edge in its place (a different
-            cost or payload), or None to forbid it.
+            cost or payload), or None: then the search goes on from there.
     """
 
     def __init__(
@@ -107,6 +109,7 @@ class AnaStar(Generic[State]):
         self._parent: list[int] = []
         self._edge_cost: list[float] = []  # from the parent
         self._payload: list[Any] = []
+        self._delay: list[float] = []
         self._crowd: list[Hashable] = []
         self._expanded_in: dict[Hashable, int] = {}
         self._open: list[int] = []  # in no order, for random draws
@@ -159,7 +162,7 @@ class AnaStar(Generic[State]):
             if not paths:
                 self._crowding = config.crowding * (1.0 + len(expanded) / config.patience)
             for edge in sorted(goals, key=lambda goal: goal.cost):
-                path = self._reach(node, edge, time.perf_counter() - began, len(expanded))
+                path = self._reach(node, edge, began, len(expanded))
                 if path is not None:
                     paths.append(path)
                     break
@@ -207,11 +210,13 @@ class AnaStar(Generic[State]):
             self._parent.append(parent)
             self._edge_cost.append(edge.cost)
             self._payload.append(edge.payload)
+            self._delay.append(edge.delay)
             self._crowd.append(crowd)
             self._place.append(-1)
         elif g < self._g[node]:
             self._g[node], self._parent[node] = g, parent
             self._edge_cost[node], self._payload[node] = edge.cost, edge.payload
+            self._delay[node] = edge.delay
         else:
             return
         self._reopen(node)
@@ -229,7 +234,7 @@ class AnaStar(Generic[State]):
 
     def _priority(self, node: int) -> float:
         """Falls as e(s) rises."""
-        g, h = self._g[node], self._h[node]
+        g, h = self._g[node], self._h[node] + self._delay[node]
         if self._config.crowding > 0:
             h += self._crowding * self._expanded_in.get(self._crowd[node], 0)
         target = self._best if self._best < math.inf else self._config.initial_cost
@@ -257,32 +262,52 @@ class AnaStar(Generic[State]):
         self._open.pop()
         self._place[node] = -1
 
-    def _reach(self, node: int, edge: Edge[State], seconds: float, expansions: int) -> Path[State] | None:
+    def _reach(self, node: int, edge: Edge[State], began: float, expansions: int) -> Path[State] | None:
         """Take an edge to a goal if it improves on the best solution and the judge agrees."""
         if not self._g[node] + edge.cost < self._best:
             return None
+        states, payloads, cost = self._trail(node)
         if self._judge is not None:
             key = (self._state[node], edge.state)
             if key in self._forbidden:
                 return None
-            judged = self._judge(self._state[node], edge)
+            judged = self._judge(states, payloads, edge)
             if judged is None:
                 self._forbidden.add(key)
+                self._refuse(node, edge)
                 return None
             edge = judged
-        states, payloads, cost = [edge.state], [edge.payload], edge.cost
-        while node >= 0:
-            states.append(self._state[node])
-            payloads.append(self._payload[node])
-            cost += self._edge_cost[node]  # the sum may be less than g: an ancestor may have reopened since
-            node = self._parent[node]
+        cost += edge.cost
         if not cost < self._best:
             return None
         self._best = cost
         self._crowding = self._config.crowding
         bound = cost / max(self._lower_bound(), _TINY) if cost > 0 else 1.0
         self._prune()
-        return Path(tuple(states[::-1]), tuple(payloads[-2::-1]), cost, bound, seconds, expansions)
+        seconds = time.perf_counter() - began
+        return Path((*states, edge.state), (*payloads, edge.payload), cost, bound, seconds, expansions)
+
+    def _trail(self, node: int) -> tuple[list[State], list[Any], float]:
+        """States from the start to a node, payloads between them and the sum of the edge costs.
+
+        The sum may be less than g: an ancestor may have reopened since.
+        """
+        states: list[State] = []
+        payloads: list[Any] = []
+        cost = 0.0
+        while node >= 0:
+            states.append(self._state[node])
+            payloads.append(self._payload[node])
+            cost += self._edge_cost[node]
+            node = self._parent[node]
+        return states[::-1], payloads[-2::-1], cost
+
+    def _refuse(self, node: int, edge: Edge[State]) -> None:
+        """Open a goal at which the judge would not end, as a state on the way to another one."""
+        h = float(self._problem.heuristic([edge.state])[0])
+        crowd = self._problem.crowd([edge.state])[0]
+        later = edge._replace(delay=edge.delay + self._config.refusal)
+        self._improve(later, self._g[node] + edge.cost, h, node, crowd)
 
     def _lower_bound(self) -> float:
         """Least g + h of the open states, or G: no path costs less.

@@ -13,11 +13,19 @@ State = TypeVar("State", bound=Hashable)
 
 
 class Edge(NamedTuple, Generic[State]):
-    """A way out of a state: where it leads, its cost (>= 0), and anything the caller wants to find in the path."""
+    """A way out of a state.
+
+    Attributes:
+        state: where it leads.
+        cost: >= 0.
+        payload: anything the caller wants to find in the path.
+        delay: >= 0; added to the state's h for the order of expansion: pruning and bounds keep the true h.
+    """
 
     state: State
     cost: float
     payload: Any = None
+    delay: float = 0.0
 
 
 class SearchProblem(Protocol[State]):
@@ -47,7 +55,8 @@ class SearchProblem(Protocol[State]):
         ...
 
 
-Judge = Callable[[State, Edge[State]], Edge[State] | None]
+Judge = Callable[[Sequence[State], Sequence[Any], Edge[State]], Edge[State] | None]
+"""Of an edge that reaches a goal, told the states before it and the payloads of the edges between them."""
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,10 @@ from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
 from toolkit.search.contact_table import ContactTable
-from toolkit.search.legs import legs_of, stances_violated
+from toolkit.search.legs import legs_of
 from toolkit.search.occupancy import BodyBox, Occupancy
+from toolkit.search.shanks import shanks_of
+from toolkit.search.stances import stances_violated
 
 _KEPT = 20_000  # entries of each memory
 
@@ -77,6 +79,7 @@ class MoveGenerator:
 
     Attributes:
         legs: both legs with the margins of the search.
+        shanks: capsules inside them.
         has_palm_surfaces: whether the world offers any.
     """
 
@@ -94,7 +97,7 @@ class MoveGenerator:
         self._occupancy, self._config = occupancy, config
         leg = robot.legs[Limb.LEFT_FOOT]
         self._climb = config.climb * (leg.thigh + leg.shin)
-        self.legs = legs_of(robot, config.margins)
+        self.legs, self.shanks = legs_of(robot, config.margins), shanks_of(robot)
         self.has_palm_surfaces = bool(projector.table.palm.any())
         self._box = np.array([box.half_depth, box.half_width, box.bottom, box.top])
         self._half = robot.half_sizes[Limb.LEFT_FOOT] + config.apart / 2
@@ -155,6 +158,7 @@ class MoveGenerator:
             self._drops,
             self._shifts,
             self.legs,
+            self.shanks,
             self._box,
             occupancy.corner,
             occupancy.cell,
@@ -198,7 +202,7 @@ class MoveGenerator:
         self.swings(Limb.LEFT_FOOT, one, standing, standing, 1.0)
         table = self._table
         place, turn = table.position[one], table.rotation[one]
-        stances_violated(self.legs, place, self._drops, table.yaw[one], place, turn, place, turn)
+        stances_violated(self.legs, self.shanks, place, self._drops, table.yaw[one], place, turn, place, turn)
         if self.has_palm_surfaces and self._robot.arms:
             limb = next(iter(self._robot.arms))
             self._projector.project_palms(limb, place[0], np.array([[0.0, 1.0, 0.0]]), 0.0, 1e6)

@@ -17,18 +17,23 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
-from toolkit.search.ana_star import AnaStar, AnaStarConfig, AnaStarResult, Edge, Path, Progress
+from toolkit.search.ana_star import AnaStar, AnaStarConfig, AnaStarResult
+from toolkit.search.arrival import Arrival
 from toolkit.search.contact_table import ContactTable
 from toolkit.search.exclusion import Exclusion
+from toolkit.search.graph import Path, Progress
 from toolkit.search.heuristic import Distance, EuclideanDistance, GridConfig
 from toolkit.search.moves import MoveConfig, MoveGenerator
 from toolkit.search.problem import ContactProblem, CostConfig
+from toolkit.search.reach_check import ReachConfig
 from toolkit.search.result import SearchResult, Solution
 from toolkit.search.start import place_feet
-from toolkit.search.state import COM, CONTACTS, VELOCITY, unpack
+from toolkit.search.state import COM, CONTACTS, VELOCITY, is_pending, unpack
 from toolkit.search.terrain_distance import TerrainDistance, resting_surfaces
 from toolkit.world.timing import Timing
 from toolkit.world.world import World
+
+_LAZY = 20  # expansions with one transition judged in each that count as one with all judged
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,7 @@ class PlannerConfig:
         rest_friction: ground steeper than this part of its friction angle's tangent holds no foot at all; None: the
             evaluator decides.
         cost: edge costs.
+        reach: what legs and arms may reach.
         moves: kinematic limits.
         projection: how patches find their place.
         grid: of the heuristic.
@@ -62,6 +68,7 @@ class PlannerConfig:
     timings: tuple[Timing, ...] = ()
     rest_friction: float | None = None
     cost: CostConfig = field(default_factory=CostConfig)
+    reach: ReachConfig = field(default_factory=ReachConfig)
     moves: MoveConfig = field(default_factory=MoveConfig)
     projection: ProjectionConfig = field(default_factory=ProjectionConfig)
     grid: GridConfig = field(default_factory=GridConfig)
@@ -170,6 +177,7 @@ class ContactPlanner:
         heuristic_seconds = time.perf_counter() - began
         moves, table = self._generator(wide)
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
+        lazy = getattr(self._evaluator, "costly", False)
         problem = ContactProblem(
             self.robot,
             moves,
@@ -183,19 +191,24 @@ class ContactPlanner:
             self._timings,
             self.config.palms,
             self.config.cost,
+            self.config.reach,
             exclusions,
+            lazy=lazy,
         )
         # What an evaluator compiles or loads at its first query is not part of the search.
         standing = ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], self._timings[0])
         self._evaluator.evaluate(start, com, np.zeros(3), [standing])
-        judge = None if self._goal_evaluator is None else _goal_judge(problem, self._goal_evaluator, self.config.cost)
+        judge = None if self._goal_evaluator is None else Arrival(problem, self._goal_evaluator, self.config.cost)
         settings = self.config.search
+        if lazy and settings.max_expansions is not None:
+            settings = replace(settings, max_expansions=settings.max_expansions * _LAZY)
         if settings.initial_cost == np.inf:
             way = float(distance(start.mean_feet.position[None], np.array([start.mean_feet.yaw]))[0])
             settings = replace(settings, initial_cost=self.config.acceptable_cost * max(way, 1.0))
         problem.deadline = time.perf_counter() + time_limit
         result = AnaStar(problem, rng, settings, judge).run(time_limit, observer)
-        expanded = problem.feet(unpack(result.expanded)[:, CONTACTS]) if result.expanded else (np.zeros((0, 3)), [])
+        judged = [state for state in result.expanded if not is_pending(state)]
+        expanded = problem.feet(unpack(judged)[:, CONTACTS]) if judged else (np.zeros((0, 3)), [])
         return SearchResult(
             solutions=tuple(_solution(problem, path) for path in result.paths),
             seconds=result.seconds,
@@ -253,40 +266,22 @@ class ContactPlanner:
         raise PlanningError(self._terrain.obstacle(start.mean_feet, strides[choices[-1]]))
 
 
-def _goal_judge(problem: ContactProblem, evaluator: TransitionEvaluator, cost: CostConfig):
-    """Judge of the last transition for ANA*: it must end at rest; its objective is replaced."""
-
-    def judge(state: bytes, edge: Edge[bytes]) -> Edge[bytes] | None:
-        row = unpack([state])[0]
-        transition = problem.transition(edge.state, edge.payload)
-        batch = evaluator.evaluate(problem.stance(state), row[COM] / 1000.0, row[VELOCITY] / 1000.0, [transition])
-        if not batch.feasible[0]:
-            problem.rejected[screen.DYNAMICS] += 1
-            return None
-        objective = float(batch.objective[0])
-        return Edge(
-            edge.state,
-            edge.cost + cost.dynamics * (objective - edge.payload[0]),
-            (objective, edge.payload[1]),
-        )
-
-    return judge
-
-
 def _solution(problem: ContactProblem, path: Path[bytes]) -> Solution:
     """A path as a contact sequence with its predicted motion."""
-    rows = unpack(path.states)
-    steps = list(zip(path.states[1:], path.payloads, strict=True))
+    states = [state for state in path.states if not is_pending(state)]
+    payloads = [payload for payload in path.payloads if payload is not None]
+    rows = unpack(states)
+    steps = list(zip(states[1:], payloads, strict=True))
     return Solution(
         sequence=ContactSequence(
-            problem.stance(path.states[0]), tuple(problem.transition(state, payload) for state, payload in steps)
+            problem.stance(states[0]), tuple(problem.transition(state, payload) for state, payload in steps)
         ),
         cost=path.cost,
         bound=path.bound,
         seconds=path.seconds,
         com=rows[:, COM] / 1000.0,
         com_velocity=rows[:, VELOCITY] / 1000.0,
-        objective=np.array([payload[0] for payload in path.payloads]),
+        objective=np.array([payload[0] for payload in payloads]),
     )
 
 

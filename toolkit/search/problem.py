@@ -1,4 +1,8 @@
-"""The contact search as a graph for ANA*: states, the transitions out of them, and what these cost (paper, Sec. V)."""
+"""The contact search as a graph for ANA*: states, the transitions out of them, and what these cost (paper, Sec. V).
+
+Where judging a transition takes long, transitions wait to be judged until they are the best to go on with: the graph
+then has, between two states, one that stands for the transition not yet judged (`toolkit.search.state.pack_pending`).
+"""
 
 from __future__ import annotations
 
@@ -10,22 +14,35 @@ import numpy as np
 
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
-from toolkit.geometry.limb import FEET, PALMS, Limb
-from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
+from toolkit.geometry.limb import PALMS, Limb
+from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
-from toolkit.search.ana_star import Edge
+from toolkit.search.candidates import CandidateGenerator, Candidates, mean_feet
 from toolkit.search.contact_table import ContactTable
-from toolkit.search.exclusion import Exclusion, excluded
+from toolkit.search.drift import Drift
+from toolkit.search.exclusion import Exclusion
+from toolkit.search.graph import Edge
 from toolkit.search.heuristic import Distance
-from toolkit.search.legs import stances_violated
 from toolkit.search.moves import MoveGenerator
-from toolkit.search.state import COM, CONTACTS, LAST, VELOCITY, pack, unpack
+from toolkit.search.reach_check import ReachCheck, ReachConfig
+from toolkit.search.state import (
+    COM,
+    CONTACTS,
+    LAST,
+    OLD,
+    TIMING,
+    VELOCITY,
+    is_pending,
+    pack,
+    pack_pending,
+    unpack,
+)
 from toolkit.world.timing import Timing
 from toolkit.world.world import Goal
 
 _LIMBS = tuple(Limb)
-_CROWD = 0.1  # m
+_CROWD, _PACE = 0.1, 0.25  # m, m/s
 
 
 @dataclass(frozen=True)
@@ -38,10 +55,8 @@ class CostConfig:
         time: per s; counts only where the planner may choose between timings, lest slower always look better.
         stagger: per m that one foot is ahead of the other in the final stance.
         swing_speed: m/s; a foot may not have to fly faster on average.
-        com_drops: m; the predicted CoM may be lower by any of these for the legs to reach.
-        lift_off: parts of the shift time at whose CoM the legs may reach at lift-off, since when the CoM moves is the
-            optimiser's choice.
-        arm_slack: m; an arm may reach further by this much, since the torso can lean.
+        miss: per m by which a transition not yet judged would have to bend the motion; only for the order in which
+            transitions are judged.
     """
 
     step: float = 3.0
@@ -49,39 +64,11 @@ class CostConfig:
     time: float = 5.0
     stagger: float = 5.0
     swing_speed: float = 4.0
-    com_drops: tuple[float, ...] = (0.0, 0.03, 0.06, 0.1)
-    lift_off: tuple[float, ...] = (1.0, 0.5)
-    arm_slack: float = 0.03
-
-
-@dataclass(frozen=True)
-class _Candidates:
-    """Transitions out of one state.
-
-    Attributes:
-        limb: (n,) int.
-        number: (n,) int; new contact, -1 where a palm breaks.
-        contacts: (n, 4) int; contact numbers afterwards.
-        centre: (n, 3) m; mean of the feet afterwards.
-        yaw: (n,) rad; its heading.
-        cost: (n,) known part of the edge cost.
-    """
-
-    limb: np.ndarray
-    number: np.ndarray
-    contacts: np.ndarray
-    centre: np.ndarray
-    yaw: np.ndarray
-    cost: np.ndarray
-
-    def select(self, rows: np.ndarray) -> _Candidates:
-        return _Candidates(
-            self.limb[rows], self.number[rows], self.contacts[rows], self.centre[rows], self.yaw[rows], self.cost[rows]
-        )
+    miss: float = 30.0
 
 
 class ContactProblem:
-    """Graph of one search; see `toolkit.search.ana_star.SearchProblem`. Edge payloads are (objective, timing index).
+    """Graph of one search; see `toolkit.search.graph.SearchProblem`. Edge payloads are (objective, timing index).
 
     Args:
         robot: the robot.
@@ -96,7 +83,9 @@ class ContactProblem:
         timings: to choose from.
         palms: whether palms may be used.
         config: costs.
+        reach: what legs and arms may reach.
         exclusions: transitions that later stages rejected.
+        lazy: whether a transition is judged only when it is the best to go on with.
 
     Attributes:
         rejected: (len(REASONS),) int; candidates that fell, by reason.
@@ -117,19 +106,25 @@ class ContactProblem:
         timings: tuple[Timing, ...],
         palms: bool,
         config: CostConfig,
+        reach: ReachConfig,
         exclusions: Sequence[Exclusion] = (),
+        *,
+        lazy: bool = False,
     ):
-        self._robot, self._moves, self._table = robot, moves, table
-        self._evaluator, self._distance, self._goal = evaluator, distance, goal
-        self._timings, self._config, self._exclusions = timings, config, exclusions
-        self._palms = [limb for limb in PALMS if palms and limb in robot.arms and moves.has_palm_surfaces]
-        self._longest = longest
+        self._table, self._evaluator, self._distance, self._goal = table, evaluator, distance, goal
+        self._timings, self._config, self._longest = timings, config, longest
+        self.rejected = np.zeros(len(screen.REASONS), np.int64)
+        limbs = [limb for limb in PALMS if palms and limb in robot.arms and moves.has_palm_surfaces]
+        self._candidates = CandidateGenerator(
+            moves, table, limbs, timings, config.swing_speed, exclusions, self.rejected
+        )
+        self._reach = ReachCheck(robot, moves.legs, moves.shanks, table, limbs, timings, reach)
+        self._drift = Drift(robot, table, timings) if lazy else None
+        self._durations = np.array([item.shift + item.swing for item in timings])
         numbers = np.full((1, 4), -1)
         for contact in start.contacts:
             numbers[0, contact.limb] = table.add_contact(contact)
         self._start = pack(numbers, np.array([-1]), com[None], np.zeros((1, 3)))[0]
-        self._drops = np.array(config.com_drops)
-        self.rejected = np.zeros(len(screen.REASONS), np.int64)
         self.deadline = np.inf
         self._pace = 0.0  # s per transition of the last query
 
@@ -144,20 +139,24 @@ class ContactProblem:
     def _stance(self, row: np.ndarray) -> Stance:
         return Stance(tuple(self._table.contact(int(number)) for number in row[CONTACTS] if number >= 0))
 
+    def origin(self, state: bytes) -> tuple[Stance, np.ndarray, np.ndarray]:
+        """Stance, CoM (3,) m and velocity (3,) m/s of a state, or of the one that a pending state comes from."""
+        row = unpack([state])[0]
+        return self._stance(_before(row)), row[COM] / 1000.0, row[VELOCITY] / 1000.0
+
     def transition(self, state: bytes, payload: tuple[float, int]) -> ContactTransition:
         """The transition that led to a state over an edge with this payload."""
         row = unpack([state])[0]
-        limb = Limb(int(row[LAST]))
-        number = int(row[CONTACTS][limb])
+        limb = int(row[LAST])
+        return self._transition(limb, int(row[CONTACTS][limb]), payload[1])
+
+    def _transition(self, limb: int, number: int, timing: int) -> ContactTransition:
         contact = self._table.contact(number) if number >= 0 else None
-        return ContactTransition(limb, contact, self._timings[payload[1]])
+        return ContactTransition(_LIMBS[limb], contact, self._timings[timing])
 
     def feet(self, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean of the feet (n, 3) m and its heading (n,) rad of contact numbers (n, 4)."""
-        table, left, right = self._table, contacts[:, 0], contacts[:, 1]
-        a, b = table.yaw[left], table.yaw[right]
-        yaw = np.arctan2(np.sin(a) + np.sin(b), np.cos(a) + np.cos(b))
-        return (table.position[left] + table.position[right]) / 2, yaw
+        return mean_feet(self._table, contacts)
 
     def heuristic(self, states: Sequence[bytes]) -> np.ndarray:
         """See `SearchProblem`; Eq. 5 of the paper, with at least one transition where the goal is not reached."""
@@ -170,175 +169,93 @@ class ContactProblem:
 
     def is_goal(self, states: Sequence[bytes]) -> np.ndarray:
         """See `SearchProblem`."""
+        if is_pending(states[0]):
+            return np.zeros(len(states), bool)
         return self._at_goal(self.feet(unpack(states)[:, CONTACTS])[0])
 
     def _at_goal(self, centre: np.ndarray) -> np.ndarray:
         return np.hypot(*(centre[:, :2] - self._goal.position[:2]).T) <= self._goal.radius
 
-    def crowd(self, states: Sequence[bytes]) -> list[tuple[int, int]]:
-        """See `SearchProblem`: states with the mean of the feet in the same square of 0.1 m."""
-        centre = self.feet(unpack(states)[:, CONTACTS])[0]
-        return list(map(tuple, np.floor(centre[:, :2] / _CROWD).astype(int).tolist()))
+    def crowd(self, states: Sequence[bytes]) -> list[tuple]:
+        """See `SearchProblem`: states with the mean of the feet in the same square of 0.1 m, and about as fast."""
+        rows = unpack(states)
+        place = np.floor(self.feet(rows[:, CONTACTS])[0][:, :2] / _CROWD)
+        speed = np.floor(np.hypot(*rows[:, VELOCITY][:, :2].T) / (1000.0 * _PACE))
+        kind = np.full(len(rows), is_pending(states[0]))
+        return list(map(tuple, np.column_stack([place, speed, kind]).astype(int).tolist()))
 
     def expand(self, state: bytes, slack: float) -> list[Edge[bytes]] | None:
         """See `SearchProblem`: screens, then one query of the evaluator for all children together."""
         row = unpack([state])[0]
-        candidates = self._candidates(row)
+        if is_pending(state):
+            return self._judge(row, self._pending(row))
+        contacts = row[CONTACTS]
+        candidates = self._candidates.out_of(contacts, int(row[LAST]))
         if candidates is None:
             return []
-        promising = candidates.cost + self._to_go(candidates.centre, candidates.yaw) < slack
+        h = self._to_go(candidates.centre, candidates.yaw)
+        promising = candidates.way + self._config.step + h < slack
         self.rejected[screen.COSTLY] += len(promising) - int(promising.sum())
-        candidates = candidates.select(promising)
-        if not len(candidates.limb):
+        candidates = self._candidates.timed(contacts, candidates.select(promising))
+        if not len(candidates):
             return []
-        com, velocity = row[COM] / 1000.0, row[VELOCITY] / 1000.0
-        chosen, timing = self._times(row, candidates)
-        candidates = candidates.select(chosen)
-        if not len(chosen):
-            return []
-        stance = self._stance(row)
+        return self._judge(row, candidates) if self._drift is None else self._postpone(row, candidates, self._drift)
+
+    def _known_cost(self, candidates: Candidates) -> np.ndarray:
+        """(n,) part of the edge cost that needs no dynamics."""
+        cost = candidates.way + self._config.step
+        if len(self._timings) > 1:
+            cost = cost + self._config.time * self._durations[candidates.timing]
+        return cost + self._final_cost(candidates)
+
+    def _judge(self, row: np.ndarray, candidates: Candidates) -> list[Edge[bytes]] | None:
+        """Edges that the evaluator and the reach of the limbs allow; None where there is no time left to ask."""
+        contacts, com, velocity = _before(row)[CONTACTS], row[COM] / 1000.0, row[VELOCITY] / 1000.0
         transitions = [
-            ContactTransition(_LIMBS[limb], self._table.contact(number) if number >= 0 else None, self._timings[choice])
-            for limb, number, choice in zip(
-                candidates.limb.tolist(), candidates.number.tolist(), timing.tolist(), strict=True
+            self._transition(*item)
+            for item in zip(
+                candidates.limb.tolist(), candidates.number.tolist(), candidates.timing.tolist(), strict=True
             )
         ]
         began = time.perf_counter()
         if began + self._pace * len(transitions) > self.deadline:
             return None
-        batch = self._evaluator.evaluate(stance, com, velocity, transitions)
+        batch = self._evaluator.evaluate(self._stance(_before(row)), com, velocity, transitions)
         self._pace = (time.perf_counter() - began) / len(transitions)
         codes = np.where(batch.feasible, 0, screen.DYNAMICS)
         rows = np.flatnonzero(batch.feasible)
         if len(rows):
-            codes[rows] = self._reach_codes(row, com, velocity, candidates.select(rows), batch, rows, timing[rows])
+            chosen = candidates.select(rows)
+            codes[rows] = self._reach.codes(contacts, com, velocity, chosen, batch.com[rows], batch.com_velocity[rows])
         self.rejected += np.bincount(codes, minlength=len(screen.REASONS))
         self.rejected[0] = 0
         kept = np.flatnonzero(codes == 0)
         if not len(kept):
             return []
-        candidates, objective, timing = candidates.select(kept), batch.objective[kept], timing[kept]
-        cost = candidates.cost + self._config.dynamics * objective
-        if len(self._timings) > 1:
-            durations = np.array([item.shift + item.swing for item in self._timings])
-            cost = cost + self._config.time * durations[timing]
-        cost = cost + self._final_cost(candidates)
+        candidates, objective = candidates.select(kept), batch.objective[kept]
+        cost = self._config.dynamics * objective
+        if self._drift is None:
+            cost = cost + self._known_cost(candidates)
         states = pack(candidates.contacts, candidates.limb, batch.com[kept], batch.com_velocity[kept])
-        payloads = zip(objective.tolist(), timing.tolist(), strict=True)
+        payloads = zip(objective.tolist(), candidates.timing.tolist(), strict=True)
         return [Edge(*item) for item in zip(states, cost.tolist(), payloads, strict=True)]
 
-    def _candidates(self, row: np.ndarray) -> _Candidates | None:
-        """All transitions that pass the screens, dynamics apart."""
-        contacts, last = row[CONTACTS], int(row[LAST])
-        limbs: list[np.ndarray] = []
-        numbers: list[np.ndarray] = []
-        for foot in FEET:
-            if foot == last:
-                continue
-            old, standing = int(contacts[foot]), int(contacts[foot.mirrored])
-            moves = self._moves.steps(foot, standing)
-            self.rejected += moves.rejected
-            if len(moves.numbers):
-                longest = self._config.swing_speed * max(timing.swing for timing in self._timings)
-                codes = self._moves.swings(foot, moves.numbers, old, standing, longest)
-                self.rejected += np.bincount(codes, minlength=len(screen.REASONS))
-                limbs.append(np.full(int((codes == 0).sum()), foot))
-                numbers.append(moves.numbers[codes == 0])
-        for palm in self._palms:
-            if palm == last:
-                continue
-            moves = self._moves.palms(palm, int(contacts[0]), int(contacts[1]))
-            self.rejected += moves.rejected
-            places = moves.numbers[moves.numbers != contacts[palm]]
-            if contacts[palm] >= 0:
-                places = np.append(places, -1)
-            limbs.append(np.full(len(places), palm))
-            numbers.append(places)
-        limb = np.concatenate(limbs) if limbs else np.zeros(0, int)
-        n = len(limb)
-        if n == 0:
-            return None
-        number = np.concatenate(numbers)
-        after = np.repeat(contacts[None], n, axis=0)
-        after[np.arange(n), limb] = number
-        if self._exclusions:
-            position = np.vstack([self._table.position, np.full(3, np.nan)])  # number -1: no contact
-            allowed = ~excluded(self._exclusions, position[contacts], limb, position[number])
-            self.rejected[screen.EXCLUDED] += n - int(allowed.sum())
-            limb, number, after, n = limb[allowed], number[allowed], after[allowed], int(allowed.sum())
-            if n == 0:
-                return None
+    def _postpone(self, row: np.ndarray, candidates: Candidates, drift: Drift) -> list[Edge[bytes]]:
+        """Edges to pending states, with the known part of the cost."""
+        com, velocity = row[COM] / 1000.0, row[VELOCITY] / 1000.0
+        miss = drift.miss(row[CONTACTS], com, velocity, candidates)
+        states = pack_pending(row, candidates.contacts, candidates.limb, candidates.timing)
+        cost, delay = self._known_cost(candidates), self._config.miss * miss
+        return [Edge(*item) for item in zip(states, cost.tolist(), [None] * len(states), delay.tolist(), strict=True)]
+
+    def _pending(self, row: np.ndarray) -> Candidates:
+        """The one candidate of a pending state."""
+        limb, after = row[LAST : LAST + 1], row[None, CONTACTS]
         centre, yaw = self.feet(after)
-        before = self.feet(contacts[None])[0][0]
-        cost = np.hypot(*(centre[:, :2] - before[:2]).T) + self._config.step
-        return _Candidates(limb, number, after, centre, yaw, cost)
+        way = np.hypot(*(centre - self.feet(_before(row)[None, CONTACTS])[0])[:, :2].T)
+        return Candidates(limb, after[:, limb[0]], after, centre, yaw, way, row[TIMING : TIMING + 1])
 
-    def _times(self, row: np.ndarray, candidates: _Candidates) -> tuple[np.ndarray, np.ndarray]:
-        """Indices of candidates and of timings: each candidate once for every timing that its swing allows."""
-        n, count = len(candidates.limb), len(self._timings)
-        if count == 1:  # the speed was screened
-            return np.arange(n), np.zeros(n, int)
-        table, old = self._table, row[CONTACTS][candidates.limb]
-        way = np.hypot(*(table.position[candidates.number] - table.position[old])[:, :2].T)
-        way[(candidates.limb > Limb.RIGHT_FOOT) | (candidates.number < 0)] = 0.0
-        swing = np.array([timing.swing for timing in self._timings])
-        chosen, timing = np.nonzero(way[:, None] <= self._config.swing_speed * swing)
-        return chosen, timing
-
-    def _reach_codes(
-        self,
-        row: np.ndarray,
-        com: np.ndarray,
-        velocity: np.ndarray,
-        candidates: _Candidates,
-        batch: TransitionBatch,
-        rows: np.ndarray,
-        timing: np.ndarray,
-    ) -> np.ndarray:
-        """Codes (n,) of candidates by what legs and arms reach with the CoM at lift-off and after touch-down."""
-        table, after = self._table, candidates.contacts
-        end, end_velocity = batch.com[rows], batch.com_velocity[rows]
-        n = len(rows)
-        codes = np.zeros(n, np.int64)
-        # Touch-down: the new stance under the predicted CoM.
-        broken = self._legs(end, candidates.yaw, after[:, 0], after[:, 1])
-        codes[broken >= 0] = screen.LEG + broken[broken >= 0]
-        # Lift-off: the old stance under the CoM at the end of the shift, on the cubic between the known ends.
-        shift = np.array([item.shift for item in self._timings])[timing]
-        total = shift + np.array([item.swing for item in self._timings])[timing]
-        feet = row[CONTACTS]
-        yaw, left, right = np.full(n, self.feet(feet[None])[1][0]), np.full(n, feet[0]), np.full(n, feet[1])
-        broken = np.full(n, 0)
-        for lag in self._config.lift_off:
-            lift = _cubic(com, velocity, end, end_velocity, lag * shift / total, total)
-            broken = np.where(broken >= 0, self._legs(lift, yaw, left, right), -1)
-        codes[broken >= 0] = screen.LEG + broken[broken >= 0]
-        for palm in self._palms:
-            held = np.flatnonzero(after[:, palm] >= 0)
-            if len(held):
-                arm = self._robot.arms[palm]
-                c, s = np.cos(candidates.yaw[held]), np.sin(candidates.yaw[held])
-                x, y, z = arm.shoulder_in_com
-                shoulder = end[held] + np.stack([c * x - s * y, s * x + c * y, np.full(len(held), z)], axis=-1)
-                distance = np.linalg.norm(table.position[after[held, palm]] - shoulder, axis=1)
-                slack = self._config.arm_slack
-                codes[held[(distance < arm.min_reach - slack) | (distance > arm.max_reach + slack)]] = screen.ARM
-        return codes
-
-    def _legs(self, com: np.ndarray, yaw: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-        table = self._table
-        return stances_violated(
-            self._moves.legs,
-            com,
-            self._drops,
-            yaw,
-            table.position[left],
-            table.rotation[left],
-            table.position[right],
-            table.rotation[right],
-        )
-
-    def _final_cost(self, candidates: _Candidates) -> np.ndarray:
+    def _final_cost(self, candidates: Candidates) -> np.ndarray:
         """(n,) extra cost of ending on a stance with one foot ahead, zero where the goal is not reached."""
         at_goal = self._at_goal(candidates.centre)
         if not at_goal.any():
@@ -348,15 +265,10 @@ class ContactProblem:
         return np.where(at_goal, self._config.stagger * ahead, 0.0)
 
 
-def _cubic(
-    start: np.ndarray, velocity: np.ndarray, end: np.ndarray, end_velocity: np.ndarray, s: np.ndarray, time: np.ndarray
-) -> np.ndarray:
-    """Points (n, 3) at the part s (n,) of Hermite cubics of duration `time` (n,) between positions and velocities."""
-    s, time = s[:, None], time[:, None]
-    rise = s * s * (3.0 - 2.0 * s)
-    return (
-        start * (1.0 - rise)
-        + end * rise
-        + velocity * time * s * (1.0 - s) ** 2
-        - end_velocity * time * s * s * (1.0 - s)
-    )
+def _before(row: np.ndarray) -> np.ndarray:
+    """The row of a state, or of the one that a pending state comes from (its last limb apart)."""
+    if len(row) <= OLD:
+        return row
+    before = row.copy()
+    before[CONTACTS][row[LAST]] = row[OLD]
+    return before

@@ -10,6 +10,7 @@ import numpy as np
 
 from toolkit.search.legs import LIMITS, violated
 from toolkit.search.occupancy import body_free
+from toolkit.search.shanks import leg_free, leg_points, legs_apart
 
 REASONS = (
     "",
@@ -29,10 +30,12 @@ REASONS = (
     "cannot lead to a better plan",
     "arm out of reach of its palm",
     "rejected by a later stage",
+    "a leg hits the world",
+    "legs hit each other",
 )
 NO_SURFACE, CLOSE, HIGH, BODY, LEG = 1, 2, 3, 4, 5
 PALM_REASONS = (14, 15, 16, 17)  # palms are an option: where they find no wall is no reason why there is no plan
-CROSSES, FAST, STILL, NO_WALL, FAR, WRONG_SIDE, FACING, DYNAMICS, COSTLY, ARM, EXCLUDED = range(11, 22)
+CROSSES, FAST, STILL, NO_WALL, FAR, WRONG_SIDE, FACING, DYNAMICS, COSTLY, ARM, EXCLUDED, SHANK, KNEES = range(11, 24)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -56,7 +59,7 @@ def mean_yaw(a, b):
 @numba.njit(cache=True, error_model="numpy")
 def screen_steps(
     surface, position, rotation, yaw, side, stand, stand_rotation, stand_yaw, half, climb, com_height, drops,
-    shifts, legs, box, body_corner, body_cell, below, codes,
+    shifts, legs, shanks, box, body_corner, body_cell, below, codes,
 ):  # fmt: skip
     """Fill codes of new soles beside a standing one, whatever the CoM may do.
 
@@ -75,12 +78,14 @@ def screen_steps(
         drops: (k,) m; how much lower the CoM may be.
         shifts: (m,) parts of the way from one sole to the other, from their middle, where the CoM may be.
         legs: both legs.
+        shanks: capsules inside them.
         box: (4,) m; half depth, half width, bottom and top of the body.
         body_corner: of the occupancy grid.
         body_cell: of the occupancy grid.
         below: of the occupancy grid.
         codes: (n,) int; filled.
     """
+    new, old = np.empty((3, 3)), np.empty((3, 3))  # hip, knee and ankle
     for row in range(len(surface)):
         codes[row] = 0
         if surface[row] < 0:
@@ -105,7 +110,18 @@ def screen_steps(
                     broken = violated(legs, 1 - side, cx, cy, cz, heading, stand, stand_rotation)
                 if m == 0 and k == 0:
                     code = 5 + broken
-                if broken < 0:
+                if broken >= 0:
+                    continue
+                leg_points(legs, side, cx, cy, cz, heading, p, rotation[row], new)
+                leg_points(legs, 1 - side, cx, cy, cz, heading, stand, stand_rotation, old)
+                if not legs_apart(shanks, new, old):
+                    code = 23
+                elif not (
+                    leg_free(body_corner, body_cell, below, shanks, new)
+                    and leg_free(body_corner, body_cell, below, shanks, old)
+                ):
+                    code = 22
+                else:
                     code = 0
                     break
             if code == 0:

@@ -1,8 +1,11 @@
-"""States of the contact search, packed: 44 bytes that are at once the state and its identity.
+"""States of the contact search, packed: bytes that are at once the state and its identity.
 
-A state is the numbers of its contacts (-1 where a palm has none), the limb that moved last (-1 at the start; it may
-not move again at once), the CoM in mm and its velocity in mm/s. Rounding to 1 mm is the paper's identification of
-states; contacts are rounded in the contact table.
+A state (44 bytes) is the numbers of its contacts (-1 where a palm has none), the limb that moved last (-1 at the
+start; it may not move again at once), the CoM in mm and its velocity in mm/s. Rounding to 1 mm is the paper's
+identification of states; contacts are rounded in the contact table.
+
+A pending state (52 bytes) stands for a transition that is still to be judged: contacts and limb as after it, CoM and
+velocity as before it, the old contact of the limb, and the transition's timing.
 """
 
 from __future__ import annotations
@@ -11,8 +14,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-SIZE = 11  # int32 each
+SIZE, PENDING = 11, 13  # int32 each
 CONTACTS, LAST, COM, VELOCITY = slice(0, 4), 4, slice(5, 8), slice(8, 11)
+OLD, TIMING = 11, 12
 
 
 def pack(contacts: np.ndarray, last: np.ndarray, com: np.ndarray, velocity: np.ndarray) -> list[bytes]:
@@ -28,10 +32,35 @@ def pack(contacts: np.ndarray, last: np.ndarray, com: np.ndarray, velocity: np.n
     rows[:, CONTACTS], rows[:, LAST] = contacts, last
     rows[:, COM] = np.round(com * 1000)
     rows[:, VELOCITY] = np.round(velocity * 1000)
-    data, size = rows.tobytes(), 4 * SIZE
-    return [data[start : start + size] for start in range(0, len(data), size)]
+    return _split(rows)
+
+
+def pack_pending(before: np.ndarray, contacts: np.ndarray, limb: np.ndarray, timing: np.ndarray) -> list[bytes]:
+    """Pending states of n transitions out of one state.
+
+    Args:
+        before: (11,) int; row of the state.
+        contacts: (n, 4) int; contact numbers afterwards.
+        limb: (n,) int; that moves.
+        timing: (n,) int; index.
+    """
+    rows = np.empty((len(contacts), PENDING), np.int32)
+    rows[:, CONTACTS], rows[:, LAST], rows[:, TIMING] = contacts, limb, timing
+    rows[:, COM], rows[:, VELOCITY], rows[:, OLD] = before[COM], before[VELOCITY], before[CONTACTS][limb]
+    return _split(rows)
+
+
+def is_pending(state: bytes) -> bool:
+    """Whether a state stands for a transition that is still to be judged."""
+    return len(state) == 4 * PENDING
 
 
 def unpack(states: Sequence[bytes]) -> np.ndarray:
-    """(n, 11) int rows of packed states."""
-    return np.frombuffer(b"".join(states), np.int32).reshape(-1, SIZE)
+    """(n, 11) int rows of packed states, (n, 13) of pending ones; one kind at a time."""
+    return np.frombuffer(b"".join(states), np.int32).reshape(len(states), -1)
+
+
+def _split(rows: np.ndarray) -> list[bytes]:
+    """One piece of bytes per row."""
+    data, size = rows.tobytes(), 4 * rows.shape[1]
+    return [data[start : start + size] for start in range(0, len(data), size)]

@@ -1,0 +1,80 @@
+"""Transitions that are judged only when they are the best to go on with."""
+
+import numpy as np
+
+from tests.search.worlds import FLOOR, make_world
+from toolkit.geometry.limb import Limb
+from toolkit.prediction.kinematic import KinematicEvaluator
+from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.planner import ContactPlanner, PlannerConfig
+from toolkit.search.state import COM, CONTACTS, LAST, OLD, TIMING, VELOCITY, is_pending, pack, pack_pending, unpack
+
+ENDLESS = PlannerConfig(search=AnaStarConfig(epsilon=0.1, max_expansions=30))
+
+
+class Counting(KinematicEvaluator):
+    """Counts what it is asked."""
+
+    asked = 0
+
+    def evaluate(self, stance, com, com_velocity, transitions):
+        self.asked += len(transitions)
+        return super().evaluate(stance, com, com_velocity, transitions)
+
+
+class Costly(Counting):
+    """The same, asked one by one."""
+
+    costly = True
+
+
+def test_pending_states_keep_both_ends_of_a_transition():
+    before = unpack(pack(np.array([[3, 5, -1, 8]]), np.array([0]), np.array([[0.1, -0.2, 0.9]]), np.ones((1, 3))))[0]
+    after = np.array([[3, 6, -1, 8], [3, 5, -1, -1]])
+    states = pack_pending(before, after, np.array([Limb.RIGHT_FOOT, Limb.RIGHT_PALM]), np.array([0, 2]))
+    assert all(is_pending(state) for state in states) and not is_pending(before.tobytes())
+    rows = unpack(states)
+    np.testing.assert_array_equal(rows[:, CONTACTS], after)
+    np.testing.assert_array_equal(rows[:, LAST], [1, 3])
+    np.testing.assert_array_equal(rows[:, OLD], [5, 8])
+    np.testing.assert_array_equal(rows[:, TIMING], [0, 2])
+    np.testing.assert_array_equal(rows[:, COM], np.tile(before[COM], (2, 1)))
+    np.testing.assert_array_equal(rows[:, VELOCITY], np.tile(before[VELOCITY], (2, 1)))
+
+
+def test_fewer_judgements_until_the_first_plan_of_the_same_graph(robot):
+    world = make_world(FLOOR, goal=(1.2, 0, 0))
+    found, asked = {}, {}
+    for kind in (Counting, Costly):
+        evaluator, first = kind(robot), []
+
+        def note(progress, evaluator=evaluator, first=first):
+            if progress.cost < np.inf and not first:
+                first.append(evaluator.asked)
+
+        result = ContactPlanner(robot, world, evaluator, ENDLESS).search(np.random.default_rng(0), 60.0, note)
+        assert result.solutions
+        found[kind], asked[kind] = result.solutions, first[0]
+        for solution in result.solutions:  # costs and predictions are those of the transitions alone
+            sequence = solution.sequence
+            stances = sequence.stances
+            assert len(solution.objective) == len(sequence.transitions) == len(solution.com) - 1
+            cost = 0.0
+            for index, (before, transition) in enumerate(zip(stances, sequence.transitions, strict=False)):
+                batch = evaluator.evaluate(before, solution.com[index], np.zeros(3), [transition])
+                np.testing.assert_allclose(batch.com[0], solution.com[index + 1], atol=6e-4)  # rounded to 1 mm
+                way = np.hypot(*(stances[index + 1].mean_feet.position - before.mean_feet.position)[:2])
+                cost += way + 3.0 + 0.1 * batch.objective[0]
+            heading = stances[-1].mean_feet.rotation[:, 0]
+            ahead = (stances[-1][Limb.LEFT_FOOT].pose.position - stances[-1][Limb.RIGHT_FOOT].pose.position) @ heading
+            np.testing.assert_allclose(solution.cost, cost + 5.0 * abs(ahead), atol=1e-6)
+    assert asked[Costly] < asked[Counting] / 1.5
+
+
+def test_same_seed_same_plan(robot):
+    world = make_world(FLOOR, goal=(1.0, 0, 0))
+    one, other = (
+        ContactPlanner(robot, world, Costly(robot), ENDLESS).search(np.random.default_rng(3), 60.0) for _ in range(2)
+    )
+    np.testing.assert_array_equal(one.expanded, other.expanded)
+    assert [solution.cost for solution in one.solutions] == [solution.cost for solution in other.solutions]

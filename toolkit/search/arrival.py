@@ -1,0 +1,71 @@
+"""Whether a search may end: after the last transition the robot stands at rest.
+
+The paper asks that of the last transition alone, which a robot that arrives fast cannot do. Where it cannot, the last
+few transitions and a moment on the final stance are optimised together, as they will be in the whole sequence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from toolkit.prediction.evaluator import TransitionEvaluator
+from toolkit.search import screen
+from toolkit.search.graph import Edge
+from toolkit.search.problem import ContactProblem, CostConfig
+from toolkit.search.state import is_pending
+
+
+class Arrival:
+    """Judge of the last transition, for ANA*; the objective of the last edge is replaced by what coming to rest takes.
+
+    Args:
+        problem: the search.
+        evaluator: judges one transition as the last one. Where it has a method `halt` (see `OptimiserEvaluator`),
+            that judges several.
+        cost: of edges.
+        window: most transitions that may be optimised together.
+        rest: s on the final stance that are optimised with them.
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        evaluator: TransitionEvaluator,
+        cost: CostConfig,
+        window: int = 3,
+        rest: float = 0.6,
+    ):
+        self._problem, self._evaluator, self._cost = problem, evaluator, cost
+        self._window, self._rest = window, rest
+
+    def __call__(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> Edge[bytes] | None:
+        """See `toolkit.search.graph.Judge`."""
+        problem = self._problem
+        last = problem.transition(edge.state, edge.payload)
+        batch = self._evaluator.evaluate(*problem.origin(states[-1]), [last])
+        objective = float(batch.objective[0]) if batch.feasible[0] else self._together(states, payloads, edge)
+        if objective is None:
+            problem.rejected[screen.DYNAMICS] += 1
+            return None
+        cost = edge.cost + self._cost.dynamics * (objective - edge.payload[0])
+        return edge._replace(cost=cost, payload=(objective, edge.payload[1]))
+
+    def _together(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> float | None:
+        """What of the objective of coming to rest falls to the last edge; None where that is infeasible."""
+        halt = getattr(self._evaluator, "halt", None)
+        if halt is None:
+            return None
+        problem = self._problem
+        judged = [payload for payload in payloads if payload is not None]
+        passed = [state for state in states if not is_pending(state)]
+        transitions, earlier = [problem.transition(edge.state, edge.payload)], 0.0
+        for back in range(1, self._window + 1):
+            objective = halt(*problem.origin(passed[-back]), transitions, self._rest)
+            if objective is not None:
+                return max(objective - earlier, 0.0)
+            if back == len(passed):
+                return None
+            transitions.insert(0, problem.transition(passed[-back], judged[-back]))
+            earlier += judged[-back][0]
+        return None

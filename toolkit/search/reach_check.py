@@ -1,0 +1,144 @@
+"""What legs and arms reach in a transition, once the CoM before and after it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.geometry.limb import Limb
+from toolkit.robot.model import RobotModel
+from toolkit.search import screen
+from toolkit.search.candidates import Candidates, mean_feet
+from toolkit.search.contact_table import ContactTable
+from toolkit.search.legs import Legs
+from toolkit.search.shanks import Shanks
+from toolkit.search.stances import ENTANGLED, stances_violated
+from toolkit.world.timing import Timing
+
+
+@dataclass(frozen=True)
+class ReachConfig:
+    """Settings of the check.
+
+    Attributes:
+        com_drops: m; the predicted CoM may be lower by any of these for the legs to reach.
+        lift_off: parts of the shift time at whose CoM the legs may reach at lift-off, since when the CoM moves is the
+            optimiser's choice.
+        arm_slack: m; an arm may reach further by this much, since the torso can lean.
+    """
+
+    com_drops: tuple[float, ...] = (0.0, 0.03, 0.06, 0.1)
+    lift_off: tuple[float, ...] = (1.0, 0.5)
+    arm_slack: float = 0.03
+
+
+class ReachCheck:
+    """Checks the candidates of one search.
+
+    Args:
+        robot: the robot.
+        legs: its legs with the margins of the search.
+        shanks: capsules inside them.
+        table: contacts.
+        palms: in use.
+        timings: to choose from.
+        config: settings.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        legs: Legs,
+        shanks: Shanks,
+        table: ContactTable,
+        palms: Sequence[Limb],
+        timings: tuple[Timing, ...],
+        config: ReachConfig,
+    ):
+        self._robot, self._legs, self._shanks, self._table = robot, legs, shanks, table
+        self._palms, self._config = palms, config
+        self._drops = np.array(config.com_drops)
+        self._shift = np.array([item.shift for item in timings])
+        self._total = self._shift + np.array([item.swing for item in timings])
+
+    def codes(
+        self,
+        contacts: np.ndarray,
+        com: np.ndarray,
+        velocity: np.ndarray,
+        candidates: Candidates,
+        end: np.ndarray,
+        end_velocity: np.ndarray,
+    ) -> np.ndarray:
+        """Codes (n,) of candidates by what legs and arms reach with the CoM at lift-off and after touch-down.
+
+        Args:
+            contacts: (4,) int; numbers before.
+            com: (3,) m; before.
+            velocity: (3,) m/s.
+            candidates: n of them.
+            end: (n, 3) m; CoM afterwards.
+            end_velocity: (n, 3) m/s.
+        """
+        table, after = self._table, candidates.contacts
+        n = len(candidates)
+        codes = np.zeros(n, np.int64)
+        # Touch-down: the new stance under the predicted CoM.
+        broken = self._violated(end, candidates.yaw, after[:, 0], after[:, 1])
+        _enter(codes, broken)
+        # Lift-off: the old stance under the CoM at the end of the shift, on the cubic between the known ends.
+        shift, total = self._shift[candidates.timing], self._total[candidates.timing]
+        yaw = np.full(n, mean_feet(table, contacts[None])[1][0])
+        left, right = np.full(n, contacts[0]), np.full(n, contacts[1])
+        broken = np.full(n, 0)
+        for lag in self._config.lift_off:
+            lift = _cubic(com, velocity, end, end_velocity, lag * shift / total, total)
+            broken = np.where(broken >= 0, self._violated(lift, yaw, left, right), -1)
+        _enter(codes, broken)
+        for palm in self._palms:
+            held = np.flatnonzero(after[:, palm] >= 0)
+            if len(held):
+                arm = self._robot.arms[palm]
+                c, s = np.cos(candidates.yaw[held]), np.sin(candidates.yaw[held])
+                x, y, z = arm.shoulder_in_com
+                shoulder = end[held] + np.stack([c * x - s * y, s * x + c * y, np.full(len(held), z)], axis=-1)
+                distance = np.linalg.norm(table.position[after[held, palm]] - shoulder, axis=1)
+                slack = self._config.arm_slack
+                codes[held[(distance < arm.min_reach - slack) | (distance > arm.max_reach + slack)]] = screen.ARM
+        return codes
+
+    def _violated(self, com: np.ndarray, yaw: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        table = self._table
+        return stances_violated(
+            self._legs,
+            self._shanks,
+            com,
+            self._drops,
+            yaw,
+            table.position[left],
+            table.rotation[left],
+            table.position[right],
+            table.rotation[right],
+        )
+
+
+def _enter(codes: np.ndarray, broken: np.ndarray) -> None:
+    """Enter what `stances_violated` found."""
+    rows = broken >= 0
+    codes[rows] = np.where(broken[rows] == ENTANGLED, screen.KNEES, screen.LEG + broken[rows])
+
+
+def _cubic(
+    start: np.ndarray, velocity: np.ndarray, end: np.ndarray, end_velocity: np.ndarray, s: np.ndarray, time: np.ndarray
+) -> np.ndarray:
+    """Points (n, 3) at the part s (n,) of Hermite cubics of duration `time` (n,) between positions and velocities."""
+    s, time = s[:, None], time[:, None]
+    rise = s * s * (3.0 - 2.0 * s)
+    return (
+        start * (1.0 - rise)
+        + end * rise
+        + velocity * time * s * (1.0 - s) ** 2
+        - end_velocity * time * s * s * (1.0 - s)
+    )
