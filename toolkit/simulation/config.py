@@ -32,7 +32,8 @@ class ControllerConfig:
         stance: a limb in contact is held still by its velocity only: where it rests is a measured fact.
         stance_palm_rotation: the same for the rotation of a palm, whose patch aligns itself with the surface.
         swing, hand: a foot in the air; a palm that approaches or leaves its contact.
-        com, base, posture: centre of mass, orientation of the base, joints.
+        com, base, posture: centre of mass, orientation of the base, joints; arms and trunk that follow momentum rather
+            than the plan leave the way that was found clear.
         leg_posture: factor on the posture's weight for joints that carry a foot.
         angular_momentum: `weight |(dk/dt - dk_ref/dt - kp (k_ref - k)) / angular_momentum_scale|^2`; kd is unused.
         angular_momentum_scale: kg m^2/s per unit of the task.
@@ -64,8 +65,8 @@ class ControllerConfig:
     hand: TaskGains = TaskGains(50.0, 200.0, 28.0)
     com: TaskGains = TaskGains(100.0, 60.0, 14.0)
     base: TaskGains = TaskGains(50.0, 100.0, 20.0)
-    posture: TaskGains = TaskGains(0.4, 60.0, 15.0)
-    leg_posture: float = 0.05
+    posture: TaskGains = TaskGains(4.0, 60.0, 15.0)
+    leg_posture: float = 0.005
     angular_momentum: TaskGains = TaskGains(40.0, 5.0, 0.0)
     angular_momentum_scale: float = 10.0
     divergence_scale: float = 0.01

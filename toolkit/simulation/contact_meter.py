@@ -14,7 +14,8 @@ class ContactMeter:
     Attributes:
         wrench: (4, 6) N and N m; contact force and moment about each patch's centre, world frame, of the last step.
         normal_force: (4,) N; its part along the patch's z axis.
-        unplanned: (robot geom, world geom) pairs that touched outside the patches, since the start.
+        expected: (4,) bool; limbs whose patch may touch now, to be set by whoever knows the plan; all at first.
+        unplanned: (robot geom, world geom) pairs that touched outside the expected patches, since the start.
         unplanned_time: s; when the first of them happened, None before.
         trunk_touched: name of a trunk geom that touched the world, "" if none did.
         friction_mismatches: contacts whose friction was not the world geom's, since the start.
@@ -23,6 +24,7 @@ class ContactMeter:
     def __init__(self, index: SceneIndex):
         self._index = index
         self.wrench, self.normal_force = np.zeros((4, 6)), np.zeros(4)
+        self.expected = np.ones(4, bool)
         self.unplanned: set[tuple[int, int]] = set()
         self.unplanned_time: float | None = None
         self.trunk_touched = ""
@@ -52,8 +54,9 @@ class ContactMeter:
         position, frame = contact.pos[touching], contact.frame[touching].reshape(-1, 3, 3)
         for k, number in enumerate(touching):
             limb = limbs[k]
-            if limb < 0:
+            if limb < 0 or not self.expected[limb]:
                 self._note(int(robot_geom[k]), int(world_geom[k]), data.time)
+            if limb < 0:
                 continue
             mujoco.mj_contactForce(scene, data, int(number), self._force)
             # The force acts on the second geom, in rows of the contact's frame (normal first).

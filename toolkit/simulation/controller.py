@@ -165,7 +165,7 @@ class Controller:
         target[6:nv] = reference.joint_acceleration[index]
         target[6:nv] += posture.kp * (reference.joints[index] - qpos[7:])
         target[6:nv] += posture.kd * (reference.joint_velocity[index] - qvel[6:])
-        target[6:nv] *= self._posture_weight / self._diagonal[6:nv]
+        target[6:nv] *= self._posture_weight * self._calm / self._diagonal[6:nv]
         diagonal = self._diagonal[: qp.size]
         for limb, slot in qp.slots.items():
             moments = slice(slot.start + 3, slot.stop)
@@ -178,7 +178,8 @@ class Controller:
         """See how far the CoM diverges from its plan.
 
         A robot about to fall uses its feet to their edges and swings its body: the margins of the CoP shrink, and so do
-        the weights of angular momentum and of the base's orientation. Friction keeps its margin: a slip saves nobody.
+        the weights of angular momentum, of the base's orientation and of the posture. Friction keeps its margin: a slip
+        saves nobody.
         """
         gains, dynamics = self._config, self.dynamics
         x, y = (dynamics.com - self._com + (dynamics.com_velocity - self._com_velocity) / gains.divergence_rate)[:2]
@@ -186,6 +187,9 @@ class Controller:
         self._calm = 1.0 / (1.0 + squared)
         self._urgent = squared > (0.25 if self._urgent else 1.0)
         self._diagonal[3:6] = gains.acceleration + gains.base.weight * self._calm
+        joints = self._diagonal[6 : dynamics.nv]
+        np.multiply(self._posture_weight, self._calm, out=joints)
+        joints += gains.acceleration
 
     def _pursue_limb(self, limb: Limb, rows: int) -> int:
         """Append a limb's task rows after the first `rows`; returns their new number."""

@@ -102,6 +102,7 @@ def execute(
         tick_started = perf_counter()
         torque = controller.tick(tick, *told(qpos, qvel), recorder.meter.normal_force)
         tick_seconds[tick] = perf_counter() - tick_started
+        recorder.meter.expected[:] = reference.authority[tick] > 0.0
         data.ctrl[:] = torque
         if push.any():
             pushed = push_time <= reference.times[tick] < push_time + config.disturbance.push_duration

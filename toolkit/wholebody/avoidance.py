@@ -35,11 +35,11 @@ class AvoidanceConfig:
     """
 
     enabled: bool = True
-    notice: float = 0.06
-    safe_world: float = 0.025
+    notice: float = 0.12
+    safe_world: float = 0.06
     safe_self: float = 0.012
     time: float = 0.15
-    max_rows: int = 12
+    max_rows: int = 16
 
 
 class ArmAvoidance:
