@@ -2,12 +2,16 @@
 
 import numpy as np
 
-from tests.search.worlds import FLOOR, make_world
+from tests.search.worlds import FLOOR, box, make_world
+from toolkit.contacts.projection import Projected
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.candidates import Candidates, mean_feet
+from toolkit.search.drift import Drift
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.state import COM, CONTACTS, LAST, OLD, TIMING, VELOCITY, is_pending, pack, pack_pending, unpack
+from toolkit.world.timing import Timing
 
 ENDLESS = PlannerConfig(search=AnaStarConfig(epsilon=0.1, max_expansions=30))
 
@@ -78,3 +82,53 @@ def test_same_seed_same_plan(robot):
     )
     np.testing.assert_array_equal(one.expanded, other.expanded)
     assert [solution.cost for solution in one.solutions] == [solution.cost for solution in other.solutions]
+
+
+def standing(robot, mjcf, timings):
+    """Drift in a world, its table, and the numbers of the feet side by side at the start."""
+    planner = ContactPlanner(robot, make_world(mjcf, goal=(0.6, 0, 0)), KinematicEvaluator(robot))
+    _, table = planner._generator(wide=False)
+    numbers = np.array([*(table.add_contact(c) for c in planner.start_stance().contacts), -1, -1])
+    return Drift(robot, table, timings), table, numbers
+
+
+def steps(table, contacts, offsets, timing=0):
+    """Candidates that move the left foot by offsets (n, 2) from where it is."""
+    n = len(offsets)
+    position = np.tile(table.position[contacts[0]], (n, 1))
+    position[:, :2] += offsets
+    rotation = np.tile(table.rotation[contacts[0]], (n, 1, 1))
+    number = table.add(Limb.LEFT_FOOT, Projected(np.zeros(n, int), position, rotation))
+    after = np.tile(contacts, (n, 1))
+    after[:, 0] = number
+    centre, yaw = mean_feet(table, after)
+    return Candidates(np.zeros(n, int), number, after, centre, yaw, np.zeros(n), np.full(n, timing))
+
+
+def test_drift_expects_quick_feet_under_the_com(robot):
+    drift, table, contacts = standing(robot, FLOOR, (Timing(0.05, 0.35), Timing(1.0, 1.0)))
+    com = mean_feet(table, contacts[None])[0][0] + [0.0, 0.0, robot.com_height]
+    at = np.array([[0.0, 0.0], [0.3, 0.0], [0.6, 0.0], [1.2, 0.0]])
+    still = drift.miss(contacts, com, np.zeros(3), steps(table, contacts, at))
+    assert still[0] < 0.03 and (np.diff(still) > 0).all() and still[3] > 0.2
+    fast = drift.miss(contacts, com, np.array([1.2, 0.0, 0.0]), steps(table, contacts, at))
+    assert fast[3] < 0.15 < fast[0]
+    slow = drift.miss(contacts, com, np.array([0.2, 0.0, 0.0]), steps(table, contacts, at[:3], timing=1))
+    assert (slow < 0.03).all()
+
+
+def test_drift_knows_that_nothing_stands_slowly_on_steep_ground(robot):
+    times = (Timing(0.05, 0.35), Timing(1.0, 1.0))
+    for angle, slides in ((20, False), (30, True)):
+        slope = box([0, 0, 0], [3, 3, 0.05], (0, angle, 0), friction=0.5)
+        drift, table, contacts = standing(robot, slope, times)
+        downhill, gain = table.slide(contacts[:2])
+        np.testing.assert_allclose(downhill[0], [1, 0], atol=1e-6)
+        sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
+        np.testing.assert_allclose(gain, max(9.81 * (sine - 0.5 * cosine) * cosine, 0.0), atol=1e-5)  # file's digits
+        com = mean_feet(table, contacts[None])[0][0] + [0.0, 0.0, robot.com_height]
+        quick, slow = (
+            drift.miss(contacts, com, np.zeros(3), steps(table, contacts, np.array([[0.2, 0.0]]), timing))[0]
+            for timing in (0, 1)
+        )
+        assert (slow > 0.5) == slides and quick < 0.1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from toolkit.centroidal.problem import GRAVITY
 from toolkit.contacts.projection import Projected
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
@@ -79,6 +80,17 @@ class ContactTable:
             found = Contact(_LIMBS[self.limb[number]], pose, float(self._friction[surface]), surface)
             self._objects[number] = found
         return found
+
+    def slide(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where whoever stands on contacts (n,) alone slides.
+
+        Returns:
+            (n, 2) unit; downhill in XY. (n,) m/s^2; least horizontal acceleration that way, 0 where friction holds.
+        """
+        normal, friction = self.rotation[numbers, :, 2], self._friction[self.surface[numbers]]
+        steep = np.hypot(normal[:, 0], normal[:, 1])  # sine of the angle
+        gain = np.maximum(steep - friction * normal[:, 2], 0.0) * normal[:, 2] * -GRAVITY[2]
+        return normal[:, :2] / np.maximum(steep, 1e-12)[:, None], gain
 
     def _grow(self) -> None:
         for name in ("position", "rotation", "yaw", "surface", "limb"):
