@@ -89,6 +89,16 @@ def add_disturbance_options(target: argparse.ArgumentParser) -> None:
     group.add_argument("--delay", type=_finite, default=0.0, metavar="S", help="of what the controller is told")
 
 
+def add_execution_options(target: argparse.ArgumentParser) -> None:
+    """Add how a plan is carried out."""
+    target.add_argument(
+        "--no-replanning",
+        dest="replanning",
+        action="store_false",
+        help="track the plan as it is: do not optimise the next contacts again from the measured state",
+    )
+
+
 def _terrain_error(text: str) -> tuple[float, float]:
     """An argparse type: metres, or metres and degrees."""
     parts = text.split(",")

@@ -33,6 +33,7 @@ def arguments() -> argparse.ArgumentParser:
     cli.add_robot_options(parser)
     cli.add_planning_options(parser)
     cli.add_disturbance_options(parser)
+    cli.add_execution_options(parser)
     parser.add_argument("--out", type=Path, help="output folder (default: runs/<world>-<robot>-<time>)")
     parser.add_argument("--candidates", type=cli.positive(int), default=6, help="sequences to test (default: 6)")
     parser.add_argument("--pictures", action="store_true", help="also render a strip of pictures and plots")
@@ -52,13 +53,12 @@ def main(argv: list[str] | None = None) -> int:
     from toolkit.report.run import write_run
     from toolkit.robot.loader import load_robot
     from toolkit.search.options import planner_config
-    from toolkit.simulation.config import ExecutionConfig
-    from toolkit.simulation.options import disturbance
+    from toolkit.simulation.options import execution_config
     from toolkit.world.loader import load_world
 
     began = time.perf_counter()
     display = StageConsole()
-    disturbed = disturbance(args)
+    execution = execution_config(args)
     world = load_world(args.world)
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
@@ -71,7 +71,7 @@ def main(argv: list[str] | None = None) -> int:
         seed=args.seed,
         time_limit=args.time_limit,
         candidates=args.candidates,
-        execution=ExecutionConfig(disturbance=disturbed),
+        execution=execution,
     )
     planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
     result = pipeline.run(robot, world, planner, config, display)

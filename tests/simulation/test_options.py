@@ -1,4 +1,4 @@
-"""Disturbances from the command line."""
+"""Disturbances and replanning from the command line."""
 
 import argparse
 
@@ -8,7 +8,7 @@ import pytest
 from toolkit import cli
 from toolkit.errors import InputError
 from toolkit.simulation.disturbance import Disturbance
-from toolkit.simulation.options import disturbance
+from toolkit.simulation.options import disturbance, execution_config
 
 
 def parsed(*options: str) -> Disturbance:
@@ -46,3 +46,12 @@ def test_what_is_out_of_range_is_refused():
         parsed("--delay", "-1")
     with pytest.raises(InputError, match="mass_error"):
         parsed("--mass-error", "-2")
+
+
+def test_replanning_can_be_left_out():
+    parser = argparse.ArgumentParser()
+    cli.add_disturbance_options(parser)
+    cli.add_execution_options(parser)
+    assert execution_config(parser.parse_args([])).replanning.enabled
+    config = execution_config(parser.parse_args(["--no-replanning", "--push", "60"]))
+    assert not config.replanning.enabled and config.disturbance.push == 60.0

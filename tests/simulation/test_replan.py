@@ -10,9 +10,10 @@ from toolkit.simulation.config import ExecutionConfig
 from toolkit.simulation.disturbance import Disturbance
 from toolkit.simulation.reference import swings_of
 from toolkit.simulation.replan_config import ReplanConfig
+from toolkit.simulation.replan_contacts import Cones, Situation
 from toolkit.simulation.replan_kernel import solve
 from toolkit.simulation.replan_nominal import Nominal
-from toolkit.simulation.replan_problem import G, Cones, ReplanProblem, Situation
+from toolkit.simulation.replan_problem import G, ReplanProblem
 
 CONFIG = ReplanConfig(enabled=True)
 WITH = ExecutionConfig(replanning=CONFIG)
@@ -51,6 +52,8 @@ def situation(walking, nominal, time, com=(0, 0, 0), velocity=(0, 0, 0), **optio
         fixed={},
         moving=moving,
         goal={},
+        landing={},
+        earliest={},
         com_shift=np.zeros(3),
         cones=Cones(0.85, 0.8, walking.robot.half_sizes - 0.02),
     )
@@ -119,7 +122,8 @@ def test_a_push_moves_the_landing_along(walking, nominal, problem):
 
 def test_a_kept_landing_is_not_moved(walking, nominal, problem):
     time = mid_swing(nominal)
-    kept = situation(walking, nominal, time, velocity=(0.25, 0.0, 0.0), moving={}, fixed={0: np.array([0.01, 0.0, 0.0])})
+    fixed = {0: np.array([0.01, 0.0, 0.0])}
+    kept = situation(walking, nominal, time, velocity=(0.25, 0.0, 0.0), moving={}, fixed=fixed)
     assert 0 not in problem.solve(kept, solve).landing
 
 

@@ -49,6 +49,9 @@ EXECUTION = (
     "com_rms_error",
     "unplanned_contacts",
     "solver_failures",
+    "replans",
+    "replan_failures",
+    "replan_seconds",
     "simulated_seconds",
     "real_time_factor",
 )

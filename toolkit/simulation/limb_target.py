@@ -31,6 +31,7 @@ class LimbTargets:
         self.authority = np.ones(4)
         self.shift, self.shift_velocity = np.zeros((4, 3)), np.zeros((4, 3))
         self._offset = np.zeros((4, 3))
+        self._period = float(reference.times[1] - reference.times[0]) if len(reference.times) > 1 else 1.0
 
     def update(self, index: int, dynamics: RobotDynamics) -> None:
         """Evaluate at a row of the reference and the measured limbs."""
@@ -48,18 +49,23 @@ class LimbTargets:
                 if not swing.breaks:
                     self._offset[limb] = 0.0
                 self.shift[limb] = self.shift_velocity[limb] = 0.0
-            target = reference.limb_position[index, limb] + self.shift[limb]
-            self.velocity[limb] = reference.limb_velocity[index, limb]
+            pace, row = tracker.pace[limb], self._row(index, tracker.lead[limb])
+            target = reference.limb_position[row, limb] + self.shift[limb]
+            self.velocity[limb] = pace * reference.limb_velocity[row, limb]
             self.velocity[limb, :3] += self.shift_velocity[limb]
-            self.acceleration[limb] = reference.limb_acceleration[index, limb]
+            self.acceleration[limb] = pace * pace * reference.limb_acceleration[row, limb]
             if state is LimbState.SEARCH and swing.contact is not None:
                 normal = swing.contact.pose.normal
                 target = target - tracker.depth[limb] * normal
                 self.velocity[limb, :3] -= tracker.search_speed(limb) * normal
             else:
-                target = target + self._remaining(swing, reference.times[index]) * self._offset[limb]
+                target = target + self._remaining(swing, reference.times[row]) * self._offset[limb]
             self.error[limb, :3] = target - dynamics.limb_position[limb]
-            self.error[limb, 3:] = rotation_error(reference.limb_rotation[index, limb], dynamics.limb_rotation[limb])
+            self.error[limb, 3:] = rotation_error(reference.limb_rotation[row, limb], dynamics.limb_rotation[limb])
+
+    def _row(self, index: int, lead: float) -> int:
+        """Row of the reference that a limb whose swing runs ahead has reached."""
+        return min(index + round(lead / self._period), len(self._reference.times) - 1) if lead else index
 
     def _remaining(self, swing: Swing, time: float) -> float:
         """Share of the initial offset that is left."""

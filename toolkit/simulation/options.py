@@ -1,11 +1,13 @@
-"""Disturbance from the options of a command line."""
+"""Settings of the execution from the options of a command line."""
 
 from __future__ import annotations
 
 from argparse import Namespace
+from dataclasses import replace
 
 import numpy as np
 
+from toolkit.simulation.config import ExecutionConfig
 from toolkit.simulation.disturbance import Disturbance
 
 
@@ -25,3 +27,13 @@ def disturbance(args: Namespace) -> Disturbance:
         state_noise=args.state_noise,
         delay=args.delay,
     )
+
+
+def execution_config(args: Namespace) -> ExecutionConfig:
+    """How a plan is carried out (see `toolkit.cli.add_disturbance_options` and `add_execution_options`).
+
+    Raises:
+        InputError: a value is out of range.
+    """
+    config = ExecutionConfig(disturbance=disturbance(args))
+    return replace(config, replanning=replace(config.replanning, enabled=args.replanning))

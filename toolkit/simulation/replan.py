@@ -11,11 +11,12 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.simulation.dynamics import RobotDynamics
 from toolkit.simulation.limb_target import LimbTargets
-from toolkit.simulation.reference import Reference
+from toolkit.simulation.reference import Reference, Swing
 from toolkit.simulation.replan_config import ReplanConfig
+from toolkit.simulation.replan_contacts import Cones, Situation
 from toolkit.simulation.replan_kernel import solve
 from toolkit.simulation.replan_nominal import Nominal
-from toolkit.simulation.replan_problem import Cones, Replan, ReplanProblem, Situation
+from toolkit.simulation.replan_problem import Replan, ReplanProblem
 from toolkit.simulation.touchdown import ContactTracker, LimbState
 from toolkit.world.surface import Surface
 
@@ -85,6 +86,7 @@ class Replanner:
         self._plan: Replan | None = None
         self._made: dict[Limb, int] = {}
         self._goal: dict[int, np.ndarray] = {}
+        self._ends: dict[int, float] = {}
         self._shift, self._rate, self._moved = np.zeros((3, 4, 3))
         self.replans = self.failures = 0
         self.seconds = 0.0
@@ -137,6 +139,7 @@ class Replanner:
         else:
             self._plan = plan
             self._goal.update(plan.landing)
+            self._ends = plan.ends
         self.seconds += process_time() - began
 
     def _follow_feet(self, index: int, period: float) -> None:
@@ -154,7 +157,7 @@ class Replanner:
 
     def _situation(self, time: float, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones) -> Situation:
         """What is measured, as the problem wants it."""
-        standing, fixed, moving = {}, {}, {}
+        standing, fixed, moving, landing, earliest = {}, {}, {}, {}, {}
         for limb in dynamics.limbs:
             if tracker.in_contact[limb]:
                 pose = dynamics.limb_position[limb].copy(), dynamics.limb_rotation[limb].copy()
@@ -164,7 +167,11 @@ class Replanner:
             if swing is None or swing.contact is None:
                 continue
             index = self._nominal.swings.index(swing)
-            over = (time - swing.start) / (swing.end - swing.start)
+            lead = float(tracker.lead[limb])
+            over = (time + lead - swing.start) / (swing.end - swing.start)
+            if tracker.state[limb] is LimbState.SWING and limb.is_foot:
+                earliest[index] = time + (swing.end - time - lead) / self._most(swing) + 0.02
+                landing[index] = min(max(self._ends.get(index, np.inf), earliest[index]), swing.end - lead)
             if tracker.state[limb] is not LimbState.SWING or over > self._config.fraction:
                 fixed[index] = self._goal.get(index, np.zeros(3))
             else:
@@ -178,9 +185,15 @@ class Replanner:
             fixed=fixed,
             moving=moving,
             goal=self._goal,
+            landing=landing,
+            earliest=earliest,
             com_shift=self.com_shift.copy(),
             cones=cones,
         )
+
+    def _most(self, swing: Swing) -> float:
+        """Fastest pace of a swing."""
+        return min(max((swing.end - swing.start) / self._config.shortest, 1.0), self._config.pace)
 
     def _track(self, time: float, target: MotionTarget) -> None:
         """Overwrite what to track by the last replan, where it reaches so far."""
@@ -198,7 +211,7 @@ class Replanner:
         target.wrench[:] = self._weight * plan.wrench[k]
 
     def _move_landings(self, time: float, period: float, tracker: ContactTracker, targets: LimbTargets) -> None:
-        """Move the landing point of the feet in the air smoothly to where the last replan wants it."""
+        """Move the landing points of the feet in the air smoothly to where and when the last replan wants them."""
         for foot in FEET:
             if tracker.begun[foot]:
                 self._shift[foot] = self._rate[foot] = 0.0
@@ -207,8 +220,14 @@ class Replanner:
                 self._rate[foot] = 0.0
                 targets.shift_velocity[foot] = 0.0
                 continue
-            goal = self._goal.get(self._nominal.swings.index(swing), self._shift[foot])
-            left = max(swing.start + 0.9 * (swing.end - swing.start) - time, 0.05)
+            event = self._nominal.swings.index(swing)
+            end = self._ends.get(event, swing.end)
+            pace = (swing.end - time - tracker.lead[foot]) / max(end - time, 0.02) if end < swing.end else 1.0
+            pace = min(max(pace, 1.0), self._most(swing))
+            change = self._config.pace_rate * period
+            tracker.pace[foot] += min(max(pace - tracker.pace[foot], -change), change)
+            goal = self._goal.get(event, self._shift[foot])
+            left = max(min(end, swing.start + 0.9 * (swing.end - swing.start)) - 0.03 - time, 0.05)
             pull = 6.0 * (goal - self._shift[foot]) / left**2 - 4.0 * self._rate[foot] / left
             self._rate[foot] += period * pull
             self._shift[foot] += period * self._rate[foot]

@@ -20,7 +20,7 @@ from numba import njit
 
 compiled = njit(fastmath={"reassoc", "contract", "arcp", "nsz"}, error_model="numpy", cache=True)
 
-GIVEN = 9
+GIVEN = 12
 """Number of states that are given at the start; the ones after them are free."""
 
 
@@ -36,7 +36,7 @@ class Program(NamedTuple):
         rows: (C, m, 6), bound: (C, m).
         knot: (K,) int, soft_rows: (K, n), soft_bound: (K,).
         price: (K,); softness: m or rad by which a violation's price doubles.
-        start: (9,).
+        start: (12,).
     """
 
     a: np.ndarray

@@ -1,7 +1,8 @@
 """ReplanProblem: the quadratic program of a replan.
 
 States are deviations from the plan: of the CoM, of its velocity, of the angular momentum per mass about a fixed point
-near it, then two shifts along its plane for each landing point that is free. Wrenches are deviations too, in weights.
+near it; of the spin (about the CoM) at the knot before; then two shifts along its plane for each landing point that is
+free. Wrenches are deviations too, in weights.
 The dynamics are those of `toolkit.centroidal.problem`, exact but for the product of a landing's shift with the change
 of its force; the limits of the body are linear about the plan.
 """
@@ -13,11 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
 from toolkit.simulation.cone import friction_rows, sole_rows
 from toolkit.simulation.replan_config import ReplanConfig
+from toolkit.simulation.replan_contacts import Cones, ContactTable, Situation
 from toolkit.simulation.replan_kernel import GIVEN, Program
 from toolkit.simulation.replan_landing import apart_row, landing_rows
 from toolkit.simulation.replan_nominal import Nominal
@@ -32,42 +34,6 @@ PALM_MOMENT = 1e3  # weight that keeps a palm's moments as planned: the controll
 
 
 @dataclass(frozen=True)
-class Cones:
-    """What the controller allows: factors on friction and yaw moment, (4, 2) m half extents of the patches."""
-
-    friction: float
-    yaw: float
-    half_size: np.ndarray
-
-
-@dataclass(frozen=True)
-class Situation:
-    """Measured state at a replan, world frame, SI units.
-
-    Attributes:
-        time: s.
-        com, velocity, spin: (3,); spin: angular momentum about the CoM per mass.
-        standing: limbs in contact: the swing that made it (-1: none), (3,) position and (3, 3) rotation of the patch.
-        fixed: swings under way whose landing point is kept -> (3,) m shift from the plan.
-        moving: swings under way whose landing point may still move -> (3,) m shift of the limb by now.
-        goal: swings -> (3,) m shift that was decided last.
-        com_shift: (3,) m; of the plan with the feet that bear it.
-        cones: what the controller allows.
-    """
-
-    time: float
-    com: np.ndarray
-    velocity: np.ndarray
-    spin: np.ndarray
-    standing: dict[Limb, tuple[int, np.ndarray, np.ndarray]]
-    fixed: dict[int, np.ndarray]
-    moving: dict[int, np.ndarray]
-    goal: dict[int, np.ndarray]
-    com_shift: np.ndarray
-    cones: Cones
-
-
-@dataclass(frozen=True)
 class Replan:
     """A replanned motion at N + 1 knots; world frame, SI units.
 
@@ -76,6 +42,9 @@ class Replan:
         com, velocity, spin: (N + 1, 3). acceleration, spin_rate: (N, 3).
         wrench: (N, 4, 6) in the contact frames, in weights.
         landing: swing -> (3,) m shift of its contact.
+        ends: swing -> s; when it ends, where that is before its planned end.
+        objective: reached.
+        divergence: m; from the plan at the end, moved with the feet that bear it.
         iterations: of the solver.
     """
 
@@ -87,6 +56,9 @@ class Replan:
     spin_rate: np.ndarray
     wrench: np.ndarray
     landing: dict[int, np.ndarray]
+    ends: dict[int, float]
+    objective: float
+    divergence: float
     iterations: int
 
 
@@ -101,7 +73,33 @@ class ReplanProblem:
         self._size = GIVEN + 2 * config.landings
 
     def solve(self, situation: Situation, solver: Callable) -> Replan | None:
-        """The best motion from a measured state; None where the solver gives no answer."""
+        """The best motion from a measured state; None where the solver gives no answer.
+
+        Where the motion with the planned times cannot be brought back to the plan, swings under way may also end
+        earlier, at any of a few times.
+        """
+        decided = {event: time for event, time in situation.landing.items() if self._is_early(event, time)}
+        best = self._solve(situation, solver, decided)
+        if best is None or best.objective < self._config.early_objective:
+            return best
+        for event, earliest in situation.earliest.items():
+            for time in self._early_times(event, earliest):
+                found = self._solve(situation, solver, {event: time})
+                if found is not None and found.objective < best.objective - self._config.early_gain:
+                    best = found
+        return best
+
+    def _is_early(self, event: int, time: float) -> bool:
+        return time < self._nominal.swings[event].end - 1e-3
+
+    def _early_times(self, event: int, earliest: float) -> np.ndarray:
+        """The first, middle and last knot between the earliest end of a swing and its planned end."""
+        knots = self._nominal.times
+        knots = knots[(knots >= earliest - 1e-9) & (knots < self._nominal.swings[event].end - 1e-3)]
+        return knots[np.unique([0, len(knots) // 2, len(knots) - 1])] if len(knots) else knots
+
+    def _solve(self, situation: Situation, solver: Callable, early: dict[int, float]) -> Replan | None:
+        """The best motion with given ends of the swings under way."""
         nominal, config, size = self._nominal, self._config, self._size
         first = int(np.searchsorted(nominal.times, situation.time + 1e-6, side="right")) - 1
         last = int(np.searchsorted(nominal.times, situation.time + config.horizon, side="left"))
@@ -118,31 +116,19 @@ class ReplanProblem:
         spin[0] += inside / (nominal.times[first + 1] - nominal.times[first]) * (spin[1] - spin[0])
         origin = com[0].copy()
 
-        active = nominal.active[span].copy()
-        for limb in range(4):
-            if active[0, limb] and limb not in situation.standing:
-                active[0, limb] = False  # late: it bears nothing yet
-        planned, rotation = nominal.position[span], nominal.rotation[span].copy()
-        shift = np.zeros((steps, 4, 3))
+        contacts = ContactTable.of(nominal, situation, first, times, early)
         free = self._free_landings(situation, first, last)
-        column = np.full((steps, 4), -1)
-        for limb, (event, position, turned) in situation.standing.items():
-            here = nominal.landing[span, limb] == event
-            rotation[here, limb] = turned
-            shift[here, limb] = position - planned[here, limb]
-        for event, moved in situation.fixed.items():
-            shift[nominal.landing[span, nominal.swings[event].limb] == event, nominal.swings[event].limb] = moved
-        planes = []
+        column, shift, planes = np.full((steps, 4), -1), contacts.shift, []
         for index, event in enumerate(free):
-            swing = nominal.swings[event]
-            column[nominal.landing[span, swing.limb] == event, swing.limb] = index
-            planes.append(swing.contact.pose.rotation[:, :2])
+            limb = nominal.swings[event].limb
+            column[contacts.event[:, limb] == event, limb] = index
+            planes.append(nominal.swings[event].contact.pose.rotation[:, :2])
 
         # contacts
-        step, limb = np.nonzero(active)
-        count = np.concatenate([[0], np.cumsum(active.sum(1))]).astype(np.int64)
-        turn, base = rotation[step, limb], nominal.wrench[span][step, limb]
-        lever = planned[step, limb] + shift[step, limb] - origin
+        step, limb = np.nonzero(contacts.active)
+        count = np.concatenate([[0], np.cumsum(contacts.active.sum(1))]).astype(np.int64)
+        turn, base = contacts.rotation[step, limb], nominal.wrench[span][step, limb]
+        lever = contacts.position[step, limb] + shift[step, limb] - origin
         spread = np.zeros((len(step), 6, 6))
         spread[:, :3, :3] = spread[:, 3:, 3:] = G * turn
         spread[:, 3:, :3] = G * np.cross(lever[:, None], turn.swapaxes(1, 2)).swapaxes(1, 2)
@@ -173,15 +159,20 @@ class ReplanProblem:
             force = pull[c, :3]
             a[t, 6:9, GIVEN + 2 * index : GIVEN + 2 * index + 2] += dt[t] * np.cross(planes[index].T, force).T
         drift = np.einsum("tij,tj->ti", b, rate)
+        turning = np.zeros((steps + 1, 3, size))
+        turning[:, :, :3], turning[:, :, 3:6] = _skew(velocity), -_skew(com - origin)
+        turning[:, axis, 6 + axis] = 1.0
+        a[:, 9:12] = turning[:-1]
 
-        cost, slope = self._objective(dt, com - origin, velocity, shift, column, planes, situation, free, span)
-        rows, bound = self._contact_rows(step, limb, base, situation.cones, first)
-        knot, soft, soft_bound, price = self._soft_rows(first, last, shift, column, planes, free, situation)
+        cost, slope, constant = self._objective(dt, turning[1:], shift, column, planes, situation, free, span)
+        rows, bound = self._contact_rows(step, limb, base, situation.cones, first, contacts.friction[step, limb])
+        knot, soft, soft_bound, price = self._soft_rows(first, last, shift, column, planes, free, situation, early)
         start = np.concatenate(
             [
                 situation.com - com[0],
                 situation.velocity - velocity[0],
                 situation.spin + np.cross(situation.com - origin, situation.velocity) - about[0],
+                np.zeros(3),
             ]
         )
         start[:3] -= situation.com_shift
@@ -201,10 +192,18 @@ class ReplanProblem:
         x, iterations, residual, gap = solver(program, u, guess, config.max_iterations, config.tolerance)
         if not (np.isfinite(x).all() and np.isfinite(u).all() and residual < 1e-3 and gap < 1e-3):
             return None
+        excess = np.maximum(np.einsum("ki,ki->k", soft, x[knot]) - soft_bound, 0.0)
+        objective = constant + 0.5 * np.einsum("ti,tij,tj", x, cost, x) + (slope * x).sum()
+        objective += 0.5 * (weight * u * u).sum() + (price * excess).sum()
+        objective += config.early * sum(nominal.swings[k].end - t for k, t in early.items())
         com, velocity = com + x[:, :3], velocity + x[:, 3:6]
         spin = about + x[:, 6:9] - np.cross(com - origin, velocity)
         wrench = np.zeros((steps, 4, 6))
         wrench[step, limb] = base + u
+        behind = self._nominal.share[last - 1] @ shift[-1, :2]
+        for index, plane in enumerate(planes):
+            mine = (column[-1, :2] == index) * self._nominal.share[last - 1]
+            behind = behind + mine.sum() * plane @ x[0, GIVEN + 2 * index : GIVEN + 2 * index + 2]
         landing = {event: plane @ x[0, own] for event, plane, own in zip(free, planes, _columns(free), strict=True)}
         return Replan(
             times=times,
@@ -215,6 +214,9 @@ class ReplanProblem:
             spin_rate=np.diff(spin, axis=0) / dt[:, None],
             wrench=wrench,
             landing=landing,
+            ends=early,
+            objective=float(objective),
+            divergence=float(np.linalg.norm(x[-1, :3] - behind + x[-1, 3:6] / config.frequency)),
             iterations=iterations,
         )
 
@@ -234,7 +236,7 @@ class ReplanProblem:
             free.append(event)
         return free
 
-    def _objective(self, dt, com, velocity, shift, column, planes, situation, free, span):
+    def _objective(self, dt, spin, shift, column, planes, situation, free, span):
         """Quadratic costs of the knots."""
         config, size, steps = self._config, self._size, len(dt)
         share = self._nominal.share[span]
@@ -250,11 +252,11 @@ class ReplanProblem:
         cost[1:] += config.com * duration * np.einsum("tki,tkj->tij", follow, follow)
         slope[1:] -= config.com * dt[:, None] * np.einsum("tki,tk->ti", follow, offset)
         axis = np.arange(3)
-        cost[1:, 3 + axis, 3 + axis] += config.velocity * dt[:, None]
-        spin = np.zeros((steps, 3, size))
-        spin[:, :, :3], spin[:, :, 3:6] = _skew(velocity[1:]), -_skew(com[1:])
-        spin[:, axis, 6 + axis] = 1.0
+        cost[1:, 3 + axis, 3 + axis] += dt[:, None] * [config.velocity, config.velocity, config.climb]
         cost[1:] += config.spin * duration * np.einsum("tki,tkj->tij", spin, spin)
+        change = spin.copy()
+        change[:, axis, 9 + axis] -= 1.0
+        cost[1:] += config.spin_rate / duration * np.einsum("tki,tkj->tij", change, change)
         end = follow[-1].copy()
         end[axis, 3 + axis] += 1.0 / config.frequency
         cost[-1] += config.final * end.T @ end + 0.1 * config.final * spin[-1].T @ spin[-1]
@@ -264,13 +266,13 @@ class ReplanProblem:
             own = slice(GIVEN + 2 * index, GIVEN + 2 * index + 2)
             cost[0, own, own] += (config.landing + config.landing_change) * np.eye(2)
             slope[0, own] -= config.landing_change * planes[index].T @ situation.goal.get(event, np.zeros(3))
-        return cost, slope
+        constant = 0.5 * (config.com * dt @ (offset**2).sum(1) + config.final * (offset[-1] ** 2).sum())
+        return cost, slope, float(constant)
 
-    def _contact_rows(self, step, limb, base, cones: Cones, first: int):
+    def _contact_rows(self, step, limb, base, cones: Cones, first: int, friction):
         """Rows and bounds of the wrenches' deviations."""
         nominal = self._nominal
         rows, limit = np.zeros((len(step), ROWS, 6)), np.zeros((len(step), ROWS))
-        friction = nominal.friction[first + step, limb]
         for c in range(len(step)):
             foot = limb[c] < 2
             rows[c, : SIDES + 12] = self._cone(int(limb[c]), float(friction[c]), cones)
@@ -295,7 +297,7 @@ class ReplanProblem:
             self._cone_rows[key] = rows
         return rows
 
-    def _soft_rows(self, first: int, last: int, shift, column, planes, free: list[int], situation: Situation):
+    def _soft_rows(self, first: int, last: int, shift, column, planes, free: list[int], situation: Situation, early):
         """Limits of the body after the first knot, then regions of the landing points."""
         table, size, config = self._nominal.rows, self._size, self._config
         begin, end = np.searchsorted(table.knot, [first + 1, last + 1])
@@ -312,7 +314,7 @@ class ReplanProblem:
             rows[here, GIVEN + 2 * index : GIVEN + 2 * index + 2] = gradient[here] @ plane
         blocks, bounds = [rows], [bound]
         for index, event in enumerate(free):
-            region, room = self._region(event, situation)
+            region, room = self._region(event, situation, early)
             block = np.zeros((len(region), size))
             block[:, GIVEN + 2 * index : GIVEN + 2 * index + 2] = region
             blocks.append(block)
@@ -322,7 +324,7 @@ class ReplanProblem:
         knot = np.concatenate([knot, np.zeros(landing, int)]).astype(np.int64)
         return knot, np.concatenate(blocks), np.concatenate(bounds), price
 
-    def _region(self, event: int, situation: Situation) -> tuple[np.ndarray, np.ndarray]:
+    def _region(self, event: int, situation: Situation, early: dict[int, float]) -> tuple[np.ndarray, np.ndarray]:
         """Half planes of a landing point's shift."""
         swing, config = self._nominal.swings[event], self._config
         contact = swing.contact
@@ -337,7 +339,7 @@ class ReplanProblem:
         reach = np.full(4, config.max_shift)
         if event in situation.moving:
             moved = contact.pose.rotation[:, :2].T @ situation.moving[event]
-            left = config.slew * max(swing.end - situation.time - 0.1, 0.0)
+            left = config.slew * max(early.get(event, swing.end) - situation.time - 0.05, 0.0)
             reach = np.minimum(reach, np.maximum(axes @ moved + left, 0.0))
         bounds.append(reach)
         other = situation.standing.get(swing.limb.mirrored)

@@ -33,6 +33,8 @@ class ContactTracker:
         min_force, max_force: (4,) N; range of the normal force at the current tick.
         depth: (4,) m; how far a searching limb has gone beyond the planned surface.
         begun, made: (4,) bool; swings that began, contacts that were made at this very tick.
+        lead: (4,) s; how far the last swing has come before its planned time.
+        pace: (4,) how fast swings go on relative to the plan; to be set by whoever wants them to end earlier.
         loose: (4,) bool; limbs that should be in contact but are measured to bear next to nothing.
         current: by limb, the swing under way or the last one; None before the first.
     """
@@ -65,6 +67,7 @@ class ContactTracker:
         self._loaded_ticks = np.zeros(4, int)
         self.in_contact = np.zeros(4, bool)
         self.min_force, self.max_force, self.depth = np.zeros(4), np.zeros(4), np.zeros(4)
+        self.lead, self.pace = np.zeros(4), np.ones(4)
         self.begun, self.made = np.zeros(4, bool), np.zeros(4, bool)
         self.loose = np.zeros(4, bool)
 
@@ -85,15 +88,17 @@ class ContactTracker:
                 self.state[limb] = LimbState.SWING
                 self.depth[limb], self._loaded_ticks[limb] = 0.0, 0
                 self.begun[limb] = True
+                self.lead[limb], self.pace[limb] = 0.0, 1.0
             swing = self.current[limb]
             if swing is not None and self.state[limb] in (LimbState.SWING, LimbState.SEARCH):
-                self._advance(limb, swing, time, period, normal_force[limb])
+                self.lead[limb] += (self.pace[limb] - 1.0) * period
+                self._advance(limb, swing, time + self.lead[limb], period, normal_force[limb])
             self.in_contact[limb] = self.state[limb] is LimbState.REST
             self.loose[limb] = self.in_contact[limb] and normal_force[limb] < self._config.loose_force
             self._bound(limb, time)
 
     def _advance(self, limb: Limb, swing: Swing, time: float, period: float, force: float) -> None:
-        """Follow one limb through its swing."""
+        """Follow one limb through its swing; its time runs ahead by its lead."""
         settings, over = self._touchdown, time >= swing.end - 1e-9
         if swing.contact is None:
             if over:
@@ -106,7 +111,7 @@ class ContactTracker:
             self._loaded_ticks[limb] = self._loaded_ticks[limb] + 1 if force > settings.palm_force else 0
             met = self._loaded_ticks[limb] >= settings.confirm_ticks
         if met and late_enough:
-            self.state[limb], self._since[limb] = LimbState.REST, time
+            self.state[limb], self._since[limb] = LimbState.REST, time - self.lead[limb]
             self.made[limb] = True
         elif over:
             self.state[limb] = LimbState.SEARCH
