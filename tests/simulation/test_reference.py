@@ -3,14 +3,14 @@
 import numpy as np
 
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.simulation.dynamics import RobotDynamics
 from toolkit.simulation.reference import planned_wrench, sample_reference
 from toolkit.wholebody.limb_paths import limb_paths
 
 
 def sampled(plan, times):
     paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion)
-    limbs = tuple(sorted(plan.robot.limbs))
-    return sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, paths, limbs)
+    return sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, paths, plan.robot)
 
 
 def test_com_velocity_and_acceleration_are_derivatives(walking):
@@ -40,6 +40,20 @@ def test_the_plan_rests_after_its_end(walking):
     for rate in ("com_velocity", "com_acceleration", "angular_momentum_rate", "joint_velocity", "joint_acceleration"):
         assert not getattr(reference, rate).any(), rate
     np.testing.assert_array_equal(reference.com[0], reference.com[1])
+
+
+def test_angular_momentum_is_that_of_the_postures(walking):
+    """By the equation of motion, which shares nothing with the sampled sum over the bodies; smoothed over 0.1 s."""
+    trajectory, dynamics = walking.trajectory, RobotDynamics(walking.robot)
+    reference = sampled(walking, trajectory.times)
+    exact = np.zeros((len(trajectory.times), 3))
+    for index, state in enumerate(zip(trajectory.qpos, trajectory.qvel, strict=True)):
+        dynamics.update(*state)
+        exact[index] = dynamics.angular_momentum
+    assert np.abs(exact).max() > 0.5  # kg m^2/s: the walk swings its legs
+    np.testing.assert_allclose(reference.angular_momentum, exact, atol=0.15 * np.abs(exact).max())
+    gained = np.cumsum(reference.angular_momentum_rate, axis=0) * (trajectory.times[1] - trajectory.times[0])
+    np.testing.assert_allclose(gained, reference.angular_momentum, atol=0.1 * np.abs(exact).max())
 
 
 def test_planned_wrenches_balance_the_planned_momentum(walking):

@@ -13,6 +13,8 @@ from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_from_quaternion
+from toolkit.robot.model import RobotModel
+from toolkit.wholebody.momentum import posture_momentum
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 
@@ -103,7 +105,7 @@ def sample_reference(
     motion: CentroidalMotion,
     trajectory: WholeBodyTrajectory,
     paths: LimbPathSampler,
-    limbs: tuple[Limb, ...],
+    robot: RobotModel,
 ) -> Reference:
     """Sample a plan.
 
@@ -114,7 +116,8 @@ def sample_reference(
         motion: CoM, angular momentum and wrenches.
         trajectory: joints and base.
         paths: limbs.
-        limbs: those the robot has.
+        robot: whose limbs, and whose angular momentum on the way: the one that the postures have, not the optimiser's,
+            which they follow only roughly.
 
     Returns:
         The plan at `times`.
@@ -124,13 +127,15 @@ def sample_reference(
     com[~moving, 1:] = 0.0
     knots, problem = motion.problem.times, motion.problem
     interval = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, problem.steps - 1)
-    momentum = np.column_stack([np.interp(times, knots, motion.angular_momentum[:, k]) for k in range(3)])
-    rate = (np.diff(motion.angular_momentum, axis=0) / problem.dt[:, None])[interval] * moving[:, None]
+    grid = trajectory.times
+    spin = posture_momentum(robot.mujoco_model, grid, trajectory.qpos, trajectory.qvel)
+    momentum, rate = (np.column_stack([np.interp(times, grid, part[:, k]) for k in range(3)]) for part in spin)
+    momentum, rate = momentum * moving[:, None], rate * moving[:, None]
     joints, base_rotation, qvel, qacc = _posture(times, trajectory)
     position, rotation = np.zeros((len(times), 4, 3)), np.tile(np.eye(3), (len(times), 4, 1, 1))
     velocity, acceleration = np.zeros((2, len(times), 4, 6))
     authority, in_contact = np.zeros((len(times), 4)), np.zeros((len(times), 4), bool)
-    for limb in limbs:
+    for limb in sorted(robot.limbs):
         for k, time in enumerate(times):
             pose, *rates, in_contact[k, limb] = paths.sample(limb, float(time))
             if pose is not None:

@@ -80,9 +80,7 @@ def execute(
     period = config.control_period
     ticks = int(np.ceil((schedule.duration + config.extra_rest) / period - 1e-9))
     paths = limb_paths(robot, world, schedule, motion) if paths is None else paths
-    reference = sample_reference(
-        period * np.arange(ticks), sequence, schedule, motion, trajectory, paths, index.limbs()
-    )
+    reference = sample_reference(period * np.arange(ticks), sequence, schedule, motion, trajectory, paths, robot)
     replanner = None
     if config.replanning.enabled:
         nominal = Nominal.of(motion, reference.swings, robot, config.replanning)

@@ -40,7 +40,7 @@ class IKConfig:
     palm_normal: float = 1e4
     palm_twist: float = 0.1
     base: float = 1.0
-    arms: float = 0.35
+    arms: float = 1.5
     trunk: float = 5.0
     legs: float = 0.01
     rest: float = 50.0
