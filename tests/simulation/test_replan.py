@@ -1,6 +1,7 @@
 """Replanning: the program about a plan, and runs with it."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,7 +44,7 @@ def situation(walking, nominal, time, com=(0, 0, 0), velocity=(0, 0, 0), **optio
         for index, swing in enumerate(nominal.swings)
         if swing.start <= time < swing.end and swing.limb not in standing
     }
-    values = dict(
+    values: dict[str, Any] = dict(
         time=time,
         com=planned_com + com,
         velocity=planned_velocity + velocity,

@@ -41,7 +41,8 @@ class MotionTarget:
     @classmethod
     def zeros(cls) -> MotionTarget:
         """Room for one."""
-        return cls(*np.zeros((5, 3)), np.zeros((4, 6)))
+        com, velocity, acceleration, momentum, rate = np.zeros((5, 3))
+        return cls(com, velocity, acceleration, momentum, rate, np.zeros((4, 6)))
 
     def follow(self, reference: Reference, index: int) -> None:
         """Fill in a row of the plan."""

@@ -56,7 +56,7 @@ class ReplanConfig:
     fraction: float = 0.75
     margin: float = 0.01
     gap: float = 0.02
-    deadband: float = 0.005
+    deadband: float = 0.01
     frequency: float = 3.4
     com: float = 200.0
     velocity: float = 5.0
@@ -66,7 +66,7 @@ class ReplanConfig:
     final: float = 2000.0
     force: float = 1.0
     moment: float = 5.0
-    landing: float = 4.0
+    landing: float = 30.0
     landing_change: float = 4.0
     price: float = 10.0
     body: BodyMargins = BodyMargins(length=0.007, ankle=0.05, hip=0.025, height=0.01, torque=0.92)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
@@ -68,6 +69,11 @@ class ReplanProblem:
     def __init__(self, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...], config: ReplanConfig):
         self._nominal, self._config, self._surfaces = nominal, config, surfaces
         self._half_sizes = robot.half_sizes
+        self._landings: dict[int, Contact] = {
+            event: swing.contact
+            for event, swing in enumerate(nominal.swings)
+            if swing.contact is not None and swing.limb.is_foot and swing.contact.surface >= 0
+        }
         self._regions: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._cone_rows: dict[tuple, np.ndarray] = {}
         self._size = GIVEN + 2 * config.landings
@@ -122,7 +128,7 @@ class ReplanProblem:
         for index, event in enumerate(free):
             limb = nominal.swings[event].limb
             column[contacts.event[:, limb] == event, limb] = index
-            planes.append(nominal.swings[event].contact.pose.rotation[:, :2])
+            planes.append(self._landings[event].pose.rotation[:, :2])
 
         # contacts
         step, limb = np.nonzero(contacts.active)
@@ -225,10 +231,8 @@ class ReplanProblem:
         nominal = self._nominal
         standing = {event for event, _, _ in situation.standing.values()}
         free = []
-        for event, swing in enumerate(nominal.swings):
-            contact = swing.contact
-            if contact is None or not swing.limb.is_foot or contact.surface < 0:
-                continue
+        for event in self._landings:
+            swing = nominal.swings[event]
             if event in standing or event in situation.fixed or swing.end <= situation.time:
                 continue
             if swing.end >= nominal.times[last] - 1e-6 or len(free) == self._config.landings:
@@ -327,7 +331,7 @@ class ReplanProblem:
     def _region(self, event: int, situation: Situation, early: dict[int, float]) -> tuple[np.ndarray, np.ndarray]:
         """Half planes of a landing point's shift."""
         swing, config = self._nominal.swings[event], self._config
-        contact = swing.contact
+        contact = self._landings[event]
         found = self._regions.get(event)
         if found is None:
             half = self._half_sizes[swing.limb]
