@@ -1,5 +1,7 @@
 """Transitions that are judged only when they are the best to go on with."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tests.search.worlds import FLOOR, box, make_world
@@ -132,3 +134,25 @@ def test_drift_knows_that_nothing_stands_slowly_on_steep_ground(robot):
             for timing in (0, 1)
         )
         assert (slow > 0.5) == slides and quick < 0.1
+
+
+def test_a_second_evaluator_has_its_say_where_ground_is_slippery(robot):
+    class Timid(Counting):
+        """Believes in no CoM between x = 0.3 m and 0.7 m."""
+
+        def __init__(self, robot, outside):
+            super().__init__(robot)
+            self.outside = outside
+
+        def evaluate(self, stance, com, com_velocity, transitions):
+            batch = super().evaluate(stance, com, com_velocity, transitions)
+            return replace(batch, feasible=batch.feasible & (np.abs(batch.com[:, 0] - 0.5) > 0.2))
+
+    longer = PlannerConfig(search=AnaStarConfig(max_expansions=400))
+    steep = box([0.5, 1.2, 0.0], [0.4, 0.3, 0.1], (45, 0, 0), friction=0.5)
+    for geoms, asked in (((FLOOR, steep), True), ((FLOOR,), False)):
+        second = Counting(robot)
+        planner = ContactPlanner(robot, make_world(*geoms, goal=(1.0, 0, 0)), Timid(robot, second), longer)
+        result = planner.search(np.random.default_rng(0), 60.0)
+        assert (second.asked > 0) == asked
+        assert not asked or result.solutions

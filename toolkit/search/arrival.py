@@ -24,7 +24,7 @@ class Arrival:
         evaluator: judges one transition as the last one. Where it has a method `halt` (see `OptimiserEvaluator`),
             that judges several.
         cost: of edges.
-        window: most transitions that may be optimised together.
+        windows: numbers of transitions that are optimised together, in the order in which they are tried.
         rest: s on the final stance that are optimised with them.
     """
 
@@ -33,11 +33,11 @@ class Arrival:
         problem: ContactProblem,
         evaluator: TransitionEvaluator,
         cost: CostConfig,
-        window: int = 3,
+        windows: Sequence[int] = (1, 3, 6),
         rest: float = 0.6,
     ):
         self._problem, self._evaluator, self._cost = problem, evaluator, cost
-        self._window, self._rest = window, rest
+        self._windows, self._rest = windows, rest
 
     def __call__(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> Edge[bytes] | None:
         """See `toolkit.search.graph.Judge`."""
@@ -59,13 +59,12 @@ class Arrival:
         problem = self._problem
         judged = [payload for payload in payloads if payload is not None]
         passed = [state for state in states if not is_pending(state)]
-        transitions, earlier = [problem.transition(edge.state, edge.payload)], 0.0
-        for back in range(1, self._window + 1):
-            objective = halt(*problem.origin(passed[-back]), transitions, self._rest)
+        transitions = [problem.transition(edge.state, edge.payload)]
+        transitions += [problem.transition(*step) for step in zip(passed[:0:-1], judged[::-1], strict=True)]
+        for count in self._windows:
+            if count > len(transitions):
+                break
+            objective = halt(*problem.origin(passed[-count]), transitions[count - 1 :: -1], self._rest)
             if objective is not None:
-                return max(objective - earlier, 0.0)
-            if back == len(passed):
-                return None
-            transitions.insert(0, problem.transition(passed[-back], judged[-back]))
-            earlier += judged[-back][0]
+                return max(objective - sum(payload[0] for payload in judged[len(judged) - count + 1 :]), 0.0)
         return None

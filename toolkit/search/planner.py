@@ -33,6 +33,7 @@ from toolkit.search.terrain_distance import TerrainDistance, resting_surfaces
 from toolkit.world.timing import Timing
 from toolkit.world.world import World
 
+_DEEP = 10  # patience of a search over slippery ground, in multiples of the patience elsewhere
 _LAZY = 20  # expansions with one transition judged in each that count as one with all judged
 
 
@@ -89,7 +90,8 @@ class ContactPlanner:
     Args:
         robot: the robot.
         world: the world.
-        evaluator: judges the dynamics of transitions.
+        evaluator: judges the dynamics of transitions. Where it has an attribute `outside`, another evaluator, that one
+            has a say on ground that holds no resting foot, where the last bit of feasibility counts.
         config: settings.
         goal_evaluator: judges the transition that reaches the goal, as one after which the robot rests; None: it is
             judged like any other.
@@ -177,7 +179,7 @@ class ContactPlanner:
         heuristic_seconds = time.perf_counter() - began
         moves, table = self._generator(wide)
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
-        lazy = getattr(self._evaluator, "costly", False)
+        lazy, slippery = getattr(self._evaluator, "costly", False), self._terrain.has_slippery_ground()
         problem = ContactProblem(
             self.robot,
             moves,
@@ -194,6 +196,7 @@ class ContactPlanner:
             self.config.reach,
             exclusions,
             lazy=lazy,
+            second=getattr(self._evaluator, "outside", None) if slippery else None,
         )
         # What an evaluator compiles or loads at its first query is not part of the search.
         standing = ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], self._timings[0])
@@ -202,6 +205,8 @@ class ContactPlanner:
         settings = self.config.search
         if lazy and settings.max_expansions is not None:
             settings = replace(settings, max_expansions=settings.max_expansions * _LAZY)
+        if slippery:  # what crosses it is rare and lies deep: less width than a way out of a cul-de-sac needs
+            settings = replace(settings, patience=settings.patience * _DEEP)
         if settings.initial_cost == np.inf:
             way = float(distance(start.mean_feet.position[None], np.array([start.mean_feet.yaw]))[0])
             settings = replace(settings, initial_cost=self.config.acceptable_cost * max(way, 1.0))

@@ -37,6 +37,7 @@ from toolkit.search.state import (
     pack,
     pack_pending,
     unpack,
+    unpack_all,
 )
 from toolkit.world.timing import Timing
 from toolkit.world.world import Goal
@@ -57,6 +58,7 @@ class CostConfig:
         swing_speed: m/s; a foot may not have to fly faster on average.
         miss: per m by which a transition not yet judged would have to bend the motion; only for the order in which
             transitions are judged.
+        doubt: of a transition that the evaluator rejects and the second one has not judged yet; likewise.
     """
 
     step: float = 3.0
@@ -65,6 +67,7 @@ class CostConfig:
     stagger: float = 5.0
     swing_speed: float = 4.0
     miss: float = 30.0
+    doubt: float = 3.0
 
 
 class ContactProblem:
@@ -86,6 +89,7 @@ class ContactProblem:
         reach: what legs and arms may reach.
         exclusions: transitions that later stages rejected.
         lazy: whether a transition is judged only when it is the best to go on with.
+        second: judges, in the same way, what the evaluator rejects; None: nobody does.
 
     Attributes:
         rejected: (len(REASONS),) int; candidates that fell, by reason.
@@ -110,8 +114,11 @@ class ContactProblem:
         exclusions: Sequence[Exclusion] = (),
         *,
         lazy: bool = False,
+        second: TransitionEvaluator | None = None,
     ):
         self._table, self._evaluator, self._distance, self._goal = table, evaluator, distance, goal
+        self._lazy, self._second = lazy, second
+        self._judge_of_pending = evaluator if lazy or second is None else second
         self._timings, self._config, self._longest = timings, config, longest
         self.rejected = np.zeros(len(screen.REASONS), np.int64)
         limbs = [limb for limb in PALMS if palms and limb in robot.arms and moves.has_palm_surfaces]
@@ -119,7 +126,7 @@ class ContactProblem:
             moves, table, limbs, timings, config.swing_speed, exclusions, self.rejected
         )
         self._reach = ReachCheck(robot, moves.legs, moves.shanks, table, limbs, timings, reach)
-        self._drift = Drift(robot, table, timings) if lazy else None
+        self._drift = Drift(robot, table, timings)
         self._durations = np.array([item.shift + item.swing for item in timings])
         numbers = np.full((1, 4), -1)
         for contact in start.contacts:
@@ -160,7 +167,7 @@ class ContactProblem:
 
     def heuristic(self, states: Sequence[bytes]) -> np.ndarray:
         """See `SearchProblem`; Eq. 5 of the paper, with at least one transition where the goal is not reached."""
-        return self._to_go(*self.feet(unpack(states)[:, CONTACTS]))
+        return self._to_go(*self.feet(unpack_all(states)[:, CONTACTS]))
 
     def _to_go(self, centre: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         distance = self._distance(centre, yaw)
@@ -169,26 +176,25 @@ class ContactProblem:
 
     def is_goal(self, states: Sequence[bytes]) -> np.ndarray:
         """See `SearchProblem`."""
-        if is_pending(states[0]):
-            return np.zeros(len(states), bool)
-        return self._at_goal(self.feet(unpack(states)[:, CONTACTS])[0])
+        judged = np.array([not is_pending(state) for state in states])
+        return judged & self._at_goal(self.feet(unpack_all(states)[:, CONTACTS])[0])
 
     def _at_goal(self, centre: np.ndarray) -> np.ndarray:
         return np.hypot(*(centre[:, :2] - self._goal.position[:2]).T) <= self._goal.radius
 
     def crowd(self, states: Sequence[bytes]) -> list[tuple]:
         """See `SearchProblem`: states with the mean of the feet in the same square of 0.1 m, and about as fast."""
-        rows = unpack(states)
+        rows = unpack_all(states)
         place = np.floor(self.feet(rows[:, CONTACTS])[0][:, :2] / _CROWD)
         speed = np.floor(np.hypot(*rows[:, VELOCITY][:, :2].T) / (1000.0 * _PACE))
-        kind = np.full(len(rows), is_pending(states[0]))
+        kind = [is_pending(state) for state in states]
         return list(map(tuple, np.column_stack([place, speed, kind]).astype(int).tolist()))
 
     def expand(self, state: bytes, slack: float) -> list[Edge[bytes]] | None:
         """See `SearchProblem`: screens, then one query of the evaluator for all children together."""
         row = unpack([state])[0]
         if is_pending(state):
-            return self._judge(row, self._pending(row))
+            return self._judge(row, self._pending(row), self._judge_of_pending)
         contacts = row[CONTACTS]
         candidates = self._candidates.out_of(contacts, int(row[LAST]))
         if candidates is None:
@@ -199,7 +205,7 @@ class ContactProblem:
         candidates = self._candidates.timed(contacts, candidates.select(promising))
         if not len(candidates):
             return []
-        return self._judge(row, candidates) if self._drift is None else self._postpone(row, candidates, self._drift)
+        return self._postpone(row, candidates) if self._lazy else self._judge(row, candidates, self._evaluator)
 
     def _known_cost(self, candidates: Candidates) -> np.ndarray:
         """(n,) part of the edge cost that needs no dynamics."""
@@ -208,8 +214,11 @@ class ContactProblem:
             cost = cost + self._config.time * self._durations[candidates.timing]
         return cost + self._final_cost(candidates)
 
-    def _judge(self, row: np.ndarray, candidates: Candidates) -> list[Edge[bytes]] | None:
+    def _judge(
+        self, row: np.ndarray, candidates: Candidates, evaluator: TransitionEvaluator
+    ) -> list[Edge[bytes]] | None:
         """Edges that the evaluator and the reach of the limbs allow; None where there is no time left to ask."""
+        pending = len(row) > OLD
         contacts, com, velocity = _before(row)[CONTACTS], row[COM] / 1000.0, row[VELOCITY] / 1000.0
         transitions = [
             self._transition(*item)
@@ -220,7 +229,7 @@ class ContactProblem:
         began = time.perf_counter()
         if began + self._pace * len(transitions) > self.deadline:
             return None
-        batch = self._evaluator.evaluate(self._stance(_before(row)), com, velocity, transitions)
+        batch = evaluator.evaluate(self._stance(_before(row)), com, velocity, transitions)
         self._pace = (time.perf_counter() - began) / len(transitions)
         codes = np.where(batch.feasible, 0, screen.DYNAMICS)
         rows = np.flatnonzero(batch.feasible)
@@ -229,23 +238,27 @@ class ContactProblem:
             codes[rows] = self._reach.codes(contacts, com, velocity, chosen, batch.com[rows], batch.com_velocity[rows])
         self.rejected += np.bincount(codes, minlength=len(screen.REASONS))
         self.rejected[0] = 0
+        later: list[Edge[bytes]] = []
+        if self._second is not None and not pending:
+            doubtful = candidates.select(codes == screen.DYNAMICS)
+            later = self._postpone(row, doubtful, self._config.doubt) if len(doubtful) else []
         kept = np.flatnonzero(codes == 0)
         if not len(kept):
-            return []
+            return later
         candidates, objective = candidates.select(kept), batch.objective[kept]
         cost = self._config.dynamics * objective
-        if self._drift is None:
+        if not pending:
             cost = cost + self._known_cost(candidates)
         states = pack(candidates.contacts, candidates.limb, batch.com[kept], batch.com_velocity[kept])
         payloads = zip(objective.tolist(), candidates.timing.tolist(), strict=True)
-        return [Edge(*item) for item in zip(states, cost.tolist(), payloads, strict=True)]
+        return [Edge(*item) for item in zip(states, cost.tolist(), payloads, strict=True)] + later
 
-    def _postpone(self, row: np.ndarray, candidates: Candidates, drift: Drift) -> list[Edge[bytes]]:
+    def _postpone(self, row: np.ndarray, candidates: Candidates, doubt: float = 0.0) -> list[Edge[bytes]]:
         """Edges to pending states, with the known part of the cost."""
         com, velocity = row[COM] / 1000.0, row[VELOCITY] / 1000.0
-        miss = drift.miss(row[CONTACTS], com, velocity, candidates)
+        miss = self._drift.miss(row[CONTACTS], com, velocity, candidates)
         states = pack_pending(row, candidates.contacts, candidates.limb, candidates.timing)
-        cost, delay = self._known_cost(candidates), self._config.miss * miss
+        cost, delay = self._known_cost(candidates), doubt + self._config.miss * miss
         return [Edge(*item) for item in zip(states, cost.tolist(), [None] * len(states), delay.tolist(), strict=True)]
 
     def _pending(self, row: np.ndarray) -> Candidates:

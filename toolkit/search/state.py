@@ -60,6 +60,12 @@ def unpack(states: Sequence[bytes]) -> np.ndarray:
     return np.frombuffer(b"".join(states), np.int32).reshape(len(states), -1)
 
 
+def unpack_all(states: Sequence[bytes]) -> np.ndarray:
+    """(n, 11) int rows of states of both kinds; of pending ones the part that they share."""
+    size = 4 * SIZE
+    return np.frombuffer(b"".join([state[:size] for state in states]), np.int32).reshape(len(states), SIZE)
+
+
 def _split(rows: np.ndarray) -> list[bytes]:
     """One piece of bytes per row."""
     data, size = rows.tobytes(), 4 * rows.shape[1]
