@@ -115,8 +115,8 @@ def test_a_replan_obeys_the_dynamics(walking, nominal, problem):
 
 def test_a_push_moves_the_landing_along(walking, nominal, problem):
     time = mid_swing(nominal)
-    ahead = problem.solve(situation(walking, nominal, time, velocity=(0.25, 0.0, 0.0)), solve)
-    back = problem.solve(situation(walking, nominal, time, velocity=(-0.25, 0.0, 0.0)), solve)
+    ahead = problem.solve(situation(walking, nominal, time, velocity=(0.4, 0.0, 0.0)), solve)
+    back = problem.solve(situation(walking, nominal, time, velocity=(-0.4, 0.0, 0.0)), solve)
     assert ahead.landing[0][0] > 0.005 and back.landing[0][0] < -0.005
     assert max(np.abs(shift).max() for shift in (*ahead.landing.values(), *back.landing.values())) < 0.16
 

@@ -40,7 +40,7 @@ class ReplanConfig:
         max_iterations, tolerance: of the solver.
     """
 
-    enabled: bool = False
+    enabled: bool = True
     period: float = 0.04
     horizon: float = 1.6
     max_dt: float = 0.1
