@@ -306,6 +306,8 @@ def _search(
     detail = search.reason or f"{found} sequence{'s' if found > 1 else ''}"
     if exclusions:
         detail += f" without {len(exclusions)} transition{'s' if len(exclusions) > 1 else ''} that failed"
+    if search.warning:
+        detail += f"; warning: {search.warning}"
     observer.finished("planning", found > 0, search.seconds, detail)
     return search
 

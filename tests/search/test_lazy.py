@@ -156,3 +156,27 @@ def test_a_second_evaluator_has_its_say_where_ground_is_slippery(robot):
         result = planner.search(np.random.default_rng(0), 60.0)
         assert (second.asked > 0) == asked
         assert not asked or result.solutions
+
+
+def test_the_stand_in_judges_timings_that_were_not_trained(robot):
+    class Trained(Counting):
+        """Hands on what swings faster than 0.5 s, as networks do."""
+
+        outside_count = 0
+
+        def __init__(self, robot, outside):
+            super().__init__(robot)
+            self.outside = outside
+
+        def evaluate(self, stance, com, com_velocity, transitions):
+            self.outside_count += sum(item.timing.swing < 0.5 for item in transitions)
+            return super().evaluate(stance, com, com_velocity, transitions)
+
+    for timing, strange in (("0.3 0.6", False), ("0.3 0.4", True)):
+        stand_in = Costly(robot)
+        evaluator = Trained(robot, stand_in)
+        world = make_world(FLOOR, goal=(0.6, 0, 0), timing=timing)
+        result = ContactPlanner(robot, world, evaluator, ENDLESS).search(np.random.default_rng(0), 60.0)
+        assert result.solutions
+        assert ("outside what the networks were trained for" in result.warning) == strange
+        assert (stand_in.asked > 0) == strange and (evaluator.asked == 1) == strange

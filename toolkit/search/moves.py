@@ -47,7 +47,7 @@ class MoveConfig:
     drop: float = 0.25
     palm_side: float = 0.15
     palm_angle: float = np.radians(65.0)
-    palm_margin: float = 0.02
+    palm_margin: float = 0.04
     still: float = 0.04
     still_yaw: float = np.radians(10.0)
 

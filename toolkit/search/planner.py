@@ -33,6 +33,9 @@ from toolkit.search.terrain_distance import TerrainDistance, resting_surfaces
 from toolkit.world.timing import Timing
 from toolkit.world.world import World
 
+_UNTRAINED = (
+    "timing or friction outside what the networks were trained for; the optimiser judged there instead, which is slower"
+)
 _DEEP = 10  # patience of a search over slippery ground, in multiples of the patience elsewhere
 _LAZY = 20  # expansions with one transition judged in each that count as one with all judged
 
@@ -179,12 +182,13 @@ class ContactPlanner:
         heuristic_seconds = time.perf_counter() - began
         moves, table = self._generator(wide)
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
-        lazy, slippery = getattr(self._evaluator, "costly", False), self._terrain.has_slippery_ground()
+        evaluator, outside = self._suited(start, com)
+        lazy, slippery = getattr(evaluator, "costly", False), self._terrain.has_slippery_ground()
         problem = ContactProblem(
             self.robot,
             moves,
             table,
-            self._evaluator,
+            evaluator,
             distance,
             start,
             com,
@@ -196,11 +200,8 @@ class ContactPlanner:
             self.config.reach,
             exclusions,
             lazy=lazy,
-            second=getattr(self._evaluator, "outside", None) if slippery else None,
+            second=getattr(evaluator, "outside", None) if slippery else None,
         )
-        # What an evaluator compiles or loads at its first query is not part of the search.
-        standing = ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], self._timings[0])
-        self._evaluator.evaluate(start, com, np.zeros(3), [standing])
         judge = None if self._goal_evaluator is None else Arrival(problem, self._goal_evaluator, self.config.cost)
         settings = self.config.search
         if lazy and settings.max_expansions is not None:
@@ -222,7 +223,23 @@ class ContactPlanner:
             exhausted=result.stopped_by == "exhausted",
             expanded=np.column_stack([expanded[0][:, :2], expanded[1]]),
             reason="" if result.paths else self._reason(result, problem),
+            warning=_UNTRAINED if getattr(self._evaluator, "outside_count", 0) > outside else "",
         )
+
+    def _suited(self, start: Stance, com: np.ndarray) -> tuple[TransitionEvaluator, int]:
+        """The evaluator for the timings, and how many transitions it had found untrained before it was asked for them.
+
+        Where none of the timings is one that it was trained for, its stand-in judges from the outset. What an evaluator
+        compiles or loads at its first query is no part of the search: so it is asked here.
+        """
+        evaluator = self._evaluator
+        before = getattr(evaluator, "outside_count", 0)
+        still = [ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], timing) for timing in self._timings]
+        evaluator.evaluate(start, com, np.zeros(3), still)
+        stand_in = getattr(evaluator, "outside", None)
+        if stand_in is not None and getattr(evaluator, "outside_count", 0) - before == len(still):
+            evaluator = stand_in
+        return evaluator, before
 
     def _reason(self, result: AnaStarResult[bytes], problem: ContactProblem) -> str:
         dynamics = getattr(self._evaluator, "rejection", screen.REASONS[screen.DYNAMICS])

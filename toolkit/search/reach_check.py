@@ -26,12 +26,17 @@ class ReachConfig:
         com_drops: m; the predicted CoM may be lower by any of these for the legs to reach.
         lift_off: parts of the shift time at whose CoM the legs may reach at lift-off, since when the CoM moves is the
             optimiser's choice.
-        arm_slack: m; an arm may reach further by this much, since the torso can lean.
+        arm_slack: m; a palm may come nearer to the shoulder than the arm's least reach by this much.
+        arm_margin: m; an arm in contact reaches so much less far than it could: where the shoulder is depends on how the
+            torso leans and on what the arms weigh.
+        arm_behind: m; a palm in contact may lie so far behind its shoulder.
     """
 
     com_drops: tuple[float, ...] = (0.0, 0.03, 0.06, 0.1)
     lift_off: tuple[float, ...] = (1.0, 0.5)
     arm_slack: float = 0.03
+    arm_margin: float = 0.05
+    arm_behind: float = 0.2
 
 
 class ReachCheck:
@@ -104,9 +109,11 @@ class ReachCheck:
                 c, s = np.cos(candidates.yaw[held]), np.sin(candidates.yaw[held])
                 x, y, z = arm.shoulder_in_com
                 shoulder = end[held] + np.stack([c * x - s * y, s * x + c * y, np.full(len(held), z)], axis=-1)
-                distance = np.linalg.norm(table.position[after[held, palm]] - shoulder, axis=1)
-                slack = self._config.arm_slack
-                codes[held[(distance < arm.min_reach - slack) | (distance > arm.max_reach + slack)]] = screen.ARM
+                reach = table.position[after[held, palm]] - shoulder
+                distance, ahead = np.linalg.norm(reach, axis=1), c * reach[:, 0] + s * reach[:, 1]
+                limits = self._config
+                beyond = (distance < arm.min_reach - limits.arm_slack) | (distance > arm.max_reach - limits.arm_margin)
+                codes[held[beyond | (ahead < -limits.arm_behind)]] = screen.ARM
         return codes
 
     def _violated(self, com: np.ndarray, yaw: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:

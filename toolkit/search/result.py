@@ -43,6 +43,7 @@ class SearchResult:
         exhausted: every reachable state was looked at.
         expanded: (k, 3) float; x, y, yaw of the mean feet of expanded states, in order (for display).
         reason: one line where there is no solution, else "".
+        warning: one line where the judgements need a grain of salt, else "".
     """
 
     solutions: tuple[Solution, ...]
@@ -52,3 +53,4 @@ class SearchResult:
     exhausted: bool
     expanded: np.ndarray = field(repr=False)
     reason: str
+    warning: str = ""
