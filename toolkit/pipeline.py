@@ -10,7 +10,7 @@ fail, the search starts again without the transitions at which they failed.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from toolkit.centroidal.build import initial_com
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.centroidal.sequence import SequenceConfig, optimise
+from toolkit.contacts.room import RoomConfig, landing_room, moved_sequence
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.prediction.networks import NetworkEvaluator, load_networks
@@ -32,6 +33,7 @@ from toolkit.wholebody.plan import WholeBodyConfig, whole_body
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.world import World
 
+FRICTION_ROUNDING = 0.01  # of a friction factor: no reason to prefer one motion to another
 PLANNERS = ("auto", "learned", "optimiser", "kinematic", "quasi-static")
 
 
@@ -105,6 +107,7 @@ class PipelineConfig:
         candidates: most contact sequences to test before giving up.
         until: last stage that tests a sequence: "dynamics" for the plan alone, "wholebody", or "execution".
         initial_rest, final_rest: s at rest before the first transition and after the last one.
+        landing: how far feet may land from where the search put them, where margins are short; None for not at all.
         sequence, wholebody, execution: settings of the stages.
     """
 
@@ -114,6 +117,7 @@ class PipelineConfig:
     until: str = "execution"
     initial_rest: float = 0.4
     final_rest: float = 1.0
+    landing: RoomConfig | None = field(default_factory=RoomConfig)
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
     wholebody: WholeBodyConfig = field(default_factory=WholeBodyConfig)
     execution: ExecutionConfig = field(default_factory=ExecutionConfig)
@@ -189,11 +193,8 @@ def test_solution(
     robot: RobotModel, world: World, solution: Solution, config: PipelineConfig, observer: Observer
 ) -> Trial:
     """Put one contact sequence through optimiser, inverse kinematics and simulation; stop at the first that fails."""
-    schedule = ContactSchedule.of(solution.sequence, initial_rest=config.initial_rest, final_rest=config.final_rest)
-    start = solution.sequence.start
-
     observer.started("dynamics")
-    motion = optimise(robot, schedule, initial_com(robot, start), np.zeros(3), config=config.sequence)
+    solution, schedule, motion = _optimised(robot, world, solution, config)
     observer.finished("dynamics", motion.feasible, motion.seconds, motion.status)
     if not motion.feasible:
         reason = f"no feasible centroidal motion: {motion.status}"
@@ -228,6 +229,33 @@ def test_solution(
     trial = Trial(solution, schedule, not reason, motion, trajectory, execution, reason, when)
     observer.finished("execution", trial.passed, time.perf_counter() - began, trial.reason)
     return trial
+
+
+def _optimised(
+    robot: RobotModel, world: World, solution: Solution, config: PipelineConfig
+) -> tuple[Solution, ContactSchedule, CentroidalMotion]:
+    """The centroidal motion of a contact sequence, with the sequence and the schedule that it belongs to.
+
+    Where the planned contacts do not allow the wanted margins, feet may land elsewhere on their surfaces; the sequence
+    then has its contacts where they landed.
+    """
+    sequence = solution.sequence
+    schedule = ContactSchedule.of(sequence, initial_rest=config.initial_rest, final_rest=config.final_rest)
+    com, rest = initial_com(robot, sequence.start), np.zeros(3)
+    motion = optimise(robot, schedule, com, rest, config=config.sequence)
+    wanted = motion.problem.margins == config.sequence.problem.margins
+    if config.landing is None or (motion.feasible and wanted):
+        return solution, schedule, motion
+    room = landing_room(robot, world.surfaces, sequence, config.landing)
+    if not room.any():
+        return solution, schedule, motion
+    moved = optimise(robot, schedule, com, rest, config=config.sequence, room=room)
+    tighter = moved.problem.margins.friction < motion.problem.margins.friction + FRICTION_ROUNDING
+    if not moved.feasible or (motion.feasible and not tighter):
+        return solution, schedule, motion
+    sequence = moved_sequence(sequence, schedule, moved.problem.times, moved.problem.position)
+    schedule = ContactSchedule.of(sequence, initial_rest=config.initial_rest, final_rest=config.final_rest)
+    return replace(solution, sequence=sequence), schedule, moved
 
 
 def failure(execution: Execution) -> str:

@@ -179,13 +179,24 @@ def test_contacts_at_knots_and_swings(walker, motion):
     active = problem.active
     expected = {(t + side, limb) for t, limb in zip(*np.nonzero(active), strict=True) for side in (0, 1)}
     assert set(seen) == expected
-    swing_knots, swing_limbs, ankles = swing_ankles(problem)
+    swing_knots, delays, swing_limbs, ankles, tangents = swing_ankles(problem)
     inner = {(t, limb) for limb in (0, 1) for t in range(1, problem.steps) if not active[t - 1 : t + 1, limb].any()}
-    assert set(zip(swing_knots.tolist(), swing_limbs.tolist(), strict=True)) == inner
+    at_knots = delays == 0.0
+    assert set(zip(swing_knots[at_knots].tolist(), swing_limbs[at_knots].tolist(), strict=True)) == inner
+    edges = {(t, limb) for limb in (0, 1) for t in range(problem.steps) if not active[t, limb]} - {
+        (t, limb) for t, limb in inner if (t + 1, limb) in inner
+    }
+    between = zip(swing_knots[~at_knots].tolist(), swing_limbs[~at_knots].tolist(), strict=True)
+    assert set(between) == edges  # the first and the last step of each swing
+    np.testing.assert_allclose(delays[~at_knots], problem.dt[swing_knots[~at_knots]] / 2)
     tips = problem.position + np.einsum("tlij,lj->tli", problem.rotation, problem.tip_in_contact)
     for knot, limb, ankle in zip(swing_knots, swing_limbs, ankles, strict=True):
-        before = tips[np.flatnonzero(active[:knot, limb])[-1], limb]
+        before = tips[np.flatnonzero(active[: knot + 1, limb])[-1], limb]
         after = tips[knot + np.flatnonzero(active[knot:, limb])[0], limb]
         assert min(before[0], after[0]) <= ankle[0] <= max(before[0], after[0]) and ankle[2] > before[2]
+    # a displaced contact takes the path along: wholly at its end, not at all at the other
+    share = np.einsum("nij,nij->n", tangents[:, :, :2], tangents[:, :, :2]) / 2
+    left = np.einsum("nij,nij->n", tangents[:, :, 2:], tangents[:, :, 2:]) / 2
+    np.testing.assert_allclose(np.sqrt(share) + np.sqrt(left), 1.0, atol=1e-12)
     height, _ = lowest_foot(problem)
     np.testing.assert_allclose(height, 0.0, atol=1e-12)

@@ -19,6 +19,7 @@ from toolkit.robot.model import RobotModel
 
 TORQUE_ROLES = ("knee", "hip_pitch", "hip_roll", "ankle_pitch", "ankle_roll")
 SWING_LIFT = 0.06  # m; height of the assumed path of a foot in the air above the line between its contacts
+CROSSING = (0.02, 0.95)  # of a swing, in which the foot crosses from contact to contact
 
 
 @dataclass(frozen=True)
@@ -86,13 +87,19 @@ def knot_contacts(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, n
     return knot, limb, position, rotation
 
 
-def swing_ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def swing_ankles(
+    problem: CentroidalProblem,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Where the ankle of a foot in the air is, on a smooth path from the contact it left to the one it will make.
 
+    Looked at are the knots strictly inside swings, and the middle of a swing's first and last step: that is where legs
+    are stretched the most.
+
     Returns:
-        (n,) knots strictly inside swings, (n,) limbs, (n, 3) ankles in the world.
+        (n,) knots, (n,) s from the knot, (n,) limbs, (n, 3) ankles in the world, and (n, 3, 4) how they follow
+        displacements of the contact made (2) and of the contact left (2) along their own axes.
     """
-    knots, limbs, ankles = [], [], []
+    knots, delays, limbs, ankles, tangents = [], [], [], [], []
     times = problem.times
     for limb in FEET:
         tip = problem.position[:, limb] + problem.rotation[:, limb] @ problem.tip_in_contact[limb]
@@ -101,22 +108,31 @@ def swing_ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np
             if lift == 0:
                 continue
             if land < problem.steps:
-                end = tip[land]
-            elif problem.landing_limb == limb and problem.landing_position is not None:
-                end = problem.landing_position + problem.landing_rotation @ problem.tip_in_contact[limb]
+                end, turn = tip[land], problem.rotation[land, limb]
+            elif problem.landing_limb == limb and problem.landing_rotation is not None:
+                turn = problem.landing_rotation
+                assert problem.landing_position is not None
+                end = problem.landing_position + turn @ problem.tip_in_contact[limb]
             else:
                 continue
-            inside = np.arange(lift + 1, land)
-            s = ((times[inside] - times[lift]) / (times[land] - times[lift]))[:, None]
-            along = s * s * (3 - 2 * s)
+            inside = np.concatenate([np.arange(lift + 1, land), [lift, land - 1]])
+            delay = np.zeros(len(inside))
+            delay[-2:] = problem.dt[inside[-2:]] / 2
+            s = ((times[inside] + delay - times[lift]) / (times[land] - times[lift]))[:, None]
+            crossed = np.clip((s - CROSSING[0]) / (CROSSING[1] - CROSSING[0]), 0.0, 1.0)
+            along = crossed * crossed * (3 - 2 * crossed)
             path = tip[lift - 1] + along * (end - tip[lift - 1])
             path[:, 2] += SWING_LIFT * (4 * s * (1 - s))[:, 0]
             knots.append(inside)
+            delays.append(delay)
             limbs.append(np.full(len(inside), int(limb)))
             ankles.append(path)
+            share, left = along[..., None], problem.rotation[lift - 1, limb]
+            tangents.append(np.concatenate([share * turn[:, :2], (1 - share) * left[:, :2]], 2))
     if not knots:
-        return np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3))
-    return np.concatenate(knots), np.concatenate(limbs), np.concatenate(ankles)
+        return np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros((0, 3)), np.zeros((0, 3, 4))
+    knot, delay, limb = np.concatenate(knots), np.concatenate(delays), np.concatenate(limbs)
+    return knot, delay, limb, np.concatenate(ankles), np.concatenate(tangents)
 
 
 def leg_torques(posture: LegPosture, sole: np.ndarray, rotation: np.ndarray, force: np.ndarray, moment: np.ndarray):
@@ -169,7 +185,7 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
 
     reach = ReachMargins(length=margins.length, ankle=margins.ankle, hip=margins.hip)
     knots, limbs, positions, rotations = knot_contacts(p)
-    swing_knots, swing_limbs, swing_tips = swing_ankles(p)
+    swing_knots, swing_delays, swing_limbs, swing_tips, _ = swing_ankles(p)
     base = rotation_about_z(p.yaw)
     for limb in FEET:
         leg, here = robot.legs[limb], limbs == limb
@@ -179,8 +195,9 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
             for name, clearance in leg_clearances(leg, posture, reach).items():
                 if name != "hip yaw":  # the base may turn to spare it
                     enter(name, at, limb, -clearance)
-        at = swing_knots[swing_limbs == limb]
-        hip = motion.com[at] + base[at] @ leg.hip_in_com
+        at, later = swing_knots[swing_limbs == limb], swing_delays[swing_limbs == limb, None]
+        com = motion.com[at] + later * motion.linear_momentum[at] / p.mass
+        hip = com + base[at] @ leg.hip_in_com
         length = np.linalg.norm(hip - swing_tips[swing_limbs == limb], axis=-1)
         enter("swing leg length", at, limb, length - leg.max_length + margins.length)
         _enter_torques(motion, robot, limb, margins.torque, enter)

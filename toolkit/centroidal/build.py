@@ -29,6 +29,7 @@ class ProblemConfig:
     Attributes:
         steps: intervals per phase (the paper: 1 s in steps of 0.2 s).
         max_dt: s; long phases of a schedule get more steps than `steps` to stay below this.
+        min_dt: s; short phases of a schedule get fewer steps than `steps` to stay above this.
         final_half_size: (3,) m; half sizes of the box for the last CoM, around the home height above the mean feet,
             where the robot is to rest.
         moving_half_size: (3,) m; the same after a transition that others follow: long strides leave the CoM before or
@@ -43,6 +44,7 @@ class ProblemConfig:
 
     steps: int = 5
     max_dt: float = 0.2
+    min_dt: float = 0.0
     final_half_size: tuple[float, float, float] = (0.15, 0.10, 0.10)
     moving_half_size: tuple[float, float, float] = (0.25, 0.12, 0.15)
     min_height: float = 0.7
@@ -130,7 +132,10 @@ def sequence_problem(
     last = phases[-1].contacts
     if [contact.limb for contact in last[:2]] != list(FEET):
         raise InputError("a schedule must end with both feet in contact: give it a final rest longer than 0 s")
-    counts = [max(config.steps, math.ceil(phase.duration / config.max_dt - 1e-9)) for phase in phases]
+    counts = []
+    for phase in phases:
+        most = int(phase.duration / config.min_dt + 1e-9) if config.min_dt > 0.0 else config.steps
+        counts.append(max(min(config.steps, most), math.ceil(phase.duration / config.max_dt - 1e-9), 1))
     total = sum(counts)
     dt, yaw = np.empty(total), np.empty(total + 1)
     arrays = _contact_arrays(total)

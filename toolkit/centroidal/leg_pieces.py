@@ -26,14 +26,20 @@ class Posture:
     pitch_axis: ca.SX
 
 
-def _posture(com: ca.SX, p: Parameters) -> tuple[Posture, ca.SX]:
+def displacement(rotation: ca.SX, offset: ca.SX) -> ca.SX:
+    """(3,) displacement in the world of a contact that moves by `offset` (2 or none) along its own axes."""
+    return rotation[:, :2] @ offset if offset.numel() else ca.SX.zeros(3)
+
+
+def _posture(com: ca.SX, p: Parameters, offset: ca.SX) -> tuple[Posture, ca.SX]:
     """Posture of a leg, and world_from_sole.
 
     Parameters: hip relative to the CoM in the world (3), ankle in the world (3), R of the sole (9, row-major), thigh,
-    shin.
+    shin. The sole is displaced by `offset` (2 or none) along its own axes.
     """
     hip_offset, ankle, rotation = p(3), p(3), ca.reshape(p(9), 3, 3).T
     thigh, shin = p(), p()
+    ankle = ankle + displacement(rotation, offset)
     hip = com + hip_offset
     h = rotation.T @ (hip - ankle)
     square = ca.sumsqr(h) + 1e-12
@@ -60,15 +66,15 @@ def _posture(com: ca.SX, p: Parameters) -> tuple[Posture, ca.SX]:
     return posture, rotation
 
 
-def leg() -> Piece:
+def leg(moving: bool) -> Piece:
     """Joint ranges of a leg.
 
     Parameters: of the posture; (2) length, then (2) lower and upper of ankle pitch, ankle roll, hip pitch, hip roll;
     wanted margins of length, ankle, hip.
     """
     p = Parameters()
-    com, slack = ca.SX.sym("c", 3), ca.SX.sym("s")
-    posture, _ = _posture(com, p)
+    com, slack, offset = ca.SX.sym("c", 3), ca.SX.sym("s"), ca.SX.sym("d", 2 * moving)
+    posture, _ = _posture(com, p, offset)
     values = [posture.length, posture.ankle_pitch, posture.ankle_roll, posture.hip_pitch, posture.hip_roll]
     ranges = [p(2) for _ in values]
     length, ankle, hip = p(), p(), p()
@@ -78,10 +84,10 @@ def leg() -> Piece:
     ):
         kept = margin * (1 - slack)
         rows += [scale * (value - limits[0] - kept), scale * (limits[1] - value - kept)]
-    return Piece("leg", ca.vertcat(com, slack), p.vector, rows=ca.vertcat(*rows))
+    return Piece("leg", ca.vertcat(com, slack, offset), p.vector, rows=ca.vertcat(*rows))
 
 
-def torque() -> Piece:
+def torque(moving: bool) -> Piece:
     """Joint torques of a stance leg in the middle of a step.
 
     Parameters: half of dt; of the posture; sole position (3); (5) torque limits of knee, hip pitch, hip roll, ankle
@@ -90,9 +96,9 @@ def torque() -> Piece:
     p = Parameters()
     com, velocity, wrench = ca.SX.sym("c", 3), ca.SX.sym("v", 3), ca.SX.sym("w", WRENCH)
     slack, half_dt = ca.SX.sym("s"), p()
-    middle = ca.SX.sym("middle", 3)
-    posture, rotation = _posture(middle, p)
-    sole, limits, wanted = p(3), p(5), p()
+    middle, offset = ca.SX.sym("middle", 3), ca.SX.sym("d", 2 * moving)
+    posture, rotation = _posture(middle, p, offset)
+    sole, limits, wanted = p(3) + displacement(rotation, offset), p(5), p()
     force, moment = rotation @ wrench[:3], rotation @ wrench[3:]
 
     def about(point: ca.SX, axis: ca.SX) -> ca.SX:
@@ -108,11 +114,12 @@ def torque() -> Piece:
         about(posture.ankle, rotation[:, 0]),
     )
     ratio = torques / limits
-    reduced = ca.vertcat(middle, wrench)
+    reduced = ca.vertcat(middle, wrench, offset)
     slope = ca.jacobian(ratio, reduced)
-    slope = ca.horzcat(slope[:, :3], half_dt * slope[:, :3], slope[:, 3:])  # the middle is com + dt / 2 velocity
+    by_offset = slope[:, 9:]
+    slope = ca.horzcat(slope[:, :3], half_dt * slope[:, :3], slope[:, 3:9])  # the middle is com + dt / 2 velocity
     part, gain = wanted + (1 - wanted) * slack, ca.repmat(1 - wanted, 5, 1)
     rows = ca.vertcat(part - ratio, part + ratio)
-    jacobian = ca.vertcat(ca.horzcat(-slope, gain), ca.horzcat(slope, gain))
+    jacobian = ca.vertcat(ca.horzcat(-slope, gain, -by_offset), ca.horzcat(slope, gain, by_offset))
     rows, jacobian = ca.substitute([rows, jacobian], [middle], [com + half_dt * velocity])
-    return Piece("torque", ca.vertcat(com, velocity, wrench, slack), p.vector, rows=rows, jacobian=jacobian)
+    return Piece("torque", ca.vertcat(com, velocity, wrench, slack, offset), p.vector, rows=rows, jacobian=jacobian)

@@ -7,8 +7,9 @@ is about the CoM, and its exact integral under constant wrenches is a sum over t
 
     kappa+ = kappa + dt g sum_i [ (p_i - r - dt v / 2 - dt^2 g_vec / 6) x f_i + tau_i ]
 
-Slacks take back the wanted margins, at a price and down to the physical limit; what goes beyond it, the excess of a
-step and a body's slack above 1, costs much more. So the program always has a solution, and says where it had to cheat.
+Slacks take back the wanted margins, at a price and down to the least margins; what goes beyond those and beyond the
+physical limit, the excess of a step, costs much more, and so does a body's slack above 1. So the program always has a
+solution, and says where it had to cheat.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from functools import lru_cache
 import casadi as ca
 
 from toolkit.centroidal.blocks import Parameters, Piece
-from toolkit.centroidal.leg_pieces import WRENCH, leg, torque
+from toolkit.centroidal.leg_pieces import WRENCH, displacement, leg, torque
 from toolkit.centroidal.problem import GRAVITY
 
 STATE = 12
@@ -43,6 +44,9 @@ class Pieces:
         slack: price of the excess and the body's slack of a step.
         initial: the given state.
         final: rest, box and centring at the end.
+        carry: what a pair of variables becomes at the next knot.
+        anchor: a pair of variables that is zero.
+        landing: price of moving a landing point.
     """
 
     stage: dict[int, Piece]
@@ -54,33 +58,44 @@ class Pieces:
     slack: Piece
     initial: Piece
     final: Piece
+    carry: Piece
+    anchor: Piece
+    landing: Piece
 
 
-@lru_cache(maxsize=1)
-def pieces() -> Pieces:
-    """The pieces; building them takes tens of milliseconds once."""
+@lru_cache(maxsize=2)
+def pieces(moving: bool = False) -> Pieces:
+    """The pieces; building them takes tens of milliseconds once.
+
+    Args:
+        moving: whether contacts are displaced by variables.
+    """
     return Pieces(
-        stage={n: _stage(n) for n in range(1, 5)},
+        stage={n: _stage(n, moving) for n in range(1, 5)},
         contact=_contact(),
-        leg=leg(),
-        torque=torque(),
-        distance=_distance(),
-        height=_height(),
+        leg=leg(moving),
+        torque=torque(moving),
+        distance=_distance(moving),
+        height=_height(moving),
         slack=_slack(),
         initial=_initial(),
-        final=_final(),
+        final=_final(moving),
+        carry=_carry(),
+        anchor=_anchor(),
+        landing=_landing(),
     )
 
 
-def _stage(contacts: int) -> Piece:
+def _stage(contacts: int, moving: bool) -> Piece:
     """Dynamics and momentum objective of a step with so many contacts.
 
-    Parameters: dt, per contact R (9, row-major) and p (3); square roots of the weights of v, a, kappa, kappa rate,
-    acceleration change, height; wanted height.
+    Variables: state, wrenches, next state; where contacts move, the displacement (2) of each along its own axes.
+    Parameters: dt; per contact R (9, row-major), p (3) and, where contacts move, whether this one does; square roots
+    of the weights of v, a, kappa, kappa rate, acceleration change, height; wanted height.
     """
     p = Parameters()
     x, after = ca.SX.sym("x", STATE), ca.SX.sym("after", STATE)
-    wrenches = ca.SX.sym("w", WRENCH * contacts)
+    wrenches, offsets = ca.SX.sym("w", WRENCH * contacts), ca.SX.sym("d", 2 * contacts * moving)
     dt = p()
     r, v, kappa, before = ca.vertsplit(x, 3)
     gravity = ca.DM(GRAVITY)
@@ -88,6 +103,8 @@ def _stage(contacts: int) -> Piece:
     middle = r + dt / 2 * v + dt**2 / 6 * gravity
     for i in range(contacts):
         rotation, position = ca.reshape(p(9), 3, 3).T, p(3)
+        if moving:
+            position += p() * displacement(rotation, offsets[2 * i : 2 * i + 2])
         force = rotation @ wrenches[WRENCH * i : WRENCH * i + 3]
         total += force
         moment += ca.cross(position - middle, force) + rotation @ wrenches[WRENCH * i + 3 : WRENCH * i + 6]
@@ -104,31 +121,33 @@ def _stage(contacts: int) -> Piece:
         weights[4] * (acceleration - before),
         weights[5] * (after[2] - height),
     )
-    return Piece(f"stage{contacts}", ca.vertcat(x, wrenches, after), p.vector, rho=rho, rows=after - following)
+    return Piece(f"stage{contacts}", ca.vertcat(x, wrenches, after, offsets), p.vector, rho=rho, rows=after - following)
 
 
 def _contact() -> Piece:
     """Friction cone, patch and yaw moment (Caron et al., ICRA 2015) of a contact, and its objective.
 
-    Variables: wrench, slacks of friction and CoP, excess. Slacks in weights: at the normal force the margin is gone.
-    Parameters: mu, (2) half extents; wanted friction factor, (2) CoP margin in m, yaw factor; square roots of the
-    weights of force, lateral force, torque (in weights), CoP, CoP times load, and distance from a wanted normal force;
-    that force; price of a slack.
+    Variables: wrench, slacks of friction and CoP, excess. Slacks in weights: at the normal force the least
+    margin is left.
+    Parameters: mu, (2) half extents; wanted friction factor, (2) CoP margin in m, yaw factor, and the least of each;
+    square roots of the weights of force, lateral force, torque (in weights), CoP, CoP times load, and distance from a
+    wanted normal force; that force; price of a slack.
     """
     p = Parameters()
     wrench, slack, excess = ca.SX.sym("w", WRENCH), ca.SX.sym("s", 2), ca.SX.sym("e")
-    mu, half, wanted, cop_margin, yaw_factor, weights, load, price = p(), p(2), p(), p(2), p(), p(6), p(), p()
+    mu, half, wanted, cop_margin, yaw_factor = p(), p(2), p(), p(2), p()
+    least, least_cop, least_yaw, weights, load, price = p(), p(2), p(), p(6), p(), p()
     fx, fy, fz, tx, ty, tz = ca.vertsplit(wrench)
-    held = mu * (wanted * fz + (1 - wanted) * slack[0] + excess) + 1e-7
+    held = mu * (wanted * fz + (least - wanted) * slack[0] + excess) + 1e-7
     cone = held - (fx**2 + fy**2) / held  # smooth at rest, unlike the square root
-    x, y = ca.vertsplit((half - cop_margin) * fz + cop_margin * slack[1] + half * excess)
+    x, y = ca.vertsplit((half - cop_margin) * fz + (cop_margin - least_cop) * slack[1] + half * excess)
     rows = [cone, x - ty, x + ty, y - tx, y + tx, fz - slack[0], fz - slack[1]]
     # Yaw: the wanted part of the range under the margins, and the whole physical range: a moment of the wrong sign can
     # be within a part of the range but not in the range itself.
     most = 2 * mu * (half[0] + half[1])
     ranges = [
         (yaw_factor, mu * wanted, half - cop_margin, most * (slack[0] + slack[1] + excess)),
-        (1, mu, half, most * excess),
+        (least_yaw, mu * least, half - least_cop, most * excess),
     ]
     for factor, friction, (hx, hy), more in ((a, b, ca.vertsplit(c), d) for a, b, c, d in ranges):
         room = friction * (hx + hy) * fz
@@ -158,25 +177,35 @@ def _contact() -> Piece:
     return Piece("contact", v, p.vector, rho=rho, linear=linear, rows=10 * ca.vertcat(*rows), curvature=curvature)
 
 
-def _distance() -> Piece:
+def _distance(moving: bool) -> Piece:
     """Distance from hip or shoulder to a tip.
 
-    Parameters: root relative to the CoM in the world (3), tip (3), lower and upper bound, wanted margin.
+    Parameters: s from the knot, root relative to the CoM in the world (3), tip (3), lower and upper bound, wanted
+    margin; where contacts move, how the tip follows the displacements of the two ends of a swing (3 x 4, row-major).
     """
     p = Parameters()
-    com, slack = ca.SX.sym("c", 3), ca.SX.sym("s")
+    com, velocity, slack = ca.SX.sym("c", 3), ca.SX.sym("v", 3), ca.SX.sym("s")
+    offset, delay = ca.SX.sym("d", 4 * moving), p()
     root, tip, lower, upper, margin = p(3), p(3), p(), p(), p()
-    length = ca.sqrt(ca.sumsqr(com + root - tip) + 1e-12)
+    if moving:
+        tip += ca.reshape(p(12), 4, 3).T @ offset
+    length = ca.sqrt(ca.sumsqr(com + delay * velocity + root - tip) + 1e-12)
     kept = margin * (1 - slack)
     rows = ca.vertcat(5 * (length - lower - kept), 5 * (upper - length - kept))
-    return Piece("distance", ca.vertcat(com, slack), p.vector, rows=rows)
+    return Piece("distance", ca.vertcat(com, velocity, slack, offset), p.vector, rows=rows)
 
 
-def _height() -> Piece:
-    """Least height of the CoM; parameters: that height in the world, wanted margin."""
+def _height(moving: bool) -> Piece:
+    """Least height of the CoM.
+
+    Parameters: that height in the world, wanted margin; how it rises with the lowest foot's displacement (2).
+    """
     p = Parameters()
-    z, slack, least, margin = ca.SX.sym("z"), ca.SX.sym("s"), p(), p()
-    return Piece("height", ca.vertcat(z, slack), p.vector, rows=5 * (z - least - margin * (1 - slack)))
+    z, slack, offset = ca.SX.sym("z"), ca.SX.sym("s"), ca.SX.sym("d", 2 * moving)
+    least, margin = p(), p()
+    if moving:
+        least += ca.dot(p(2), offset)
+    return Piece("height", ca.vertcat(z, slack, offset), p.vector, rows=5 * (z - least - margin * (1 - slack)))
 
 
 def _slack() -> Piece:
@@ -194,16 +223,37 @@ def _initial() -> Piece:
     return Piece("initial", x, p.vector, rows=rows)
 
 
-def _final() -> Piece:
+def _final(moving: bool) -> Piece:
     """Rest, box and centring; rows: the velocity (3), and the offset from the centre in the yaw frame (3).
 
     Parameters: centre (3), (2) cos and sin of the final yaw, square roots of the weights of centring, acceleration and
-    angular momentum.
+    angular momentum; where contacts move, how the centre follows both feet's displacements (3 x 4, row-major).
     """
     p = Parameters()
-    x = ca.SX.sym("x", STATE)
+    x, moved = ca.SX.sym("x", STATE), ca.SX.sym("d", 4 * moving)
     center, heading, weights = p(3), p(2), p(3)
+    if moving:
+        center += ca.reshape(p(12), 4, 3).T @ moved
     dx, dy, dz = ca.vertsplit(x[:3] - center)
     offset = ca.vertcat(heading[0] * dx + heading[1] * dy, -heading[1] * dx + heading[0] * dy, dz)
     rho = ca.vertcat(weights[0] * offset[:2], weights[1] * x[9:12], weights[2] * x[6:9])
-    return Piece("final", x, p.vector, rho=rho, rows=ca.vertcat(x[3:6], offset))
+    return Piece("final", ca.vertcat(x, moved), p.vector, rho=rho, rows=ca.vertcat(x[3:6], offset))
+
+
+def _carry() -> Piece:
+    """What a pair of variables becomes at the next knot: rows b - a."""
+    now, after = ca.SX.sym("a", 2), ca.SX.sym("b", 2)
+    return Piece("carry", ca.vertcat(now, after), ca.SX(0, 1), rows=after - now)
+
+
+def _anchor() -> Piece:
+    """A pair of variables that is zero."""
+    pair = ca.SX.sym("a", 2)
+    return Piece("anchor", pair, ca.SX(0, 1), rows=pair)
+
+
+def _landing() -> Piece:
+    """Price of moving a landing point; parameter: square root of the weight."""
+    p = Parameters()
+    offset, weight = ca.SX.sym("u", 2), p()
+    return Piece("landing", offset, p.vector, rho=weight * offset)

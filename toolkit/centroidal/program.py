@@ -7,6 +7,7 @@ inequalities.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,12 +22,14 @@ from toolkit.centroidal.body import (
 )
 from toolkit.centroidal.layout import Layout, indices
 from toolkit.centroidal.pieces import CONTACT, STATE, WRENCH, G, pieces
-from toolkit.centroidal.problem import CentroidalProblem
+from toolkit.centroidal.problem import CentroidalProblem, Margins
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 
 OPEN = 1e3  # bound of rows that are left free
+# What plans keep but where nothing else is feasible: a slide or a tilt cannot be undone without it.
+LEAST = Margins(friction=0.96, cop=(0.01, 0.01), yaw=0.95)
 SCALE = 1e-2  # of the objective inside the program
 
 
@@ -45,8 +48,10 @@ class Regularisers:
         final_center: weight of the distance of the last CoM from the mean of the feet, m^2.
         final_acceleration: weight of the last CoM acceleration, m^2/s^4.
         final_spin: weight of the last angular momentum per mass, m^4/s^2.
+        landing: weight of the displacement of a landing point, m^2.
         slack: price of a margin of a fully loaded contact, or of the body, taken back for 0.2 s.
-        excess: price of going beyond a physical limit by as much, in multiples of `slack`.
+        excess: price of going beyond the least margins, and beyond a physical limit, by as much, in multiples of
+            `slack`.
     """
 
     jerk: float = 0.02
@@ -58,8 +63,25 @@ class Regularisers:
     final_center: float = 20000.0
     final_acceleration: float = 20.0
     final_spin: float = 200.0
+    landing: float = 300.0
     slack: float = 3000.0
-    excess: float = 10.0
+    excess: float = 60.0
+
+
+@dataclass(frozen=True)
+class Landing:
+    """Room for a foot's next contact.
+
+    Attributes:
+        limb: the foot.
+        step: the first one in which it is in the air.
+        lower, upper: (2,) m; range of the contact's displacement along its own axes.
+    """
+
+    limb: Limb
+    step: int
+    lower: np.ndarray
+    upper: np.ndarray
 
 
 class Program:
@@ -70,13 +92,25 @@ class Program:
         robot: for the limits of the body.
         body: wanted margins of the body.
         regularisers: weights.
+        landings: where contacts may move; they stay where None.
     """
 
-    def __init__(self, problem: CentroidalProblem, robot: RobotModel, body: BodyMargins, regularisers: Regularisers):
+    def __init__(
+        self,
+        problem: CentroidalProblem,
+        robot: RobotModel,
+        body: BodyMargins,
+        regularisers: Regularisers,
+        landings: Sequence[Landing] | None = None,
+    ):
         self.problem, self.robot, self.body, self.regularisers = problem, robot, body, regularisers
-        self.layout = Layout.of(problem.active)
+        self.least = LEAST
+        self.landings = landings
+        self.layout = Layout.of(problem.active, None if landings is None else [item.step for item in landings])
+        self._pieces = pieces(self.layout.moving)
         self.path_rows = np.zeros(problem.steps + 1, int)
         self._parts: list[tuple[Piece, np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
+        self._carried: list[tuple[int, np.ndarray]] = []
         self._bounds: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._heading = rotation_about_z(problem.yaw)
         self._middle_heading = rotation_about_z((problem.yaw[:-1] + problem.yaw[1:]) / 2)
@@ -84,6 +118,7 @@ class Program:
         self._add_contacts()
         self._add_body()
         self._add_slacks()
+        self._add_landings()
         self._finish()
 
     def _add(self, piece: Piece, stage: np.ndarray, variables: np.ndarray, *columns: np.ndarray) -> np.ndarray:
@@ -91,7 +126,8 @@ class Program:
         n = len(stage)
         rows = self.path_rows[stage][:, None] + np.arange(piece.rows)
         self.path_rows[stage] += piece.rows
-        parameters = np.concatenate([np.reshape(column, (n, -1)) for column in columns], 1)
+        shaped = [np.reshape(column, (n, -1) if np.size(column) else (n, 0)) for column in columns]
+        parameters = np.concatenate(shaped, 1)
         self._parts.append((piece, stage, variables, rows, parameters))
         return rows
 
@@ -106,12 +142,16 @@ class Program:
         n = p.steps
         first, last = np.array([0]), np.array([n])
         initial = np.concatenate([p.com, p.com_velocity, p.angular_momentum / p.mass, np.zeros(3)])
-        rows = self._add(pieces().initial, first, self._state(first), initial[None])
+        rows = self._add(self._pieces.initial, first, self._state(first), initial[None])
         self._bounds.append((first, rows, np.zeros((STATE, 2))))
         weights = np.sqrt(SCALE * np.array([reg.final_center, reg.final_acceleration, reg.final_spin]))
         yaw = p.yaw[-1]
         columns = np.concatenate([p.final_center, [np.cos(yaw), np.sin(yaw)], weights])
-        rows = self._add(pieces().final, last, self._state(last), columns[None])
+        variables, tangents = self._state(last), np.zeros((1, 0))
+        if self.layout.moving:
+            variables = np.concatenate([variables, *(self.layout.pair(last, foot) for foot in FEET)], 1)
+            tangents = np.concatenate([p.rotation[-1, foot, :, :2] / 2 for foot in FEET], 1).reshape(1, 12)
+        rows = self._add(self._pieces.final, last, variables, columns[None], tangents)
         speed = 0.0 if p.final_at_rest else OPEN
         bound = np.concatenate([np.full(3, speed), p.final_half_size])
         self._bounds.append((last, rows, np.stack([-bound, bound], 1)))
@@ -137,20 +177,22 @@ class Program:
             squares += [np.full(len(step), w.cop), np.full(len(step), reg.cop), press]
             weights = np.sqrt(duration[step, None] * np.stack(squares, 1))
             wanted = np.array([p.margins.friction, *cop_margin[limb], p.margins.yaw])
+            least = np.array([self.least.friction, *np.minimum(self.least.cop, cop_margin[limb]), self.least.yaw])
+            least[[0, 3]] = np.maximum(least[[0, 3]], wanted[[0, 3]])
             variables = np.concatenate(
                 [indices(self.layout.wrench[step, limb], CONTACT), self.layout.slack[step, :1]], 1
             )
-            fixed = np.tile(np.concatenate([p.half_size[limb], wanted]), (len(step), 1))
+            fixed = np.tile(np.concatenate([p.half_size[limb], wanted, least]), (len(step), 1))
             wanted_force = np.full(len(step), force)
             self._add(
-                pieces().contact, step, variables, p.friction[step, limb], fixed, weights, wanted_force, price[step]
+                self._pieces.contact, step, variables, p.friction[step, limb], fixed, weights, wanted_force, price[step]
             )
 
     def _add_body(self) -> None:
         """Limits of legs and arms."""
         p, body, layout = self.problem, self.body, self.layout
         knots, limbs, positions, rotations = knot_contacts(p)
-        swing_knots, swing_limbs, tips = swing_ankles(p)
+        swing_knots, delays, swing_limbs, tips, tangents = swing_ankles(p)
         weight = p.mass * G
         com = slice(0, 3)
         for limb in FEET:
@@ -158,63 +200,109 @@ class Program:
             hip = self._heading @ leg.hip_in_com
             here = limbs == limb
             at = knots[here]
-            variables = np.concatenate([self._state(at, com), layout.slack[at, 1:]], 1)
+            variables = np.concatenate([self._state(at, com), layout.slack[at, 1:], self._moved(at, limb)], 1)
             ranges = [leg.ranges[role] for role in ("ankle_pitch", "ankle_roll", "hip_pitch", "hip_roll")]
             fixed = np.concatenate([[leg.min_length, leg.max_length], *ranges, [body.length, body.ankle, body.hip]])
             rotation = rotations[here]
             ankle = positions[here] + rotation @ leg.ankle_in_sole
             links = np.tile([leg.thigh, leg.shin], (len(at), 1))
             posture = (hip[at], ankle, rotation, links)
-            self._add(pieces().leg, at, variables, *posture, np.tile(fixed, (len(at), 1)))
+            self._add(self._pieces.leg, at, variables, *posture, np.tile(fixed, (len(at), 1)))
 
             step = np.flatnonzero(p.active[:, limb])
             wrench = indices(layout.wrench[step, limb], WRENCH)
-            variables = np.concatenate([self._state(step, com, slice(3, 6)), wrench, layout.slack[step, 1:]], 1)
+            variables = [self._state(step, com, slice(3, 6)), wrench, layout.slack[step, 1:], self._moved(step, limb)]
+            variables = np.concatenate(variables, 1)
             sole, rotation = p.position[step, limb], p.rotation[step, limb]
             limits = np.array([leg.torques[role] for role in TORQUE_ROLES]) / weight
             posture = (self._middle_heading[step] @ leg.hip_in_com, sole + rotation @ leg.ankle_in_sole, rotation)
             fixed = np.tile(np.append(limits, body.torque), (len(step), 1))
             links = np.tile([leg.thigh, leg.shin], (len(step), 1))
             # order of the piece: half of dt, posture, sole, limits
-            self._add(pieces().torque, step, variables, p.dt[step] / 2, *posture, links, sole, fixed)
+            self._add(self._pieces.torque, step, variables, p.dt[step] / 2, *posture, links, sole, fixed)
 
-            here = swing_limbs == limb
-            self._add_distance(swing_knots[here], hip[swing_knots[here]], tips[here], 0.0, leg.max_length)
+            for late in (False, True):  # a piece stands at a stage once
+                here = (swing_limbs == limb) & ((delays > 0.0) == late)
+                at, ends = swing_knots[here], tangents[here]
+                self._add_distance(at, delays[here], hip[at], tips[here], 0.0, leg.max_length, limb, ends)
         for limb in (Limb.LEFT_PALM, Limb.RIGHT_PALM):
             here = limbs == limb
             if here.any():
                 arm = self.robot.arms[limb]
                 shoulder = self._heading[knots[here]] @ arm.shoulder_in_com
-                self._add_distance(knots[here], shoulder, positions[here], arm.min_reach, arm.max_reach)
-        floor, _ = lowest_foot(p)
+                now, reach = np.zeros(here.sum()), (arm.min_reach, arm.max_reach)
+                self._add_distance(knots[here], now, shoulder, positions[here], *reach)
+        floor, lowest = lowest_foot(p)
         at = np.flatnonzero(np.isfinite(floor))
-        variables = np.concatenate([self._state(at, slice(2, 3)), layout.slack[at, 1:]], 1)
-        least = floor[at] + p.min_height
-        self._add(pieces().height, at, variables, least, np.full(len(at), body.height))
+        variables = np.concatenate([self._state(at, slice(2, 3)), layout.slack[at, 1:], self._moved(at, lowest[at])], 1)
+        least, rises = floor[at] + p.min_height, np.zeros((len(at), 0))
+        if layout.moving:
+            rises = p.rotation[np.minimum(at, p.steps - 1), lowest[at], 2, :2]
+        self._add(self._pieces.height, at, variables, least, np.full(len(at), body.height), rises)
 
-    def _add_distance(self, knot: np.ndarray, root: np.ndarray, tip: np.ndarray, lower: float, upper: float) -> None:
-        """Bounds on the distance from a root to a tip at knots."""
-        if len(knot):
-            variables = np.concatenate([self._state(knot, slice(0, 3)), self.layout.slack[knot, 1:]], 1)
-            fixed = np.tile([lower, upper, self.body.length], (len(knot), 1))
-            self._add(pieces().distance, knot, variables, root, tip, fixed)
+    def _moved(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
+        """(n, 2) variables that displace a foot's contact at knots; (n, 0) where contacts stay."""
+        return self.layout.pair(knot, foot) if self.layout.moving else np.zeros((len(knot), 0), int)
+
+    def _add_distance(
+        self,
+        knot: np.ndarray,
+        delay: np.ndarray,
+        root: np.ndarray,
+        tip: np.ndarray,
+        lower: float,
+        upper: float,
+        foot: Limb = FEET[0],
+        tangents: np.ndarray | None = None,
+    ) -> None:
+        """Bounds on the distance from a root to a tip `delay` s after knots; `tangents` as in the piece."""
+        if not len(knot):
+            return
+        variables = [self._state(knot, slice(0, 6)), self.layout.slack[knot, 1:]]
+        columns = [delay, root, tip, np.tile([lower, upper, self.body.length], (len(knot), 1))]
+        if self.layout.moving:
+            variables += [self._moved(knot, foot), self.layout.pair(knot, len(FEET))]
+            columns.append(np.zeros((len(knot), 12)) if tangents is None else tangents)
+        self._add(self._pieces.distance, knot, np.concatenate(variables, 1), *columns)
+
+    def _add_landings(self) -> None:
+        """How displacements of contacts go from knot to knot, and what choosing them costs."""
+        layout, landings = self.layout, self.landings
+        if landings is None:
+            return
+        n, air = self.problem.steps, len(FEET)
+        step = np.arange(n)
+        sources = {which: layout.pair(step, which) for which in range(air + 1)}
+        for item in landings:
+            sources[air][item.step] = layout.pair(np.array([item.step]), item.limb)[0]
+            sources[item.limb][item.step] = layout.landing[item.step] + np.arange(2)
+        for which, source in sources.items():
+            variables = np.concatenate([source, layout.pair(step + 1, which)], 1)
+            self._carried.append((which, variables))
+        for which in range(air + 1):
+            rows = self._add(self._pieces.anchor, np.array([0]), layout.pair(np.array([0]), which), np.zeros((1, 0)))
+            self._bounds.append((np.array([0]), rows, np.zeros((2, 2))))
+        at = np.array([item.step for item in landings], int)
+        if len(at):
+            price = np.full(len(at), np.sqrt(SCALE * self.regularisers.landing))
+            self._add(self._pieces.landing, at, indices(layout.landing[at], 2), price)
 
     def _price(self) -> np.ndarray:
-        """(N,) price of a slack in each step; short steps cost as much as 0.05 s, or margins would go there."""
-        return SCALE * self.regularisers.slack * np.maximum(self.problem.dt, 0.05) / 0.2
+        """(N,) price of a slack in each step."""
+        return SCALE * self.regularisers.slack * self.problem.dt / 0.2
 
     def _add_slacks(self) -> None:
         """Prices of what the steps take beyond their contacts' margins."""
         slack, price = self.layout.slack, self._price()
         step, last = np.arange(self.problem.steps), np.array([self.problem.steps])
-        self._add(pieces().slack, step, slack[:-1], self.regularisers.excess * price, price)
-        self._add(pieces().slack, last, slack[-1:], price[-1:] / 2, price[-1:] / 2)
+        self._add(self._pieces.slack, step, slack[:-1], self.regularisers.excess * price, price)
+        self._add(self._pieces.slack, last, slack[-1:], price[-1:] / 2, price[-1:] / 2)
 
     def _finish(self) -> None:
         """Dynamics, bounds and the assembly."""
         p, w, reg, layout = self.problem, self.problem.weights, self.regularisers, self.layout
         n = p.steps
-        dynamics = np.append(np.full(n, STATE), 0)
+        dynamics = np.append(layout.states[1:], 0)
         first_row = np.concatenate([[0], np.cumsum(dynamics + self.path_rows)])
         total = int(first_row[-1])
         blocks = [
@@ -244,20 +332,32 @@ class Program:
                 continue
             limbs = np.nonzero(p.active[step])[1].reshape(-1, contacts)
             wrench = indices(layout.wrench[step[:, None], limbs].ravel(), WRENCH).reshape(len(step), -1)
-            variables = np.concatenate([self._state(step), wrench, self._state(step + 1)], 1)
+            variables = [self._state(step), wrench, self._state(step + 1)]
             rotation = p.rotation[step[:, None], limbs].reshape(len(step), contacts, 9)
-            pose = np.concatenate([rotation, p.position[step[:, None], limbs]], 2).reshape(len(step), -1)
+            pose = [rotation, p.position[step[:, None], limbs]]
+            if layout.moving:
+                foot = limbs < len(FEET)
+                pose.append(foot[..., None].astype(float))
+                variables += [layout.pair(step, np.where(foot, limbs, 0)[:, k]) for k in range(contacts)]
+            variables = np.concatenate(variables, 1)
+            pose = np.concatenate(pose, 2).reshape(len(step), -1)
             parameters = np.concatenate([p.dt[step, None], pose, weights[step], height[step + 1, None]], 1)
             rows = first_row[step][:, None] + np.arange(STATE)
-            blocks.append(Block(pieces().stage[contacts], variables, rows, parameters))
+            blocks.append(Block(self._pieces.stage[contacts], variables, rows, parameters))
+        for which, variables in self._carried:
+            rows = first_row[:n, None] + STATE + 2 * which + np.arange(2)
+            blocks.append(Block(self._pieces.carry, variables, rows, np.zeros((n, 0))))
         self.assembly = Assembly(blocks, layout.size, total)
         self.row_bounds = np.stack([np.zeros(total), np.full(total, np.inf)], 1)
         for stage in range(n):
-            self.row_bounds[first_row[stage] : first_row[stage] + STATE] = 0.0
+            self.row_bounds[first_row[stage] : first_row[stage] + dynamics[stage]] = 0.0
         for stage, rows, bound in self._bounds:
             self.row_bounds[first_row[stage[0]] + dynamics[stage[0]] + rows[0]] = bound
         self.variable_bounds = np.stack([np.full(layout.size, -np.inf), np.full(layout.size, np.inf)], 1)
         self.variable_bounds[layout.slack, 0] = 0.0
+        for item in self.landings or ():
+            at = layout.landing[item.step] + np.arange(2)
+            self.variable_bounds[at] = np.stack([item.lower, item.upper], 1)
         step, limb = np.nonzero(p.active)
         self.variable_bounds[indices(layout.wrench[step, limb] + WRENCH, 2), 0] = 0.0
         normal = layout.wrench[step, limb] + 2

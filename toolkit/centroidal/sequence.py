@@ -8,6 +8,7 @@ far (its problem's margins). Solved by Fatrop, which exploits the stages; by Ipo
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import casadi as ca
@@ -18,10 +19,11 @@ from toolkit.centroidal.build import ProblemConfig, sequence_problem
 from toolkit.centroidal.layout import indices
 from toolkit.centroidal.pieces import WRENCH, G
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem, Margins
-from toolkit.centroidal.program import Program, Regularisers
+from toolkit.centroidal.program import Landing, Program, Regularisers
 from toolkit.centroidal.verdict import judged
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.errors import InputError
+from toolkit.geometry.limb import FEET
 from toolkit.robot.model import RobotModel
 
 WANTED = Margins(friction=0.66, cop=(0.055, 0.045), yaw=0.6)
@@ -42,14 +44,16 @@ class SequenceConfig:
         regularisers: small terms beside the paper's objective.
         solver: "fatrop" (Ipopt is tried where it fails) or "ipopt".
         max_iterations: of either solver.
+        landing_iterations: of either solver, where landing points move.
         tolerance: of either solver; its constraints are met to about this.
     """
 
-    problem: ProblemConfig = field(default_factory=lambda: ProblemConfig(margins=WANTED))
+    problem: ProblemConfig = field(default_factory=lambda: ProblemConfig(margins=WANTED, min_dt=0.02))
     body: BodyMargins = WANTED_BODY
     regularisers: Regularisers = field(default_factory=Regularisers)
     solver: str = "fatrop"
     max_iterations: int = 70
+    landing_iterations: int = 150
     tolerance: float = 1e-4
 
 
@@ -61,6 +65,7 @@ def optimise(
     *,
     config: SequenceConfig = SequenceConfig(),
     warm: CentroidalMotion | None = None,
+    room: np.ndarray | None = None,
 ) -> CentroidalMotion:
     """Optimise the motion of a whole schedule, which ends at rest.
 
@@ -72,6 +77,9 @@ def optimise(
         config: see the class.
         warm: a motion to start the solver from, of any schedule; it is sampled in time. Saves about a third of the
             iterations where little has changed.
+        room: (transitions, 2, 2) m; lowest and highest displacement of each transition's contact along its own axes,
+            where feet may land elsewhere; the motion's problem has the contacts where they landed. As planned where
+            None.
 
     Returns:
         The motion. Feasible where NumPy confirms it within `motion.problem.margins` and the body's limits; else
@@ -82,7 +90,8 @@ def optimise(
     """
     start = time.perf_counter()
     problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem)
-    motion = optimise_problem(robot, problem, config=config, warm=warm)
+    landings = None if room is None else _landings(problem, schedule, room)
+    motion = optimise_problem(robot, problem, config=config, warm=warm, landings=landings)
     ends = np.array([phase.end for phase in schedule.phases])
     status = motion.status
     if "at knot" in status:
@@ -100,10 +109,13 @@ def optimise_problem(
     *,
     config: SequenceConfig = SequenceConfig(),
     warm: CentroidalMotion | None = None,
+    landings: Sequence[Landing] | None = None,
 ) -> CentroidalMotion:
     """Optimise a problem whose margins are the wanted ones; as `optimise`."""
     start = time.perf_counter()
-    program = Program(problem, robot, config.body, config.regularisers)
+    if landings is not None:
+        config = replace(config, max_iterations=max(config.max_iterations, config.landing_iterations))
+    program = Program(problem, robot, config.body, config.regularisers, landings)
     if not np.isfinite(program.assembly.parameters).all():
         raise InputError("a contact pose, a friction coefficient or a timing of the sequence is not finite")
     x, status, iterations = _solve(program, _guess(program, warm), config.solver, config, warm is not None)
@@ -229,9 +241,36 @@ def _copy_wrenches(x: np.ndarray, program: Program, warm: CentroidalMotion) -> N
     x[indices(layout.wrench[step, limb], WRENCH)] = np.concatenate([force, moment], 1)
 
 
+def _landings(problem: CentroidalProblem, schedule: ContactSchedule, room: np.ndarray) -> list[Landing]:
+    """Where the feet of a schedule may land, given the room of each transition's contact."""
+    landings = []
+    for phase in schedule.phases:
+        if phase.swing is not None and phase.swing.is_foot:
+            step = int(np.searchsorted(problem.times, phase.start + 1e-9, side="right")) - 1
+            lower, upper = room[phase.transition]
+            landings.append(Landing(phase.swing, step, lower, upper))
+    return landings
+
+
+def _landed(program: Program, x: np.ndarray) -> CentroidalProblem:
+    """The problem with its contacts where the variables have them."""
+    p, layout = program.problem, program.layout
+    if not layout.moving:
+        return p
+    position, step = p.position.copy(), np.arange(p.steps)
+    for foot in FEET:
+        moved = np.einsum("tij,tj->ti", p.rotation[:, foot, :, :2], x[layout.pair(step, foot)])
+        on = p.active[:, foot]
+        position[on, foot] += moved[on]
+        held = np.maximum.accumulate(np.where(on, step, -1))  # in the air, the contact it left
+        position[held >= 0, foot] = position[held[held >= 0], foot]
+    shift = (position[-1, :2] - p.position[-1, :2]).mean(0)
+    return replace(p, position=position, final_center=p.final_center + shift)
+
+
 def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
     """The motion of the program's variables, its knots integrated exactly from the wrenches."""
-    p, layout = program.problem, program.layout
+    p, layout = _landed(program, x), program.layout
     n, weight = p.steps, p.mass * G
     local, moment = np.zeros((n, 4, 3)), np.zeros((n, 4, 3))
     step, limb = np.nonzero(p.active)

@@ -1,0 +1,138 @@
+"""Room of a contact: how far it may be displaced on its surface, where the optimiser chooses landing points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.stance import Contact
+from toolkit.geometry.pose import Pose
+from toolkit.robot.model import RobotModel
+from toolkit.world.polygon import region_of
+from toolkit.world.surface import Surface
+
+
+@dataclass(frozen=True)
+class RoomConfig:
+    """How far landing points may move.
+
+    Attributes:
+        reach: (2,) m; along and across the foot, each way.
+        margin: m; kept between a sole and the edge of its surface, or as much as the planned contact keeps.
+        gap: m; kept between a sole and the other one, or as much as the planned contacts keep.
+        step: m; the room is found in such steps.
+    """
+
+    reach: tuple[float, float] = (0.15, 0.04)
+    margin: float = 0.01
+    gap: float = 0.03
+    step: float = 0.01
+
+
+def landing_room(
+    robot: RobotModel, surfaces: Sequence[Surface], sequence: ContactSequence, config: RoomConfig = RoomConfig()
+) -> np.ndarray:
+    """Box of displacements along each new contact's own axes that keep a sole on its surface and off the other sole.
+
+    Args:
+        robot: sizes of the soles.
+        surfaces: of the world; contacts without one do not move.
+        sequence: planned contacts.
+        config: settings.
+
+    Returns:
+        (transitions, 2, 2) m; lowest and highest displacement along x and y; zeros for palms.
+    """
+    room = np.zeros((len(sequence.transitions), 2, 2))
+    stances = sequence.stances
+    for index, transition in enumerate(sequence.transitions):
+        contact = transition.contact
+        if contact is None or not contact.limb.is_foot or not 0 <= contact.surface < len(surfaces):
+            continue
+        other = stances[index][contact.limb.mirrored]
+        following = [item.contact for item in sequence.transitions[index + 1 :] if item.limb == other.limb]
+        box = np.stack([-np.array(config.reach), np.array(config.reach)])
+        for sole in (other, *following[:1]):
+            if sole is not None:
+                box = _apart(box, contact, sole, robot.half_sizes[contact.limb], config.gap)
+        room[index] = _inside(box, contact, surfaces[contact.surface], robot.half_sizes[contact.limb], config)
+    return room
+
+
+def _apart(box: np.ndarray, contact: Contact, sole: Contact, half_size: np.ndarray, gap: float) -> np.ndarray:
+    """The box without displacements towards another sole; the other one may come as far, so each gets half the way."""
+    local = contact.pose.inverse() @ sole.pose
+    corners = np.array([[a, b, 0.0] for a in (-1, 1) for b in (-1, 1)]) * np.append(half_size, 0.0)
+    points = (local @ corners)[:, :2]
+    ahead, behind = points.min(0) - half_size, -half_size - points.max(0)  # free way to the sole in + and - directions
+    box = box.copy()
+    # Feet pass each other: they stay apart across, and along as well where they are not.
+    for axis in (1,) if max(ahead[1], behind[1]) > 0.0 else (0, 1):
+        if ahead[axis] >= behind[axis]:
+            box[1, axis] = min(box[1, axis], max((ahead[axis] - gap) / 2, 0.0))
+        else:
+            box[0, axis] = max(box[0, axis], -max((behind[axis] - gap) / 2, 0.0))
+    return box
+
+
+def _inside(
+    box: np.ndarray, contact: Contact, surface: Surface, half_size: np.ndarray, config: RoomConfig
+) -> np.ndarray:
+    """The part of the box, grown evenly from zero, in which the sole stays on the surface's region."""
+    region = region_of(surface)
+    frame = surface.pose.inverse() @ contact.pose
+    shapely.prepare(region)
+
+    def holds(found: np.ndarray, margin: float) -> bool:
+        (x0, y0), (x1, y1) = found[0] - half_size - margin, found[1] + half_size + margin
+        swept = frame @ np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]])
+        return bool(region.covers(shapely.Polygon(swept[:, :2])))
+
+    found = np.zeros((2, 2))
+    margin = next((share * config.margin for share in (1.0, 0.5, 0.0) if holds(found, share * config.margin)), None)
+    if margin is None:
+        return found
+    growing = {(end, axis) for end in range(2) for axis in range(2)}
+    while growing:
+        for end, axis in sorted(growing):
+            wider = found.copy()
+            limit = box[end, axis]
+            wider[end, axis] = (
+                max(found[0, axis] - config.step, limit) if end == 0 else min(found[1, axis] + config.step, limit)
+            )
+            if wider[end, axis] == found[end, axis] or not holds(wider, margin):
+                growing.discard((end, axis))
+            else:
+                found = wider
+    return found
+
+
+def moved_sequence(
+    sequence: ContactSequence, schedule: ContactSchedule, times: np.ndarray, position: np.ndarray
+) -> ContactSequence:
+    """The sequence with its contacts where a motion has them.
+
+    Args:
+        sequence: as planned.
+        schedule: its schedule.
+        times: (N + 1,) s; knots of the motion.
+        position: (N, 4, 3) m; of the contacts in the motion's steps.
+
+    Returns:
+        The same transitions; surfaces, orientation and timing as planned.
+    """
+    transitions = []
+    for index, transition in enumerate(sequence.transitions):
+        contact = transition.contact
+        if contact is not None:
+            after = next(phase for phase in schedule.phases if phase.transition > index)
+            step = int(np.searchsorted(times, (after.start + after.end) / 2, side="right")) - 1
+            pose = Pose(contact.pose.rotation, position[step, contact.limb].copy())
+            transition = replace(transition, contact=replace(contact, pose=pose))
+        transitions.append(transition)
+    return ContactSequence(sequence.start, tuple(transitions))
