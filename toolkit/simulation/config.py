@@ -31,7 +31,10 @@ class ControllerConfig:
     Attributes:
         stance: a limb in contact is held still by its velocity only: where it rests is a measured fact.
         stance_palm_rotation: the same for the rotation of a palm, whose patch aligns itself with the surface.
-        swing, hand: a foot in the air; a palm that approaches or leaves its contact.
+        swing, swing_rotation: a foot in the air.
+        swing_share: part of a foot's weights that counts until it prepares to land: where its joints are too slow the
+            foot gives way, not the body.
+        hand: a palm that approaches or leaves its contact.
         com, base, posture: centre of mass, orientation of the base, joints; arms and trunk that follow momentum rather
             than the plan leave the way that was found clear.
         leg_posture: factor on the posture's weight for joints that carry a foot.
@@ -62,6 +65,8 @@ class ControllerConfig:
     stance: TaskGains = TaskGains(1e4, 0.0, 30.0)
     stance_palm_rotation: TaskGains = TaskGains(20.0, 0.0, 20.0)
     swing: TaskGains = TaskGains(200.0, 400.0, 40.0)
+    swing_rotation: TaskGains = TaskGains(20.0, 400.0, 40.0)
+    swing_share: float = 0.05
     hand: TaskGains = TaskGains(50.0, 200.0, 28.0)
     com: TaskGains = TaskGains(100.0, 60.0, 14.0)
     base: TaskGains = TaskGains(50.0, 100.0, 20.0)

@@ -200,7 +200,7 @@ class Controller:
         elif self.tracker.state[limb] is LimbState.FREE or targets.authority[limb] <= 0.0:
             return rows
         else:
-            linear = angular = gains.swing if limb.is_foot else gains.hand
+            linear, angular = (gains.swing, gains.swing_rotation) if limb.is_foot else (gains.hand, gains.hand)
         share = 1.0 if self.tracker.in_contact[limb] else targets.authority[limb]
         rows = self._append(limb, slice(0, 3), linear, share, rows)
         rows = self._append(limb, slice(3, 6), angular, share, rows)

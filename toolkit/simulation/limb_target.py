@@ -27,6 +27,7 @@ class LimbTargets:
 
     def __init__(self, reference: Reference, tracker: ContactTracker, config: ControllerConfig):
         self._reference, self._tracker, self._rest_speed = reference, tracker, config.rest_speed
+        self._swing_share = config.swing_share
         self.error, self.velocity, self.acceleration = np.zeros((4, 6)), np.zeros((4, 6)), np.zeros((4, 6))
         self.authority = np.ones(4)
         self.shift, self.shift_velocity = np.zeros((4, 3)), np.zeros((4, 3))
@@ -54,6 +55,9 @@ class LimbTargets:
             self.velocity[limb] = pace * reference.limb_velocity[row, limb]
             self.velocity[limb, :3] += self.shift_velocity[limb]
             self.acceleration[limb] = pace * pace * reference.limb_acceleration[row, limb]
+            if limb.is_foot and state is LimbState.SWING:
+                late = min(max((reference.times[row] - swing.start) / (swing.end - swing.start) - 0.5, 0.0) / 0.4, 1.0)
+                self.authority[limb] = self._swing_share + (1.0 - self._swing_share) * late * late * (3.0 - 2.0 * late)
             if state is LimbState.SEARCH and swing.contact is not None:
                 normal = swing.contact.pose.normal
                 target = target - tracker.depth[limb] * normal

@@ -25,6 +25,7 @@ from toolkit.wholebody.profile import Window
 from toolkit.wholebody.swing import rotation_exponential, rotation_vector
 
 OFFSET = Window(0.0, 0.6)  # of a palm's swing, over which it joins its path
+LEAVING, LANDING = Window(0.0, 0.2), Window(0.75, 1.0)  # of a foot's swing, near its contacts
 
 
 class WholeBodyIK:
@@ -181,15 +182,28 @@ class WholeBodyIK:
     def _set_targets(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> None:
         self.com.target_world = motion.sample(time)[0]
         self.momentum.L_world = momentum_at(motion, time)
-        heading = np.zeros(2)
+        heading, config = np.zeros(2), self.config
         for foot, task in self.feet.items():
             pose = paths.sample(foot, time).pose
             assert pose is not None
             task.T_world_frame = pose.matrix
+            air = self._air(foot, time, paths)
+            position = config.foot_position * (config.air_position / config.foot_position) ** air
+            orientation = config.foot_orientation * (config.air_orientation / config.foot_orientation) ** air
+            task.configure(foot.label, "soft", position, orientation)
             heading += np.array([np.cos(pose.yaw), np.sin(pose.yaw)])
         self.base.R_world_frame = rotation_about_z(np.arctan2(heading[1], heading[0]))
         for palm, tasks in self.palms.items():
             self._set_palm(palm, tasks, time, paths)
+
+    @staticmethod
+    def _air(foot: Limb, time: float, paths: LimbPaths) -> float:
+        """How far a foot is from its contacts, in [0, 1]: 0 at both ends of a swing, 1 in the middle."""
+        segment = paths.segment(foot, time)
+        if segment.path is None:
+            return 0.0
+        u = (time - segment.begin) / (segment.end - segment.begin)
+        return LEAVING.step(u)[0] - LANDING.step(u)[0]
 
     def _set_dampers(self, qpos: np.ndarray, angles: np.ndarray, reaching: set[Limb]) -> None:
         """Keep the arms clear of the world and the body."""

@@ -14,8 +14,10 @@ class IKConfig:
     Attributes:
         substeps: quadratic programs per sample of the trajectory.
         settle: iterations for the first sample.
-        foot_position, foot_orientation, com, palm_position, palm_normal, palm_twist, base: weights per squared m or
-            rad.
+        foot_position, foot_orientation: weights per squared m or rad of a foot in contact.
+        air_position, air_orientation: the same in the middle of a swing: where joints are too slow the foot gives way,
+            not the base.
+        com, palm_position, palm_normal, palm_twist, base: weights per squared m or rad.
         arms, trunk, legs, rest: weights per squared rad of a tick's deviation from the eased return to the home
             posture; the trunk is what carries both arms, the rest is a head and the like.
         posture_time: s; time constant of that return.
@@ -35,11 +37,13 @@ class IKConfig:
     settle: int = 200
     foot_position: float = 1e6
     foot_orientation: float = 1e5
+    air_position: float = 1e4
+    air_orientation: float = 30.0
     com: float = 1e5
     palm_position: float = 1e5
     palm_normal: float = 1e4
     palm_twist: float = 0.1
-    base: float = 1.0
+    base: float = 3.0
     arms: float = 1.5
     trunk: float = 5.0
     legs: float = 0.01

@@ -58,8 +58,10 @@ def _raises(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float
     climb = float(task.end.position[2] - task.start.position[2])
     climb += config.foot_lift * float(task.end.normal[2] - task.start.normal[2])
     up, down = max(climb, 0.0), max(-climb, 0.0)
-    shares = np.linspace(0.0, 1.0, 1 + min(4, int(np.ceil(abs(climb) / config.raise_step)))).tolist()
-    yield from ((share * up, share * down) for share in shares)
+    # Small raises first, whatever the climb: along a slope they are all it takes.
+    small = [step for step in steps[:5] if step < abs(climb)]
+    heights = sorted({*small, *np.linspace(0.0, abs(climb), 1 + min(4, int(np.ceil(abs(climb) / config.raise_step))))})
+    yield from ((min(height, up), min(height, down)) for height in heights)
     yield from ((up + step, down + step) for step in steps[1:])
 
 
@@ -72,13 +74,15 @@ def _path(
     onto = np.zeros(3) if task.free_end else -lift * task.end.normal
     up = np.array([0.0, 0.0, 1.0]) if task.is_foot else _outward(task)
     travel = task.end.position - task.start.position - off - onto - (before - after) * up
-    across = _across(float(np.linalg.norm(travel)) / task.duration, timing.across, config)
+    speed = float(np.linalg.norm(travel)) / task.duration
+    across = _hastened(speed, timing.across, config.fast_across, config)
+    land = _hastened(speed, timing.land, config.fast_land, config) if task.is_foot else timing.land
     moves = [
         Move(off, timing.leave),
         Move(before * up, timing.rise),
         Move(travel, across),
         Move(-after * up, timing.descend),
-        Move(onto, timing.land),
+        Move(onto, land),
         Move(bump, across, returns=True),
     ]
     moves = tuple(move for move in moves if np.any(move.vector))
@@ -113,7 +117,10 @@ def _pitch(task: SwingTask, config: SwingConfig) -> float:
         return 0.0
     trail = (task.other[0].position - task.start.position) @ task.start.rotation[:, 0]
     ahead = (task.end.position - task.start.position) @ task.start.rotation[:, 0]
-    return float(np.clip(config.pitch_gain * (min(trail, ahead) - config.pitch_from), 0.0, config.max_pitch))
+    # Fast swings leave the ankle no time for more than its range demands.
+    speed = float(np.linalg.norm(task.end.position - task.start.position)) / task.duration
+    gain = config.pitch_gain * (1.0 - _haste(speed, config))
+    return float(np.clip(gain * (min(trail, ahead) - config.pitch_from), 0.0, config.max_pitch))
 
 
 def _outward(task: SwingTask) -> np.ndarray:
@@ -125,10 +132,14 @@ def _outward(task: SwingTask) -> np.ndarray:
     return outward / length if length > 1e-3 else np.array([0.0, 0.0, 1.0])
 
 
-def _across(speed: float, slow: Window, config: SwingConfig) -> Window:
-    """Window of the crossing: fast swings take all the time there is, to keep the peak velocity low."""
-    share = min(max((speed - config.slow) / (config.fast - config.slow), 0.0), 1.0)
-    fast = config.fast_across
+def _haste(speed: float, config: SwingConfig) -> float:
+    """0 for slow swings, 1 for fast ones."""
+    return min(max((speed - config.slow) / (config.fast - config.slow), 0.0), 1.0)
+
+
+def _hastened(speed: float, slow: Window, fast: Window, config: SwingConfig) -> Window:
+    """Window between those of slow and of fast swings."""
+    share = _haste(speed, config)
     return Window(slow.start + share * (fast.start - slow.start), slow.end + share * (fast.end - slow.end))
 
 
@@ -154,8 +165,8 @@ def _swept_boxes(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres (k, 3), rotations (k, 3, 3), half sizes (k, 3) of the patch, thickened and padded, along a path.
 
-    The padding below fades to nothing at the surfaces that the path leaves and reaches; the padding at the sides is
-    what is free there, and grows with the way from there.
+    The padding below fades to nothing at the surfaces that the path leaves and reaches, with the patch's lowest edge;
+    the padding at the sides is what is free there, and grows with the way from there.
     """
     length = sum(np.linalg.norm(move.vector) for move in path.moves)
     count = max(config.samples, int(np.ceil(2.0 * length / config.spacing)) + 1)  # twice as fast in the middle
@@ -171,7 +182,8 @@ def _swept_boxes(
         way = points - pose.position
         height = way @ pose.normal
         along = np.linalg.norm(way - height[:, None] * pose.normal, axis=1)
-        below[half_of_swing] = np.minimum(below, 0.5 * height)[half_of_swing]
+        lowest = height - np.abs(np.einsum("kij,i->kj", rotations[:, :, :2], pose.normal)) @ task.half_size
+        below[half_of_swing] = np.minimum(below, 0.5 * lowest)[half_of_swing]
         aside[half_of_swing] = np.minimum(aside, side + along)[half_of_swing]
     below = np.maximum(below, 0.0)
     half = np.empty((count, 3))

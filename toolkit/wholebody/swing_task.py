@@ -39,7 +39,9 @@ class SwingConfig:
         detour_step, max_detour: m; the same for the sideways detour around the standing foot.
         easy, steep: timing for the open, and timing that rises first, crosses then, and descends last.
         easy_raise: m; paths raised by more than that are first tried with the steep timing.
-        fast_across: window of the crossing for swings faster than `fast`.
+        fast_across, fast_land: windows of the crossing and the landing of feet that swing faster than `fast`: nearly
+            all the time there is, to keep the peak velocity low, but the foot comes to rest along the surface before
+            it meets it.
         slow, fast: m/s; mean speed up to which the window of the crossing is kept, and from which it is `fast_across`.
         pitch_gain, pitch_from, max_pitch: rad/m, m, rad; a foot that trails the standing one by more than `pitch_from`
             pitches its toes down in proportion, and more where the ankle's range asks for it.
@@ -63,7 +65,8 @@ class SwingConfig:
     easy: SwingTiming = EASY
     steep: SwingTiming = STEEP
     easy_raise: float = 0.04
-    fast_across: Window = Window(0.0, 1.0)
+    fast_across: Window = Window(0.02, 0.95)
+    fast_land: Window = Window(0.7, 1.0)
     pitch_gain: float = 1.5
     pitch_from: float = 0.2
     max_pitch: float = 0.9
