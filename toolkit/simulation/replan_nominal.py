@@ -190,7 +190,8 @@ def _body_rows(motion: CentroidalMotion, robot: RobotModel, config: ReplanConfig
         tables.append((np.repeat(at, count), np.full(len(at) * count, limb), value.ravel(), gradient))
 
     reach = ReachMargins(length=body.length, ankle=body.ankle, hip=body.hip)
-    swing_knots, swing_limbs, tips = swing_ankles(problem)
+    in_air, delays, feet, ankles, _ = swing_ankles(problem)
+    swing_knots, swing_limbs, tips = (each[delays == 0.0] for each in (in_air, feet, ankles))
     for limb in FEET:
         leg, here = robot.legs[limb], limbs == limb
         at, position, rotation = knots[here], positions[here], rotations[here]
