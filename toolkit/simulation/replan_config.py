@@ -12,7 +12,9 @@ class ReplanConfig:
     """The centroidal motion is optimised again over the next contacts from the measured state.
 
     Attributes:
-        enabled: whether that is done at all.
+        enabled: whether that is done at all...
+        max_friction: ... where the plan keeps to this part of the friction: a descent at the limit of friction has nothing
+            left to correct with, and was better followed as planned.
         period: s between replans.
         horizon: s that a replan looks ahead.
         max_dt: s; longest step of its grid.
@@ -41,6 +43,7 @@ class ReplanConfig:
     """
 
     enabled: bool = True
+    max_friction: float = 0.9
     period: float = 0.04
     horizon: float = 1.6
     max_dt: float = 0.1

@@ -82,7 +82,7 @@ def execute(
     paths = limb_paths(robot, world, schedule, motion) if paths is None else paths
     reference = sample_reference(period * np.arange(ticks), sequence, schedule, motion, trajectory, paths, robot)
     replanner = None
-    if config.replanning.enabled:
+    if config.replanning.enabled and motion.problem.margins.friction <= config.replanning.max_friction:
         nominal = Nominal.of(motion, reference.swings, robot, config.replanning)
         replanner = Replanner(reference, nominal, robot, world.surfaces, config.replanning)
     controller = Controller(robot, reference, motion.problem.margins, config, replanner)
