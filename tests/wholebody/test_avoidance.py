@@ -77,3 +77,25 @@ def test_arms_are_drawn_in_beside_a_wall(robot, flat_walk, hand):
     assert hit is not None and "world/wall" in hit.text
     drawn_in = solve_ik(robot, paths, flat_walk.motion, times, IKConfig(), world)
     assert first_collision(robot, world, times, drawn_in, CollisionConfig()) is None
+
+
+def test_boxes_are_seen_edge_to_edge(robot, hand):
+    """A box whose edge points at the hand, where MuJoCo's collision of boxes with a margin finds nothing."""
+    place = f"{hand[0]} {hand[1] + 0.3} {hand[2]}"
+    world = world_of(f'<geom name="post" type="box" size="0.15 0.15 0.02" pos="{place}" euler="30 20 45"/>')
+    avoidance = ArmAvoidance(robot, world, CONFIG)
+    avoidance._place(robot.home)
+    model, data, post = avoidance.model, avoidance.data, avoidance.model.geom("world/post").id
+    pairs = avoidance._box_pairs()
+    seen = {first: (distance, normal) for first, second, distance, normal, _ in pairs if second == post}
+    boxes = [g for g in np.flatnonzero(avoidance.arm_of >= 0) if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX]
+    if not boxes:
+        pytest.skip("arms without boxes")
+    for geom in boxes:
+        distance = mujoco.mj_geomDistance(model, data, int(geom), post, 1.0, None)
+        assert (geom in seen) == (distance < CONFIG.notice)
+        if geom in seen:
+            assert seen[geom][0] == pytest.approx(distance, abs=1e-6)
+            np.testing.assert_allclose(np.linalg.norm(seen[geom][1]), 1.0, atol=1e-6)
+            assert seen[geom][1] @ (data.geom_xpos[post] - data.geom_xpos[geom]) > 0.0
+    assert seen

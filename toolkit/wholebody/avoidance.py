@@ -63,6 +63,9 @@ class ArmAvoidance:
         self.model.geom_margin[:] = 0.0
         self.model.geom_gap[:] = 0.0
         self.model.geom_margin[self.arm_of >= 0] = config.notice
+        self.box = self.model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
+        solid = self.box & ((self.model.geom_contype != 0) | (self.model.geom_conaffinity != 0))
+        self.boxes, self.arm_boxes = np.flatnonzero(solid), np.flatnonzero(solid & (self.arm_of >= 0))
         self.near = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
         self.resting = self._pairs_below(robot.home, config.safe_self)
 
@@ -106,15 +109,30 @@ class ArmAvoidance:
         mujoco.mj_collision(self.model, self.data)
 
     def _contacts(self):
-        """Pairs of geoms within `notice`: the nearest point of each pair of geoms."""
+        """Pairs of geoms within `notice`: geoms, distance, normal from first to second, nearest point of each pair."""
         contact = self.data.contact
         nearest: dict[tuple[int, int], int] = {}
         for index, (first, second) in enumerate(contact.geom.tolist()):
+            if self.box[first] and self.box[second]:
+                continue
             kept = nearest.get((first, second))
             if kept is None or contact.dist[index] < contact.dist[kept]:
                 nearest[first, second] = index
         for (first, second), index in nearest.items():
             yield first, second, float(contact.dist[index]), contact.frame[index, :3], contact.pos[index]
+        yield from self._box_pairs()
+
+    def _box_pairs(self):
+        """The same for boxes, whose collision function sees pairs apart only face to face, not edge to edge."""
+        model, data, notice = self.model, self.data, self.config.notice
+        others, ends = self.boxes, np.zeros(6)
+        for arm in self.arm_boxes:
+            apart = np.linalg.norm(data.geom_xpos[others] - data.geom_xpos[arm], axis=1)
+            near = apart < notice + model.geom_rbound[others] + model.geom_rbound[arm]
+            for other in others[near & (self.arm_of[others] != self.arm_of[arm])].tolist():
+                distance = mujoco.mj_geomDistance(model, data, int(arm), other, notice, ends)
+                if distance < notice and abs(distance) > 1e-9:
+                    yield int(arm), other, distance, (ends[3:] - ends[:3]) / distance, 0.5 * (ends[:3] + ends[3:])
 
     def _ignored(self, first: int, second: int, reaching: set[Limb]) -> bool:
         if self.arm_of[first] < 0 and self.arm_of[second] < 0:
