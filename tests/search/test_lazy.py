@@ -154,7 +154,7 @@ def test_a_second_evaluator_has_its_say_where_ground_is_slippery(robot):
         second = Counting(robot)
         planner = ContactPlanner(robot, make_world(*geoms, goal=(1.0, 0, 0)), Timid(robot, second), longer)
         result = planner.search(np.random.default_rng(0), 60.0)
-        assert (second.asked > 0) == asked
+        assert (second.asked > 1) == asked  # once to warm up
         assert not asked or result.solutions
 
 
@@ -179,4 +179,4 @@ def test_the_stand_in_judges_timings_that_were_not_trained(robot):
         result = ContactPlanner(robot, world, evaluator, ENDLESS).search(np.random.default_rng(0), 60.0)
         assert result.solutions
         assert ("outside what the networks were trained for" in result.warning) == strange
-        assert (stand_in.asked > 0) == strange and (evaluator.asked == 1) == strange
+        assert (stand_in.asked > 1) == strange and (evaluator.asked == 1) == strange  # once to warm up

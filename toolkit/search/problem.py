@@ -125,7 +125,7 @@ class ContactProblem:
         self._candidates = CandidateGenerator(
             moves, table, limbs, timings, config.swing_speed, exclusions, self.rejected
         )
-        self._reach = ReachCheck(robot, moves.legs, moves.shanks, table, limbs, timings, reach)
+        self._reach = ReachCheck(robot, moves.legs, moves.shanks, moves.arms, table, limbs, timings, reach)
         self._drift = Drift(robot, table, timings)
         self._durations = np.array([item.shift + item.swing for item in timings])
         numbers = np.full((1, 4), -1)
@@ -133,7 +133,7 @@ class ContactProblem:
             numbers[0, contact.limb] = table.add_contact(contact)
         self._start = pack(numbers, np.array([-1]), com[None], np.zeros((1, 3)))[0]
         self.deadline = np.inf
-        self._pace = 0.0  # s per transition of the last query
+        self._pace: dict[int, float] = {}  # s per transition of the last query, by the evaluator's id
 
     def start(self) -> bytes:
         """See `SearchProblem`."""
@@ -227,10 +227,10 @@ class ContactProblem:
             )
         ]
         began = time.perf_counter()
-        if began + self._pace * len(transitions) > self.deadline:
+        if began + self._pace.get(id(evaluator), 0.0) * len(transitions) > self.deadline:
             return None
         batch = evaluator.evaluate(self._stance(_before(row)), com, velocity, transitions)
-        self._pace = (time.perf_counter() - began) / len(transitions)
+        self._pace[id(evaluator)] = (time.perf_counter() - began) / len(transitions)
         codes = np.where(batch.feasible, 0, screen.DYNAMICS)
         rows = np.flatnonzero(batch.feasible)
         if len(rows):
