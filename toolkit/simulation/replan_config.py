@@ -13,8 +13,8 @@ class ReplanConfig:
 
     Attributes:
         enabled: whether that is done at all...
-        max_friction: ... where the plan keeps to this part of the friction: a descent at the limit of friction has nothing
-            left to correct with, and was better followed as planned.
+        max_friction: ... where the plan keeps to this part of the friction: a descent at the limit of friction has
+            nothing left to correct with, and was better followed as planned.
         period: s between replans.
         horizon: s that a replan looks ahead.
         max_dt: s; longest step of its grid.
