@@ -94,7 +94,7 @@ def arm_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> ArmG
         RobotError: fewer than four joints between the trunk and the palm.
     """
     site = model.site(limb.label).id
-    joints = _arm_joints(model, limb)
+    joints = arm_joints(model, limb)
     if len(joints) < 4:
         raise RobotError(
             f"{limb.label}: {len(joints)} joints between the trunk and the palm; an arm needs four or more"
@@ -155,7 +155,7 @@ def _chain(model: mujoco.MjModel, body: int) -> list[int]:
     return joints
 
 
-def _arm_joints(model: mujoco.MjModel, limb: Limb) -> list[int]:
+def arm_joints(model: mujoco.MjModel, limb: Limb) -> list[int]:
     """Joints from the trunk to a palm.
 
     The trunk is the first body above the palm that carries another limb, or that carries other joints (a head, an arm

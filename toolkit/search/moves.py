@@ -6,10 +6,12 @@ computed once and looked up afterwards.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.contacts.arm_map import ArmMap
 from toolkit.contacts.projection import Projector
 from toolkit.contacts.reach import ReachMargins
 from toolkit.contacts.transition_model import TransitionModel
@@ -76,6 +78,7 @@ class MoveGenerator:
         occupancy: of the world.
         box: the body.
         config: limits.
+        arms: where each arm can hold its palm.
 
     Attributes:
         legs: both legs with the margins of the search.
@@ -92,9 +95,10 @@ class MoveGenerator:
         occupancy: Occupancy,
         box: BodyBox,
         config: MoveConfig,
+        arms: Mapping[Limb, ArmMap],
     ):
         self._robot, self._projector, self._table, self._model = robot, projector, table, model
-        self._occupancy, self._config = occupancy, config
+        self._occupancy, self._config, self.arms = occupancy, config, arms
         leg = robot.legs[Limb.LEFT_FOOT]
         self._climb = config.climb * (leg.thigh + leg.shin)
         self.legs, self.shanks = legs_of(robot, config.margins), shanks_of(robot)
@@ -227,6 +231,10 @@ class MoveGenerator:
             config.palm_side,
             float(np.cos(config.palm_angle)),
         )
+        relative, normals = (palms.position - shoulder) @ turn, palms.rotation[:, :, 2] @ turn
+        open_palms = np.flatnonzero(codes == 0)
+        served = self.arms[limb].serves(relative[open_palms], normals[open_palms])
+        codes[open_palms[~served]] = screen.FACING
         numbers = table.add(limb, palms.select(codes == 0))
         return Moves(np.unique(numbers), _count(codes))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from toolkit.contacts.arm_map import ArmMap
 from toolkit.contacts.projection import Projected, ProjectionConfig, Projector
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Stance
@@ -116,6 +117,8 @@ class ContactPlanner:
         )
         self._terrain = TerrainDistance(robot, world, self._projector, grid)
         self._timings = self.config.timings or (world.timing,)
+        walls = self.config.palms and bool(self._projector.table.palm.any())
+        self._arms = {limb: ArmMap.of(robot, limb) for limb in robot.arms if walls}
         self._warm_up()
 
     def _warm_up(self) -> None:
@@ -263,6 +266,7 @@ class ContactPlanner:
             terrain.occupancy,
             terrain.box,
             self.config.moves,
+            self._arms,
         )
         return moves, table
 

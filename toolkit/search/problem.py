@@ -125,7 +125,7 @@ class ContactProblem:
         self._candidates = CandidateGenerator(
             moves, table, limbs, timings, config.swing_speed, exclusions, self.rejected
         )
-        self._reach = ReachCheck(robot, moves.legs, moves.shanks, table, limbs, timings, reach)
+        self._reach = ReachCheck(robot, moves.legs, moves.shanks, moves.arms, table, limbs, timings, reach)
         self._drift = Drift(robot, table, timings)
         self._durations = np.array([item.shift + item.swing for item in timings])
         numbers = np.full((1, 4), -1)

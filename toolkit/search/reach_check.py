@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.contacts.arm_map import ArmMap
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
@@ -26,17 +27,12 @@ class ReachConfig:
         com_drops: m; the predicted CoM may be lower by any of these for the legs to reach.
         lift_off: parts of the shift time at whose CoM the legs may reach at lift-off, since when the CoM moves is the
             optimiser's choice.
-        arm_slack: m; a palm may come nearer to the shoulder than the arm's least reach by this much.
-        arm_margin: m; an arm in contact reaches so much less far than it could: where the shoulder is depends on how the
-            torso leans and on what the arms weigh.
-        arm_behind: m; a palm in contact may lie so far behind its shoulder.
+        arm_margin: m; an arm in contact reaches so much less far than it could, since the CoM moves in between.
     """
 
     com_drops: tuple[float, ...] = (0.0, 0.03, 0.06, 0.1)
     lift_off: tuple[float, ...] = (1.0, 0.5)
-    arm_slack: float = 0.03
     arm_margin: float = 0.05
-    arm_behind: float = 0.2
 
 
 class ReachCheck:
@@ -46,6 +42,7 @@ class ReachCheck:
         robot: the robot.
         legs: its legs with the margins of the search.
         shanks: capsules inside them.
+        arms: where each arm can hold its palm.
         table: contacts.
         palms: in use.
         timings: to choose from.
@@ -57,13 +54,14 @@ class ReachCheck:
         robot: RobotModel,
         legs: Legs,
         shanks: Shanks,
+        arms: Mapping[Limb, ArmMap],
         table: ContactTable,
         palms: Sequence[Limb],
         timings: tuple[Timing, ...],
         config: ReachConfig,
     ):
         self._robot, self._legs, self._shanks, self._table = robot, legs, shanks, table
-        self._palms, self._config = palms, config
+        self._palms, self._config, self._arms = palms, config, arms
         self._drops = np.array(config.com_drops)
         self._shift = np.array([item.shift for item in timings])
         self._total = self._shift + np.array([item.swing for item in timings])
@@ -109,11 +107,14 @@ class ReachCheck:
                 c, s = np.cos(candidates.yaw[held]), np.sin(candidates.yaw[held])
                 x, y, z = arm.shoulder_in_com
                 shoulder = end[held] + np.stack([c * x - s * y, s * x + c * y, np.full(len(held), z)], axis=-1)
-                reach = table.position[after[held, palm]] - shoulder
-                distance, ahead = np.linalg.norm(reach, axis=1), c * reach[:, 0] + s * reach[:, 1]
-                limits = self._config
-                beyond = (distance < arm.min_reach - limits.arm_slack) | (distance > arm.max_reach - limits.arm_margin)
-                codes[held[beyond | (ahead < -limits.arm_behind)]] = screen.ARM
+                reach, normal = table.position[after[held, palm]] - shoulder, table.rotation[after[held, palm], :, 2]
+                forward = np.stack([c, s, np.zeros_like(c)], axis=-1)
+                left, up = np.stack([-s, c, np.zeros_like(c)], axis=-1), np.array([0.0, 0.0, 1.0])
+                axes = (forward, left, np.broadcast_to(up, forward.shape))
+                local = [np.stack([(rows * axis).sum(1) for axis in axes], axis=-1) for rows in (reach, normal)]
+                distance, margin = np.linalg.norm(reach, axis=1), self._config.arm_margin
+                within = (distance > arm.min_reach + margin / 2) & (distance < arm.max_reach - margin)
+                codes[held[~(within & self._arms[palm].serves(*local))]] = screen.ARM
         return codes
 
     def _violated(self, com: np.ndarray, yaw: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -12,9 +12,11 @@ import mujoco
 import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.contacts.arm_map import ArmMap
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose, rotation_about_z
+from toolkit.robot.geometry import arm_joints
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
 from toolkit.wholebody.avoidance import ArmAvoidance
@@ -45,6 +47,8 @@ class WholeBodyIK:
         self.order = pinocchio_map(robot, self.wrapper.model)
         self.solver = self.wrapper.make_solver()
         self.solver.dt = tick
+        self.maps: dict[Limb, ArmMap] = {}
+        self.reaching: dict[Limb, tuple] = {}
         self.home = dict(zip(robot.joint_names, robot.home[7:], strict=True))
         self._set_limits()
         self._add_tasks()
@@ -98,6 +102,10 @@ class WholeBodyIK:
         both = set.intersection(*reaching) if len(reaching) == 2 else set()
         arms = set().union(*reaching) - both - legs
         names = {limb: [model.joint(joint).name for joint in chains[limb] if joint in arms] for limb in self.palms}
+        self.map_joints = {
+            limb: [self.robot.joint_names.index(model.joint(joint).name) for joint in arm_joints(model, limb)]
+            for limb in self.palms
+        }
         self.arm_joints = {limb: [self.robot.joint_names.index(name) for name in row] for limb, row in names.items()}
         groups: dict[float, list[str]] = {}
         for joint in range(1, model.njnt):
@@ -150,7 +158,7 @@ class WholeBodyIK:
         angles = self.joints
         self._set_targets(time, paths, motion)
         self._set_ranges(angles, [palm for palm in self.palms if paths.authority(palm, time) == 0.0])
-        step = self._ease * (self.robot.home[7:] - angles)
+        step = self._ease * (self._posture(time, angles, paths, motion) - angles)
         step = (step + self.config.inertia * self.last_step) / (1.0 + self.config.inertia)
         targets = dict(zip(self.robot.joint_names, angles + step, strict=True))
         for task, names, _ in self.postures:
@@ -161,6 +169,36 @@ class WholeBodyIK:
         self._solve(time)
         self.drift, self.last_step = self._base_motion(before), self.joints - angles
         return self.order.qpos_from_q(self.wrapper.state.q)
+
+    def _posture(
+        self, time: float, angles: np.ndarray, paths: LimbPaths, motion: CentroidalMotion
+    ) -> np.ndarray:
+        """(n,) rad; where joints tend to: home, and for an arm that holds or reaches a contact what suits that."""
+        posture = self.robot.home[7:].copy()
+        for palm in self.palms:
+            segment = paths.segment(palm, time)
+            if (segment.path is None and segment.pose is None) or segment.free_end:
+                self.reaching.pop(palm, None)
+                continue
+            if segment.path is not None and self.reaching.get(palm, (None,))[0] is not segment:
+                self.reaching[palm] = segment, self._arm_posture(palm, segment.end, angles, paths, motion)
+            if palm in self.reaching:
+                posture[self.map_joints[palm]] = self.reaching[palm][1]
+        return posture
+
+    def _arm_posture(
+        self, palm: Limb, time: float, angles: np.ndarray, paths: LimbPaths, motion: CentroidalMotion
+    ) -> np.ndarray:
+        """(k,) rad; joints of an arm that make the contact at a time, with the trunk upright."""
+        pose = paths.sample(palm, time).pose
+        feet = [paths.sample(foot, time).pose for foot in FEET]
+        assert pose is not None and all(foot is not None for foot in feet)
+        heading = np.sum([[np.cos(foot.yaw), np.sin(foot.yaw)] for foot in feet if foot is not None], axis=0)
+        turn = rotation_about_z(np.arctan2(heading[1], heading[0]))
+        if palm not in self.maps:
+            self.maps[palm] = ArmMap.of(self.robot, palm)
+        relative = turn.T @ (pose.position - motion.sample(time)[0]) - self.robot.arms[palm].shoulder_in_com
+        return self.maps[palm].posture(relative, turn.T @ pose.normal, angles[self.map_joints[palm]])
 
     @property
     def joints(self) -> np.ndarray:

@@ -43,7 +43,7 @@ class IKConfig:
     palm_position: float = 1e5
     palm_normal: float = 1e4
     palm_twist: float = 0.1
-    base: float = 3.0
+    base: float = 10.0
     arms: float = 1.5
     trunk: float = 5.0
     legs: float = 0.01

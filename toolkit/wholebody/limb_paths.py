@@ -25,6 +25,9 @@ from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
 
 
+LEADING = 0.4  # authority of a palm's path in its middle
+
+
 class LimbSample(NamedTuple):
     """A limb's patch at one time.
 
@@ -95,13 +98,15 @@ class LimbPaths:
         segment = self.segment(limb, time)
         if segment.path is None:
             return 0.0 if segment.pose is None else 1.0
+        if limb.is_foot:
+            return 1.0
+        # In between, a palm's path only leads: it may neither drag the trunk along nor twist the arm.
         u = (time - segment.path.begin) / segment.path.duration
-        value = 1.0
-        if segment.free_start:
-            value *= Window(0.0, 0.5).step(u)[0]
-        if segment.free_end:
-            value *= 1.0 - Window(0.5, 1.0).step(u)[0]
-        return value
+        if u < 0.5:
+            left = Window(0.0, 0.3).step(u)[0]
+            return LEADING * left if segment.free_start else 1.0 - (1.0 - LEADING) * left
+        near = Window(0.5, 0.95).step(u)[0]
+        return LEADING * (1.0 - near) if segment.free_end else LEADING + (1.0 - LEADING) * near
 
     @property
     def blocked(self) -> tuple[tuple[Limb, int], ...]:

@@ -1,0 +1,107 @@
+"""ArmMap: where, and facing which way, a palm can be held with an upright trunk and joints off the ends of their ranges.
+
+A distance to the shoulder says little: near the trunk the elbow is at its end, and a wrist turns a palm only so far.
+The map holds what the arm does at evenly spread joint angles; a palm is served if one of them comes near to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import mujoco
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.stats import qmc
+
+from toolkit.geometry.limb import Limb
+from toolkit.robot.geometry import arm_joints
+from toolkit.robot.model import RobotModel
+
+
+@dataclass(frozen=True)
+class ArmMapConfig:
+    """Settings.
+
+    Attributes:
+        samples: joint angles of the map.
+        margin: rad; off both ends of each joint's range, at most a fifth of it.
+        position: m; and
+        angle: rad; how far a palm may be from a sample: what the trunk adds by leaning.
+    """
+
+    samples: int = 2**17
+    margin: float = 0.15
+    position: float = 0.05
+    angle: float = 0.25
+
+
+@dataclass(frozen=True)
+class ArmMap:
+    """Palms that an arm can hold.
+
+    Attributes:
+        positions: (n, 3) m; patches relative to the shoulder, axes of the upright base.
+        normals: (n, 3); z axes of the patches, which point along the outward normal of the surface that they rest on.
+        angles: (n, k) rad; of the joints from the trunk to the palm.
+        config: settings.
+    """
+
+    positions: np.ndarray
+    normals: np.ndarray
+    angles: np.ndarray
+    config: ArmMapConfig
+
+    @staticmethod
+    def of(robot: RobotModel, limb: Limb, config: ArmMapConfig | None = None) -> ArmMap:
+        """Map of one arm; the other joints stay at home. The same angles every time (a Sobol sequence)."""
+        config, model = config or ArmMapConfig(), robot.mujoco_model
+        data = mujoco.MjData(model)
+        data.qpos[:] = robot.home
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        base = data.xmat[1].reshape(3, 3).copy()
+        shoulder = data.subtree_com[1] + base @ robot.arms[limb].shoulder_in_com
+        joints = arm_joints(model, limb)
+        low, high = model.jnt_range[joints].T
+        margin = np.minimum(config.margin, 0.2 * (high - low))
+        unit = qmc.Sobol(len(joints), scramble=False).random(config.samples)
+        angles = low + margin + unit * (high - low - 2 * margin)
+        turned = angles - data.qpos[model.jnt_qposadr[joints]]
+        site = model.site(robot.limbs[limb].site).id
+        positions = np.tile(data.site_xpos[site], (config.samples, 1))
+        normals = np.tile(data.site_xmat[site, 2::3], (config.samples, 1))
+        for row, joint in reversed(list(enumerate(joints))):  # from the hand to the shoulder, by axes at home
+            axis, anchor = data.xaxis[joint], data.xanchor[joint]
+            positions = anchor + _rotated(positions - anchor, axis, turned[:, row])
+            normals = _rotated(normals, axis, turned[:, row])
+        return ArmMap((positions - shoulder) @ base, normals @ base, angles, config)
+
+    def serves(self, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """(n,) bool; whether the arm can hold palms.
+
+        Args:
+            positions: (n, 3) m; relative to the shoulder, in the yaw frame of the base.
+            normals: (n, 3); outward normals of the surfaces, the same frame.
+        """
+        return self._tree.query(self._scaled(positions, normals), distance_upper_bound=1.0)[0] < 1.0
+
+    def posture(self, position: np.ndarray, normal: np.ndarray, near: np.ndarray, count: int = 64) -> np.ndarray:
+        """(k,) rad; of the samples about a palm, the one with the joints nearest to `near` (k,)."""
+        scaled = self._scaled(position[None], normal[None])[0]
+        distance, rows = self._tree.query(scaled, count)
+        rows = rows[distance < max(1.0, 1.5 * distance[0])]
+        return self.angles[rows[np.argmin(np.square(self.angles[rows] - near).sum(1))]]
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self._scaled(self.positions, self.normals))
+
+    def _scaled(self, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        return np.hstack([positions / self.config.position, normals / self.config.angle])
+
+
+def _rotated(vectors: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Vectors (n, 3) turned about a unit axis (3,) by angles (n,) (Rodrigues)."""
+    along = (vectors @ axis)[:, None] * axis
+    return along + np.cos(angle)[:, None] * (vectors - along) + np.sin(angle)[:, None] * np.cross(axis, vectors)
