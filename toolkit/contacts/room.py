@@ -46,13 +46,17 @@ def landing_room(
         config: settings.
 
     Returns:
-        (transitions, 2, 2) m; lowest and highest displacement along x and y; zeros for palms.
+        (transitions, 2, 2) m; lowest and highest displacement along x and y; zeros for palms, and for the last contact
+        of each foot: where they stand in the end is what the plan was made for.
     """
     room = np.zeros((len(sequence.transitions), 2, 2))
     stances = sequence.stances
+    last = {transition.limb: index for index, transition in enumerate(sequence.transitions)}
     for index, transition in enumerate(sequence.transitions):
         contact = transition.contact
         if contact is None or not contact.limb.is_foot or not 0 <= contact.surface < len(surfaces):
+            continue
+        if index == last[transition.limb]:
             continue
         other = stances[index][contact.limb.mirrored]
         following = [item.contact for item in sequence.transitions[index + 1 :] if item.limb == other.limb]
