@@ -38,6 +38,7 @@ class ControllerConfig:
         com, base, posture: centre of mass, orientation of the base, joints; arms and trunk that follow momentum rather
             than the plan leave the way that was found clear.
         leg_posture: factor on the posture's weight for joints that carry a foot.
+        arm_posture: the same for an arm whose palm is in contact, and not quite where it was planned to be.
         angular_momentum: `weight |(dk/dt - dk_ref/dt - kp (k_ref - k)) / angular_momentum_scale|^2`; kd is unused.
         angular_momentum_scale: kg m^2/s per unit of the task.
         divergence_scale: m; divergence of the CoM that halves the weights of angular momentum and base orientation.
@@ -72,6 +73,7 @@ class ControllerConfig:
     base: TaskGains = TaskGains(50.0, 100.0, 20.0)
     posture: TaskGains = TaskGains(4.0, 60.0, 15.0)
     leg_posture: float = 0.005
+    arm_posture: float = 0.01
     angular_momentum: TaskGains = TaskGains(40.0, 5.0, 0.0)
     angular_momentum_scale: float = 10.0
     divergence_scale: float = 0.01

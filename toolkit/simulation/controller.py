@@ -6,6 +6,7 @@ import numpy as np
 
 from toolkit.centroidal.problem import Margins
 from toolkit.geometry.limb import Limb
+from toolkit.robot.geometry import arm_joints
 from toolkit.robot.model import RobotModel
 from toolkit.simulation.config import ExecutionConfig, TaskGains
 from toolkit.simulation.dynamics import RobotDynamics, carries
@@ -72,12 +73,18 @@ class Controller:
             for urgent, shrink in ((False, nesting), (True, urgent_nesting))
         }
         self._urgent, self._calm = False, 1.0
-        legs = np.zeros(len(robot.joint_names), bool)
+        legs, model = np.zeros(len(robot.joint_names), bool), robot.mujoco_model
         for limb in self.limbs:
             if limb.is_foot:
                 legs |= carries(robot, limb)
         gains, nv = config.controller, self.dynamics.nv
         self._posture_weight = np.where(legs, gains.leg_posture, 1.0) * gains.posture.weight
+        self._arms = {
+            limb: np.array([robot.joint_names.index(model.joint(joint).name) for joint in arm_joints(model, limb)])
+            for limb in self.limbs
+            if not limb.is_foot
+        }
+        self._posture = self._posture_weight.copy()
         self._diagonal = np.full(nv + 18, gains.acceleration)
         self._diagonal[3:6] += gains.base.weight
         self._diagonal[6:nv] += self._posture_weight
@@ -165,7 +172,7 @@ class Controller:
         target[6:nv] = reference.joint_acceleration[index]
         target[6:nv] += posture.kp * (reference.joints[index] - qpos[7:])
         target[6:nv] += posture.kd * (reference.joint_velocity[index] - qvel[6:])
-        target[6:nv] *= self._posture_weight * self._calm / self._diagonal[6:nv]
+        target[6:nv] *= self._posture / self._diagonal[6:nv]
         diagonal = self._diagonal[: qp.size]
         for limb, slot in qp.slots.items():
             moments = slice(slot.start + 3, slot.stop)
@@ -187,9 +194,11 @@ class Controller:
         self._calm = 1.0 / (1.0 + squared)
         self._urgent = squared > (0.25 if self._urgent else 1.0)
         self._diagonal[3:6] = gains.acceleration + gains.base.weight * self._calm
-        joints = self._diagonal[6 : dynamics.nv]
-        np.multiply(self._posture_weight, self._calm, out=joints)
-        joints += gains.acceleration
+        np.multiply(self._posture_weight, self._calm, out=self._posture)
+        for limb, joints in self._arms.items():
+            if self.tracker.in_contact[limb]:
+                self._posture[joints] *= gains.arm_posture
+        np.add(self._posture, gains.acceleration, out=self._diagonal[6 : dynamics.nv])
 
     def _pursue_limb(self, limb: Limb, rows: int) -> int:
         """Append a limb's task rows after the first `rows`; returns their new number."""
