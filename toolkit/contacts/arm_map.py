@@ -66,6 +66,8 @@ class ArmMap:
         low, high = model.jnt_range[joints].T
         margin = np.minimum(config.margin, 0.2 * (high - low))
         unit = qmc.Sobol(len(joints), scramble=False).random(config.samples)
+        flipped = _flipped(robot, data, limb, joints)
+        unit[:, flipped] = 1.0 - unit[:, flipped]
         angles = low + margin + unit * (high - low - 2 * margin)
         turned = angles - data.qpos[model.jnt_qposadr[joints]]
         site = model.site(robot.limbs[limb].site).id
@@ -99,6 +101,15 @@ class ArmMap:
 
     def _scaled(self, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
         return np.hstack([positions / self.config.position, normals / self.config.angle])
+
+
+def _flipped(robot: RobotModel, data: mujoco.MjData, limb: Limb, joints: list[int]) -> np.ndarray:
+    """(k,) bool; joints of a right arm that turn against those of the left one: mirrored robots get mirrored maps."""
+    others = arm_joints(robot.mujoco_model, limb.mirrored) if limb.mirrored in robot.arms else []
+    if limb.is_left or len(others) != len(joints):
+        return np.zeros(len(joints), bool)
+    mirrored = data.xaxis[others] * [-1.0, 1.0, -1.0]  # an axis of rotation is a pseudo-vector; home faces along x
+    return (mirrored * data.xaxis[joints]).sum(1) < 0.0
 
 
 def _rotated(vectors: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
