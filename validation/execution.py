@@ -123,7 +123,9 @@ def goals_of(summaries: Sequence[dict[str, Any]]) -> list[Goal]:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the experiment; returns the exit code."""
-    args = options.parser("execution", DESCRIPTION, list(KINDS), 50).parse_args(argv)
+    parser = options.parser("execution", DESCRIPTION, list(KINDS), 50)
+    cli.add_execution_options(parser)
+    args = parser.parse_args(argv)
     for kind in args.kinds:
         kind_of(kind)
     console = make_console()

@@ -11,6 +11,8 @@ from typing import Any
 from toolkit import cli
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
+from toolkit.simulation.config import ExecutionConfig
+from toolkit.simulation.replan_config import ReplanConfig
 from validation.jobs import PoolOptions
 from validation.machine import ROOT, code_fingerprint, folder_fingerprint
 
@@ -73,6 +75,7 @@ class TrialSettings:
         planning: the planning options of the command line.
         out: folder for runs.
         recording: whether runs are kept with a recording.
+        replanning: whether runs replan.
     """
 
     robot: str
@@ -81,11 +84,18 @@ class TrialSettings:
     planning: argparse.Namespace
     out: Path
     recording: bool = True
+    replanning: bool = True
+
+    @property
+    def execution(self) -> ExecutionConfig:
+        """How plans are carried out."""
+        return ExecutionConfig(replanning=ReplanConfig(enabled=self.replanning))
 
     def described(self) -> dict[str, Any]:
         """As JSON can hold it, for results: what decides them."""
         names = ("timing", "time_limit", "expansions", "no_palms", "steps", "heuristic")
-        return {"robot": self.robot, "planner": self.planner} | {name: getattr(self.planning, name) for name in names}
+        own = {"robot": self.robot, "planner": self.planner, "replanning": self.replanning}
+        return own | {name: getattr(self.planning, name) for name in names}
 
     def deciding(self) -> dict[str, Any]:
         """What a trial's record depends on, the code and the robot's files included."""
@@ -105,7 +115,8 @@ def settings_of(args: argparse.Namespace) -> TrialSettings:
     robot = load_robot(args.robot, args.robots)
     planner = resolved(args.planner, robot)
     folder = robot.folder.resolve()
-    return TrialSettings(folder.name, folder.parent, planner, args, args.out.resolve())
+    replanning = getattr(args, "replanning", True)  # not every experiment executes
+    return TrialSettings(folder.name, folder.parent, planner, args, args.out.resolve(), replanning=replanning)
 
 
 def resolved(planner: str, robot: RobotModel) -> str:

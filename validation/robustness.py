@@ -60,7 +60,7 @@ def robustness_trial(settings: TrialSettings, case: Case, levels: Sequence[float
     world = case.world()
     record: dict[str, Any] = {"kind": case.kind, "seed": case.seed, "passed": False, "runs": {}}
     try:
-        result, log = run_pipeline(settings, case, world, PipelineConfig())
+        result, log = run_pipeline(settings, case, world, PipelineConfig(execution=settings.execution))
     except ToolkitError as error:
         return record | {"stage": "planning", "reason": " ".join(str(error).split())}
     trial = result.trial
@@ -84,7 +84,6 @@ def disturbed_run(
     trial, world = result.trial, result.world
     assert trial is not None and trial.motion is not None and trial.trajectory is not None
     robot = robot_of(settings.robot, settings.robots)
-    base = PipelineConfig()
     try:
         execution = execute(
             robot,
@@ -93,7 +92,7 @@ def disturbed_run(
             trial.schedule,
             trial.motion,
             trial.trajectory,
-            config=replace(base.execution, disturbance=disturbance),
+            config=replace(settings.execution, disturbance=disturbance),
             rng=np.random.default_rng([case.seed, 1, index]),
         )
     except ToolkitError as error:
@@ -181,6 +180,7 @@ def goals_of(rows: Sequence[dict[str, Any]]) -> list[Goal]:
 def main(argv: list[str] | None = None) -> int:
     """Run the experiment; returns the exit code."""
     parser = options.parser("robustness", DESCRIPTION, ["rubble_field"], OF)
+    cli.add_execution_options(parser)
     parser.add_argument(
         "--levels",
         type=cli.positive(float),

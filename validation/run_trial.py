@@ -83,7 +83,7 @@ def execution_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
     surface_seconds = time.perf_counter() - began
     record: dict[str, Any] = {"kind": case.kind, "seed": case.seed, "planned": False, "passed": False}
     try:
-        result, log = run_pipeline(settings, case, world, pipeline.PipelineConfig())
+        result, log = run_pipeline(settings, case, world, pipeline.PipelineConfig(execution=settings.execution))
     except ToolkitError as error:
         reason = " ".join(str(error).split())
         folder = keep_failure(settings, case, world, reason)

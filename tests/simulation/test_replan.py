@@ -9,12 +9,13 @@ import pytest
 from toolkit.geometry.limb import Limb
 from toolkit.simulation.config import ExecutionConfig
 from toolkit.simulation.disturbance import Disturbance
-from toolkit.simulation.reference import swings_of
+from toolkit.simulation.reference import sample_reference
 from toolkit.simulation.replan_config import ReplanConfig
 from toolkit.simulation.replan_contacts import Cones, Situation
 from toolkit.simulation.replan_kernel import solve
 from toolkit.simulation.replan_nominal import Nominal
 from toolkit.simulation.replan_problem import G, ReplanProblem
+from toolkit.wholebody.limb_paths import limb_paths
 
 CONFIG = ReplanConfig(enabled=True)
 WITH = ExecutionConfig(replanning=CONFIG)
@@ -22,7 +23,11 @@ WITH = ExecutionConfig(replanning=CONFIG)
 
 @pytest.fixture(scope="module")
 def nominal(walking):
-    return Nominal.of(walking.motion, swings_of(walking.sequence, walking.schedule), walking.robot, CONFIG)
+    plan = walking
+    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion)
+    times = np.arange(0.0, plan.schedule.duration, 0.01)
+    reference = sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, paths, plan.robot)
+    return Nominal.of(plan.motion, reference, plan.robot, CONFIG)
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +61,7 @@ def situation(walking, nominal, time, com=(0, 0, 0), velocity=(0, 0, 0), **optio
         landing={},
         earliest={},
         com_shift=np.zeros(3),
+        displaced=True,
         cones=Cones(0.85, 0.8, walking.robot.half_sizes - 0.02),
     )
     return Situation(**(values | options))
@@ -81,10 +87,8 @@ def test_an_undisturbed_state_changes_nothing(walking, nominal, problem):
     for time in (0.0, mid_swing(nominal), 0.5 * nominal.times[-1]):
         replan = problem.solve(situation(walking, nominal, time), solve)
         assert replan is not None
-        k = int(np.searchsorted(nominal.times, time + 1e-6)) - 1
-        count = len(replan.times)
         # What the solver leaves of the distance to its rows at its tolerance.
-        np.testing.assert_allclose(replan.com[1:], nominal.com[k + 1 : k + count], rtol=0.0, atol=2e-3)
+        np.testing.assert_allclose(replan.com, 0.0, rtol=0.0, atol=2e-3)
         assert all(np.linalg.norm(shift) < 2e-3 for shift in replan.landing.values())
 
 
@@ -93,6 +97,13 @@ def test_a_replan_obeys_the_dynamics(walking, nominal, problem):
     replan = problem.solve(situation(walking, nominal, time, velocity=(0.05, 0.1, 0.0)), solve)
     dt = np.diff(replan.times)
     k = int(np.searchsorted(nominal.times, time + 1e-6)) - 1
+    planned = [walking.motion.sample(float(each))[:2] for each in replan.times]
+    com, velocity = (np.array(part) for part in zip(*planned, strict=True))
+    velocity[replan.times >= walking.motion.problem.times[-1]] = 0.0
+    com, velocity = com + replan.com, velocity + replan.velocity
+    spin = (
+        np.column_stack([np.interp(replan.times, nominal.times, part) for part in nominal.wrench_spin.T]) + replan.spin
+    )
     for t in range(len(dt)):
         force, moment = np.zeros(3), np.zeros(3)
         for limb in np.flatnonzero(nominal.active[k + t]):
@@ -104,9 +115,9 @@ def test_a_replan_obeys_the_dynamics(walking, nominal, problem):
             force += own
             moment += np.cross(place, own) + G * turn @ replan.wrench[t, limb, 3:]
         acceleration = force - [0.0, 0.0, G]
-        np.testing.assert_allclose(np.diff(replan.velocity, axis=0)[t], dt[t] * acceleration, rtol=0.0, atol=1e-9)
-        about = replan.spin[t : t + 2] + np.cross(replan.com[t : t + 2], replan.velocity[t : t + 2])
-        mean = replan.com[t] + dt[t] * (replan.velocity[t] / 2 + dt[t] * acceleration / 6)
+        np.testing.assert_allclose(np.diff(velocity, axis=0)[t], dt[t] * acceleration, rtol=0.0, atol=1e-9)
+        about = spin[t : t + 2] + np.cross(com[t : t + 2], velocity[t : t + 2])
+        mean = com[t] + dt[t] * (velocity[t] / 2 + dt[t] * acceleration / 6)
         rate = moment + np.cross(mean, [0.0, 0.0, -G])
         # The product of a landing's shift and the change of its force is left out: 5 cm times a part of the weight.
         exact = 1e-9 if not any(np.abs(shift).max() > 1e-9 for shift in replan.landing.values()) else 0.3
@@ -133,11 +144,30 @@ def test_no_answer_is_none(walking, nominal, problem):
     assert problem.solve(broken, solve) is None
 
 
-def test_a_run_with_replanning_passes(walking):
+def test_a_small_push_moves_no_landing(walking, nominal, problem):
+    time = mid_swing(nominal)
+    small = problem.solve(situation(walking, nominal, time, velocity=(0.01, 0.0, 0.0), displaced=False), solve)
+    assert small is not None and not small.landing and not small.ends
+    large = problem.solve(situation(walking, nominal, time, velocity=(0.4, 0.0, 0.0), displaced=False), solve)
+    assert large is not None and large.landing[0][0] > 0.005
+
+
+def test_an_undisturbed_run_is_the_same_with_replanning(walking):
     run = walking.run(config=WITH)
-    assert run.replans >= 20 * (run.simulated_seconds - CONFIG.horizon) and run.replan_failures == 0
+    assert run.replans >= 20 * (run.simulated_seconds - CONFIG.horizon)
+    assert run.replan_landings == run.replan_failures == 0
     assert all(check.result.value == "PASS" for check in run.checks if check.name != "goal")
-    assert not run.fell and run.completed
+    without = walking.run(config=replace(WITH, replanning=replace(CONFIG, enabled=False)))
+    if not run.replan_departures:
+        np.testing.assert_array_equal(run.ctrl, without.ctrl)
+    assert run.com_rms_error < without.com_rms_error + 1e-3
+
+
+def test_a_push_is_replanned_and_the_error_counts_from_there(walking):
+    run = walking.run(config=replace(WITH, disturbance=Disturbance(push=120.0, push_time=0.3, push_direction=1.5)))
+    assert not run.fell and run.replan_departures > 0 and run.replan_failures == 0
+    error = np.sqrt(((run.com - run.com_planned) ** 2).sum(1).mean())
+    assert 0.0 < run.com_rms_error < error
 
 
 def test_a_run_without_it_counts_none(walking):
@@ -155,6 +185,6 @@ def test_a_pushed_run_is_the_same_twice(walking):
 
 def test_an_answer_that_fails_is_counted_and_the_last_goes_on(walking, monkeypatch):
     monkeypatch.setattr(ReplanProblem, "solve", lambda *_: None)
-    run = walking.run(config=WITH)
-    assert run.replan_failures == run.replans > 0
+    run = walking.run(config=replace(WITH, disturbance=Disturbance(push=60.0, push_time=0.3, push_direction=1.5)))
+    assert run.replan_failures == run.replan_departures > 0
     assert not run.fell

@@ -51,6 +51,8 @@ EXECUTION = (
     "solver_failures",
     "replans",
     "replan_failures",
+    "replan_departures",
+    "replan_landings",
     "replan_seconds",
     "simulated_seconds",
     "real_time_factor",

@@ -49,7 +49,7 @@ class Controller:
             config: settings.
             replanner: optimises motion and landing points anew; they stay as planned where None.
         """
-        self._replanner, self._aim = replanner, MotionTarget.zeros()
+        self._replanner, self.aim = replanner, MotionTarget.zeros()
         self._com, self._com_velocity = np.zeros(3), np.zeros(3)
         self._robot, self._reference, self._config = robot, reference, config.controller
         self._period = config.control_period
@@ -111,10 +111,10 @@ class Controller:
         self.dynamics.update(qpos, qvel)
         self.tracker.update(float(self._reference.times[index]), self._period, normal_force)
         self._com[:], self._com_velocity[:] = self._reference.com[index], self._reference.com_velocity[index]
-        self._aim.follow(self._reference, index)
+        self.aim.follow(self._reference, index)
         if self._replanner is not None:
             cones = self._limits[self._urgent]
-            self._replanner.update(index, self._period, self.dynamics, self.tracker, self.targets, cones, self._aim)
+            self._replanner.update(index, self._period, self.dynamics, self.tracker, self.targets, cones, self.aim)
             self._com += self._replanner.com_shift
         self.targets.update(index, self.dynamics)
         limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
@@ -154,7 +154,7 @@ class Controller:
     def _pursue(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in the objective."""
         reference, dynamics, gains, nv = self._reference, self.dynamics, self._config, self.dynamics.nv
-        tasks, wanted, target, aim = self._tasks, self._wanted, self._target, self._aim
+        tasks, wanted, target, aim = self._tasks, self._wanted, self._target, self.aim
         root = gains.com.weight**0.5
         np.multiply(dynamics.com_jacobian, root, out=tasks[:3])
         error = gains.com.kp * (aim.com - dynamics.com)

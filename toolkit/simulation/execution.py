@@ -35,9 +35,11 @@ class Execution:
         fell: base too low, tilted, or body contact with the world.
         fall_reason: one line, "" if it did not fall.
         solver_failures: control ticks whose QP was not solved.
-        replans, replan_failures: motions optimised again during the run; those that gave no answer, so that the one
-            before went on.
-        replan_seconds: wall-clock of a replan, on average.
+        com_rms_error: m; from the plan as replanned: a robot that recovers from a push is not asked to be where it
+            would be without, and a run that nothing disturbs has no other plan than the first one.
+        replans, replan_failures: replans during the run; those that gave no answer, so that the one before went on.
+        replan_departures: those that had to leave the plan; replan_landings: those that moved a landing point.
+        replan_seconds: of the processor for one that departs, on average.
         unplanned_contacts: distinct (robot geom, world geom) names that touched outside the patches.
         tick_seconds: (C,) wall-clock of each control tick.
         simulated_seconds, real_time_factor: of the whole loop.
@@ -87,4 +89,6 @@ class Execution:
     failure_time: float | None = None
     replans: int = 0
     replan_failures: int = 0
+    replan_departures: int = 0
+    replan_landings: int = 0
     replan_seconds: float = 0.0

@@ -28,7 +28,8 @@ class RunLog:
         ctrl: (S, nu). tick_seconds: (C,) s. wall_seconds: of the loop.
         finished: the loop reached its end.
         solver_failures: ticks.
-        replans, replan_failures: how many were tried, how many gave no answer. replan_seconds: of one, on average.
+        com_aim: (C, 3) m; where the controller wanted the CoM: the plan, as replanned.
+        replans, replan_failures, replan_departures, replan_landings, replan_seconds: as in `Execution`.
     """
 
     scene: mujoco.MjModel
@@ -41,8 +42,11 @@ class RunLog:
     wall_seconds: float
     finished: bool
     solver_failures: int
+    com_aim: np.ndarray
     replans: int = 0
     replan_failures: int = 0
+    replan_departures: int = 0
+    replan_landings: int = 0
     replan_seconds: float = 0.0
 
 
@@ -75,7 +79,7 @@ def measure(
     slip = _slip_by_stance(intervals, times, reference, len(sequence.stances))
     touchdowns = _touchdowns(intervals, recorder, reference, config)
     missing = sum(swing.contact is not None for swing in reference.swings) - len(touchdowns)
-    error = recorder.com[:count] - reference.com[:count]
+    error = recorder.com[:count] - log.com_aim
     torque_ratio = (np.abs(recorder.torque[:count]) / robot.torque_limit).max(1)
     joints, speed = recorder.qpos[:count, 7:], np.abs(recorder.qvel[:count, 6:])
     excess = np.maximum(joints - robot.upper, robot.lower - joints).max()
@@ -133,6 +137,8 @@ def measure(
         solver_failures=log.solver_failures,
         replans=log.replans,
         replan_failures=log.replan_failures,
+        replan_departures=log.replan_departures,
+        replan_landings=log.replan_landings,
         replan_seconds=log.replan_seconds,
         unplanned_contacts=recorder.meter.unplanned_names,
         tick_seconds=log.tick_seconds,

@@ -56,10 +56,14 @@ class MotionTarget:
 class Replanner:
     """Solves a tracking problem over the next contacts at a fixed rate and says what to track.
 
+    Where the robot is within the deadband of its plan, with its feet where they should be, nothing deviates: the plan
+    itself is the optimum, which needs no solving.
+
     Attributes:
-        replans, failures: how many were tried; how many of them gave no answer, so that the one before went on.
+        replans: how many. departures: how many of them had to leave the plan; failures: how many of these gave no
+            answer, so that the one before went on; moved: how many of these moved a landing point.
         seconds: of all of them together (of the processor; never decides anything).
-        com_shift: (3,) m; by how much the feet that bear the plan have been moved from it.
+        com_shift: (3,) m; by how much the feet that bear the plan stand off it, where that is more than the deadband.
     """
 
     def __init__(
@@ -89,7 +93,7 @@ class Replanner:
         self._goal: dict[int, np.ndarray] = {}
         self._ends: dict[int, float] = {}
         self._shift, self._rate, self._moved = np.zeros((3, 4, 3))
-        self.replans = self.failures = 0
+        self.replans = self.departures = self.failures = self.moved = 0
         self.seconds = 0.0
         self.com_shift = np.zeros(3)
 
@@ -120,28 +124,56 @@ class Replanner:
                 swing = tracker.current[limb]
                 self._made[limb] = self._nominal.swings.index(swing) if swing is not None else -1
                 if swing is not None and swing.contact is not None:
-                    self._moved[limb] = dynamics.limb_position[limb] - swing.contact.pose.position
+                    off = dynamics.limb_position[limb] - swing.contact.pose.position
+                    self._moved[limb] = off if np.linalg.norm(off) > self._config.deadband else 0.0
         if time >= self._due - 1e-9:
             self._due = time + self._config.period
-            self._replan(time, dynamics, tracker, cones)
+            self._replan(index, dynamics, tracker, cones)
         self._follow_feet(index, period)
         self._track(time, aim)
         self._move_landings(time, period, tracker, targets)
 
-    def _replan(self, time: float, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones) -> None:
-        """Solve once; where that fails the last answer goes on."""
+    def _replan(self, index: int, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones) -> None:
+        """Solve once, where the plan is left at all; where that fails the last answer goes on."""
+        time, displaced = float(self._reference.times[index]), self._displaced(tracker)
         if time >= self._nominal.times[-1] - self._config.horizon:
             return
-        began = process_time()
-        plan = self._problem.solve(self._situation(time, dynamics, tracker, cones), solve)
         self.replans += 1
+        if not displaced and self._divergence(index, dynamics) <= self._config.deadband:
+            self._plan, self._ends = None, {}
+            self._goal.clear()
+            return
+        began = process_time()
+        plan = self._problem.solve(self._situation(time, displaced, dynamics, tracker, cones), solve)
+        self.departures += 1
         if plan is None:
             self.failures += 1
         else:
             self._plan = plan
             self._goal.update(plan.landing)
             self._ends = plan.ends
+            self.moved += bool(plan.landing)
         self.seconds += process_time() - began
+
+    def _displaced(self, tracker: ContactTracker) -> bool:
+        """Whether feet stand elsewhere than planned, or are on their way there, or to come earlier."""
+        if self._ends or np.linalg.norm(self._moved[:2], axis=1).any():
+            return True
+        for foot in FEET:
+            swing = tracker.current[foot]
+            if swing is None or tracker.state[foot] is not LimbState.SWING:
+                continue
+            shift: np.ndarray = self._shift[foot]
+            goal: np.ndarray = self._goal.get(self._nominal.swings.index(swing), shift)
+            if max(np.linalg.norm(goal), np.linalg.norm(shift)) > self._config.deadband:
+                return True
+        return bool(np.linalg.norm(self.com_shift) > self._config.deadband)
+
+    def _divergence(self, index: int, dynamics: RobotDynamics) -> float:
+        """In m, from the plan moved with the feet that bear it."""
+        off = dynamics.com - self._reference.com[index] - self.com_shift
+        speed = dynamics.com_velocity - self._reference.com_velocity[index]
+        return float(np.linalg.norm(off + speed / self._config.frequency))
 
     def _follow_feet(self, index: int, period: float) -> None:
         """Let the plan's shift follow the feet that bear it."""
@@ -153,10 +185,12 @@ class Replanner:
 
     @property
     def mean_seconds(self) -> float:
-        """Wall clock of one replan, on average; 0 before the first."""
-        return self.seconds / self.replans if self.replans else 0.0
+        """Seconds of the processor for one that departs from the plan, on average; 0 before the first."""
+        return self.seconds / self.departures if self.departures else 0.0
 
-    def _situation(self, time: float, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones) -> Situation:
+    def _situation(
+        self, time: float, displaced: bool, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones
+    ) -> Situation:
         """What is measured, as the problem wants it."""
         standing, fixed, moving, landing, earliest = {}, {}, {}, {}, {}
         for limb in dynamics.limbs:
@@ -189,6 +223,7 @@ class Replanner:
             landing=landing,
             earliest=earliest,
             com_shift=self.com_shift.copy(),
+            displaced=displaced,
             cones=cones,
         )
 
@@ -197,18 +232,19 @@ class Replanner:
         return min(max((swing.end - swing.start) / self._config.shortest, 1.0), self._config.pace)
 
     def _track(self, time: float, target: MotionTarget) -> None:
-        """Overwrite what to track by the last replan, where it reaches so far."""
+        """Move what to track by the last replan, where it reaches so far; else with the feet that bear it."""
         plan = self._plan
         if plan is None or time >= plan.times[-1]:
+            target.com += self.com_shift
             return
         k = int(np.searchsorted(plan.times, time + 1e-9, side="right")) - 1
         tau = time - plan.times[k]
         acceleration = plan.acceleration[k]
-        target.com[:] = plan.com[k] + tau * plan.velocity[k] + 0.5 * tau * tau * acceleration
-        target.com_velocity[:] = plan.velocity[k] + tau * acceleration
-        target.com_acceleration[:] = acceleration
-        target.angular_momentum_rate[:] = self._mass * plan.spin_rate[k]
-        target.angular_momentum[:] = self._mass * (plan.spin[k] + tau * plan.spin_rate[k])
+        target.com += plan.com[k] + tau * plan.velocity[k] + 0.5 * tau * tau * acceleration
+        target.com_velocity += plan.velocity[k] + tau * acceleration
+        target.com_acceleration += acceleration
+        target.angular_momentum_rate += self._mass * plan.spin_rate[k]
+        target.angular_momentum += self._mass * (plan.spin[k] + tau * plan.spin_rate[k])
         target.wrench[:] = self._weight * plan.wrench[k]
 
     def _move_landings(self, time: float, period: float, tracker: ContactTracker, targets: LimbTargets) -> None:

@@ -30,7 +30,10 @@ class ReplanConfig:
         fraction: of the swing, after which the landing point is kept.
         margin: m; distance of the sole from the edge of its surface.
         gap: m; distance of a landing sole from the other one.
-        deadband: m; divergence from the plan that the controller's gains settle without a replan.
+        deadband: m; divergence from the plan that the controller's gains settle without a replan, where every foot is
+            also as near to its planned place: the plan is followed as it is.
+        settled: m; divergence left when the next foot lands, up to which landing points stay where they are planned...
+        excess: ... and cost of the body's limits exceeded on the way.
         frequency: 1/s; of the pendulum in the divergence `(c - c_plan) + (v - v_plan) / frequency`.
         com, velocity, climb, spin, spin_rate: weights of the deviations from the plan: m^2 s, m^2/s (horizontal and
             vertical), (m^2/s)^2 s and (m^2/s^2)^2 s (spin: angular momentum per mass).
@@ -60,6 +63,8 @@ class ReplanConfig:
     margin: float = 0.01
     gap: float = 0.02
     deadband: float = 0.01
+    settled: float = 0.01
+    excess: float = 0.02
     frequency: float = 3.4
     com: float = 200.0
     velocity: float = 5.0

@@ -33,6 +33,7 @@ class Situation:
         landing: swings under way -> s; when they end as decided last.
         earliest: swings under way -> s; when they may end at the earliest.
         com_shift: (3,) m; of the plan with the feet that bear it.
+        displaced: whether feet stand or go elsewhere than planned, or come earlier.
         cones: what the controller allows.
     """
 
@@ -47,6 +48,7 @@ class Situation:
     landing: dict[int, float]
     earliest: dict[int, float]
     com_shift: np.ndarray
+    displaced: bool
     cones: Cones
 
 

@@ -12,7 +12,7 @@ from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
 from toolkit.geometry.limb import FEET, PALMS
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
-from toolkit.simulation.reference import Swing, planned_wrench
+from toolkit.simulation.reference import Reference, Swing, planned_wrench
 from toolkit.simulation.replan_config import ReplanConfig
 
 LIMITS = ("leg length", "hip roll", "hip pitch", "ankle pitch", "ankle roll")
@@ -42,7 +42,9 @@ class Nominal:
     Attributes:
         mass: kg.
         times: (M + 1,) s.
-        com, velocity: (M + 1, 3). spin: (M + 1, 3) m^2/s; angular momentum about the CoM per mass.
+        com, velocity: (M + 1, 3).
+        spin: (M + 1, 3) m^2/s; angular momentum about the CoM per mass, that of the postures.
+        wrench_spin: (M + 1, 3) m^2/s; the one that the wrenches make: the optimiser's.
         acceleration: (M, 3); of the CoM.
         active: (M, 4) bool. position: (M, 4, 3). rotation: (M, 4, 3, 3). friction: (M, 4). half_size: (4, 2) m.
         wrench: (M, 4, 6) about the centre of the patch in the contact frame, in weights and weights times 1 m.
@@ -58,6 +60,7 @@ class Nominal:
     com: np.ndarray
     velocity: np.ndarray
     spin: np.ndarray
+    wrench_spin: np.ndarray
     acceleration: np.ndarray
     active: np.ndarray
     position: np.ndarray
@@ -72,18 +75,16 @@ class Nominal:
     swings: tuple[Swing, ...]
 
     @classmethod
-    def of(
-        cls, motion: CentroidalMotion, swings: tuple[Swing, ...], robot: RobotModel, config: ReplanConfig
-    ) -> Nominal:
+    def of(cls, motion: CentroidalMotion, reference: Reference, robot: RobotModel, config: ReplanConfig) -> Nominal:
         """The grid of a planned motion.
 
         Args:
             motion: the plan.
-            swings: its moves in order.
+            reference: the same at the control ticks; its moves, and the angular momentum of its postures.
             robot: for the limits of its body.
             config: horizon, longest step, margins of the body.
         """
-        fine = _refined(motion, config)
+        fine, swings = _refined(motion, config), reference.swings
         problem, mass = fine.problem, fine.problem.mass
         weight = mass * float(np.linalg.norm(GRAVITY))
         moving = problem.times[:-1] < motion.problem.times[-1] - 1e-9
@@ -98,7 +99,10 @@ class Nominal:
             times=problem.times,
             com=fine.com,
             velocity=fine.linear_momentum / mass,
-            spin=fine.angular_momentum / mass,
+            spin=np.column_stack(
+                [np.interp(problem.times, reference.times, part) / mass for part in reference.angular_momentum.T]
+            ),
+            wrench_spin=fine.angular_momentum / mass,
             acceleration=np.where(moving[:, None], acceleration, 0.0),
             active=problem.active,
             position=problem.position,

@@ -36,16 +36,17 @@ PALM_MOMENT = 1e3  # weight that keeps a palm's moments as planned: the controll
 
 @dataclass(frozen=True)
 class Replan:
-    """A replanned motion at N + 1 knots; world frame, SI units.
+    """A replanned motion at N + 1 knots, as its deviation from the plan; world frame, SI units.
 
     Attributes:
         times: (N + 1,) s.
         com, velocity, spin: (N + 1, 3). acceleration, spin_rate: (N, 3).
-        wrench: (N, 4, 6) in the contact frames, in weights.
+        wrench: (N, 4, 6) in the contact frames, in weights; with the contacts' own planned wrenches.
         landing: swing -> (3,) m shift of its contact.
         ends: swing -> s; when it ends, where that is before its planned end.
-        objective: reached.
-        divergence: m; from the plan at the end, moved with the feet that bear it.
+        objective: reached; excess: its part for limits of the body exceeded.
+        divergence: m; (N + 1,) from the plan.
+        next_landing: knot at which the next foot lands; the last one where none does.
         iterations: of the solver.
     """
 
@@ -59,7 +60,9 @@ class Replan:
     landing: dict[int, np.ndarray]
     ends: dict[int, float]
     objective: float
-    divergence: float
+    excess: float
+    divergence: np.ndarray
+    next_landing: int
     iterations: int
 
 
@@ -81,9 +84,13 @@ class ReplanProblem:
     def solve(self, situation: Situation, solver: Callable) -> Replan | None:
         """The best motion from a measured state; None where the solver gives no answer.
 
-        Where the motion with the planned times cannot be brought back to the plan, swings under way may also end
-        earlier, at any of a few times.
+        Landing points move only where the motion cannot be brought back to the plan without that; and where not even
+        that is enough, swings under way may also end earlier, at any of a few times.
         """
+        if not situation.displaced:
+            kept = self._solve(situation, solver, {}, landings=0)
+            if kept is not None and self._is_settled(kept):
+                return kept
         decided = {event: time for event, time in situation.landing.items() if self._is_early(event, time)}
         best = self._solve(situation, solver, decided)
         if best is None or best.objective < self._config.early_objective:
@@ -95,6 +102,11 @@ class ReplanProblem:
                     best = found
         return best
 
+    def _is_settled(self, kept: Replan) -> bool:
+        """Whether a motion with the planned landing points is back at the plan when the next foot lands."""
+        config = self._config
+        return kept.divergence[kept.next_landing] <= config.settled and kept.excess <= config.excess
+
     def _is_early(self, event: int, time: float) -> bool:
         return time < self._nominal.swings[event].end - 1e-3
 
@@ -104,8 +116,10 @@ class ReplanProblem:
         knots = knots[(knots >= earliest - 1e-9) & (knots < self._nominal.swings[event].end - 1e-3)]
         return knots[np.unique([0, len(knots) // 2, len(knots) - 1])] if len(knots) else knots
 
-    def _solve(self, situation: Situation, solver: Callable, early: dict[int, float]) -> Replan | None:
-        """The best motion with given ends of the swings under way."""
+    def _solve(
+        self, situation: Situation, solver: Callable, early: dict[int, float], landings: int | None = None
+    ) -> Replan | None:
+        """The best motion with given ends of the swings under way, and at most so many landing points free."""
         nominal, config, size = self._nominal, self._config, self._size
         first = int(np.searchsorted(nominal.times, situation.time + 1e-6, side="right")) - 1
         last = int(np.searchsorted(nominal.times, situation.time + config.horizon, side="left"))
@@ -116,14 +130,17 @@ class ReplanProblem:
         times[0] = situation.time
         dt = np.diff(times)
         inside = situation.time - nominal.times[first]
-        com, velocity, spin = nominal.com[knots].copy(), nominal.velocity[knots].copy(), nominal.spin[knots].copy()
+        com, velocity = nominal.com[knots].copy(), nominal.velocity[knots].copy()
+        spin, made = nominal.spin[knots].copy(), nominal.wrench_spin[knots].copy()
         com[0] += inside * (velocity[0] + 0.5 * inside * nominal.acceleration[first])
         velocity[0] += inside * nominal.acceleration[first]
-        spin[0] += inside / (nominal.times[first + 1] - nominal.times[first]) * (spin[1] - spin[0])
+        for each in (spin, made):
+            each[0] += inside / (nominal.times[first + 1] - nominal.times[first]) * (each[1] - each[0])
         origin = com[0].copy()
 
         contacts = ContactTable.of(nominal, situation, first, times, early)
-        free = self._free_landings(situation, first, last)
+        most = self._config.landings if landings is None else landings
+        free = self._free_landings(situation, first, last, most)
         column, shift, planes = np.full((steps, 4), -1), contacts.shift, []
         for index, event in enumerate(free):
             limb = nominal.swings[event].limb
@@ -142,8 +159,9 @@ class ReplanProblem:
         pulls = np.zeros((steps, 6))
         np.add.at(pulls, step, pull)
         pulls[:, 2] -= G
-        # The plan's own rates: its acceleration, and its angular momentum about the origin.
-        about = spin + np.cross(com - origin, velocity)
+        # The rates that the plan's wrenches make: its acceleration, and its angular momentum about the origin. That the
+        # postures have another one is left to the controller.
+        about = made + np.cross(com - origin, velocity)
         wanted = np.zeros((steps, 6))
         wanted[:, :3] = np.diff(velocity, axis=0) / dt[:, None]
         weight_moment = np.zeros((steps, 3))
@@ -177,7 +195,10 @@ class ReplanProblem:
             [
                 situation.com - com[0],
                 situation.velocity - velocity[0],
-                situation.spin + np.cross(situation.com - origin, situation.velocity) - about[0],
+                situation.spin
+                - spin[0]
+                + np.cross(situation.com - origin, situation.velocity)
+                - np.cross(com[0] - origin, velocity[0]),
                 np.zeros(3),
             ]
         )
@@ -202,31 +223,31 @@ class ReplanProblem:
         objective = constant + 0.5 * np.einsum("ti,tij,tj", x, cost, x) + (slope * x).sum()
         objective += 0.5 * (weight * u * u).sum() + (price * excess).sum()
         objective += config.early * sum(nominal.swings[k].end - t for k, t in early.items())
-        com, velocity = com + x[:, :3], velocity + x[:, 3:6]
-        spin = about + x[:, 6:9] - np.cross(com - origin, velocity)
+        turned = x[:, 6:9] + np.cross(com - origin, velocity)
+        turned -= np.cross(com + x[:, :3] - origin, velocity + x[:, 3:6])
         wrench = np.zeros((steps, 4, 6))
         wrench[step, limb] = base + u
-        behind = self._nominal.share[last - 1] @ shift[-1, :2]
-        for index, plane in enumerate(planes):
-            mine = (column[-1, :2] == index) * self._nominal.share[last - 1]
-            behind = behind + mine.sum() * plane @ x[0, GIVEN + 2 * index : GIVEN + 2 * index + 2]
+        ends = [self._nominal.swings[event].end for event in self._landings]
+        next_end = min((end for end in ends if end > situation.time), default=np.inf)
         landing = {event: plane @ x[0, own] for event, plane, own in zip(free, planes, _columns(free), strict=True)}
         return Replan(
             times=times,
-            com=com,
-            velocity=velocity,
-            spin=spin,
-            acceleration=np.diff(velocity, axis=0) / dt[:, None],
-            spin_rate=np.diff(spin, axis=0) / dt[:, None],
+            com=x[:, :3],
+            velocity=x[:, 3:6],
+            spin=turned,
+            acceleration=np.diff(x[:, 3:6], axis=0) / dt[:, None],
+            spin_rate=np.diff(turned, axis=0) / dt[:, None],
             wrench=wrench,
             landing=landing,
             ends=early,
             objective=float(objective),
-            divergence=float(np.linalg.norm(x[-1, :3] - behind + x[-1, 3:6] / config.frequency)),
+            excess=float((price * excess).sum()),
+            divergence=np.linalg.norm(x[:, :3] + x[:, 3:6] / config.frequency, axis=1),
+            next_landing=int(np.searchsorted(times, next_end) if next_end < times[-1] else steps),
             iterations=iterations,
         )
 
-    def _free_landings(self, situation: Situation, first: int, last: int) -> list[int]:
+    def _free_landings(self, situation: Situation, first: int, last: int, most: int) -> list[int]:
         """Swings of feet whose landing point is free, the next ones first."""
         nominal = self._nominal
         standing = {event for event, _, _ in situation.standing.values()}
@@ -235,7 +256,7 @@ class ReplanProblem:
             swing = nominal.swings[event]
             if event in standing or event in situation.fixed or swing.end <= situation.time:
                 continue
-            if swing.end >= nominal.times[last] - 1e-6 or len(free) == self._config.landings:
+            if swing.end >= nominal.times[last] - 1e-6 or len(free) == most:
                 break
             free.append(event)
         return free

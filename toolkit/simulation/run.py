@@ -83,7 +83,7 @@ def execute(
     reference = sample_reference(period * np.arange(ticks), sequence, schedule, motion, trajectory, paths, robot)
     replanner = None
     if config.replanning.enabled and motion.problem.margins.friction <= config.replanning.max_friction:
-        nominal = Nominal.of(motion, reference.swings, robot, config.replanning)
+        nominal = Nominal.of(motion, reference, robot, config.replanning)
         replanner = Replanner(reference, nominal, robot, world.surfaces, config.replanning)
     controller = Controller(robot, reference, motion.problem.margins, config, replanner)
     recorder = Recorder(ticks, scene, robot, index, config)
@@ -92,7 +92,7 @@ def execute(
     data = mujoco.MjData(scene)
     data.qpos[:], data.qvel[:] = qpos0, qvel0
     ctrl = np.zeros((ticks * config.control_decimation, scene.nu))
-    tick_seconds, step = np.zeros(ticks), 0
+    tick_seconds, com_aim, step = np.zeros(ticks), np.zeros((ticks, 3)), 0
     report_every = max(round(0.1 / period), 1)
     qpos, qvel = qpos0.copy(), qvel0.copy()
     started = perf_counter()
@@ -100,6 +100,7 @@ def execute(
         tick_started = perf_counter()
         torque = controller.tick(tick, *told(qpos, qvel), recorder.meter.normal_force)
         tick_seconds[tick] = perf_counter() - tick_started
+        com_aim[tick] = controller.aim.com
         recorder.meter.expected[:] = reference.authority[tick] > 0.0
         data.ctrl[:] = torque
         if push.any():
@@ -129,8 +130,11 @@ def execute(
         wall_seconds=wall,
         finished=recorder.count == ticks and not recorder.fall,
         solver_failures=controller.failures,
+        com_aim=com_aim[: recorder.count],
         replans=replanner.replans if replanner else 0,
         replan_failures=replanner.failures if replanner else 0,
+        replan_departures=replanner.departures if replanner else 0,
+        replan_landings=replanner.moved if replanner else 0,
         replan_seconds=replanner.mean_seconds if replanner else 0.0,
     )
     return measure(log, recorder, reference, robot, world, sequence, config)
