@@ -20,6 +20,7 @@ from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.centroidal.sequence import SequenceConfig, optimise
 from toolkit.contacts.room import RoomConfig, landing_room, moved_sequence
 from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.sequence import ContactSequence
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.prediction.networks import NetworkEvaluator, load_networks
 from toolkit.robot.model import RobotModel
@@ -104,7 +105,8 @@ class PipelineConfig:
         seed: of every random draw.
         time_limit: s for the contact search; the search also ends after its own number of expansions, so that the
             same seed gives the same plan on any machine fast enough.
-        candidates: most contact sequences to test before giving up.
+        candidates: most contact sequences to test before giving up; those with palms at most half of them, after which
+            the search is run for the feet alone.
         until: last stage that tests a sequence: "dynamics" for the plan alone, "wholebody", or "execution".
         initial_rest, final_rest: s at rest before the first transition and after the last one.
         landing: how far feet may land from where the search put them, where margins are short; None for not at all.
@@ -300,27 +302,38 @@ def run(
     chosen = search
     exclusions: list[Exclusion] = []
     tested = attempt = 0
+    palms = True
     while search.solutions:
-        before = tested
+        before, failed_with_palms = tested, False
         for solution in reversed(search.solutions):  # newest, cheapest first
             if tested == config.candidates or _meets(solution, exclusions):
                 continue
+            with_palms = any(not item.limb.is_foot for item in solution.sequence.transitions)
+            if with_palms and tested >= config.candidates // 2:
+                continue  # the other half is for the feet alone
             tested += 1
+            failed_with_palms |= with_palms
             trial = test_solution(robot, world, solution, config, observer)
             if best is None or trial.merit > best.merit:
                 best, chosen = trial, search
             if trial.passed:
                 return PipelineResult(robot, world, chosen, best, tested, "")
-            exclusions += _blamed(trial)
-        if tested in (before, config.candidates) or not exclusions:
+            exclusions += _blamed(solution.sequence, trial.failed_transition)
+        if tested in (before, config.candidates) or not (exclusions or failed_with_palms):
             break
         attempt += 1
-        search = _search(planner, config, observer, attempt, exclusions)
+        palms = palms and not failed_with_palms
+        search = _search(planner, config, observer, attempt, exclusions, palms)
     return PipelineResult(robot, world, chosen, best, tested, best.reason if best else search.reason)
 
 
 def _search(
-    planner: ContactPlanner, config: PipelineConfig, observer: Observer, attempt: int, exclusions: list[Exclusion]
+    planner: ContactPlanner,
+    config: PipelineConfig,
+    observer: Observer,
+    attempt: int,
+    exclusions: list[Exclusion],
+    palms: bool = True,
 ) -> SearchResult:
     """One contact search; the first attempt uses the seed itself."""
     observer.started("planning")
@@ -329,25 +342,31 @@ def _search(
         config.time_limit,
         observer=lambda progress: observer.progress("planning", None, str(progress)),
         exclusions=exclusions,
+        palms=palms,
     )
     found = len(search.solutions)
     detail = search.reason or f"{found} sequence{'s' if found > 1 else ''}"
     if exclusions:
         detail += f" without {len(exclusions)} transition{'s' if len(exclusions) > 1 else ''} that failed"
+    if not palms:
+        detail += " for the feet alone"
     if search.warning:
         detail += f"; warning: {search.warning}"
     observer.finished("planning", found > 0, search.seconds, detail)
     return search
 
 
-def _blamed(trial: Trial) -> list[Exclusion]:
-    """The transition at which a trial failed, to keep the next search away from it; empty where none can be blamed."""
-    index = trial.failed_transition
-    transitions = trial.solution.sequence.transitions
-    if index is None or not transitions:
+def _blamed(sequence: ContactSequence, index: int | None) -> list[Exclusion]:
+    """The transition at which a trial failed, to keep the next search away from it; empty where none can be blamed.
+
+    Args:
+        sequence: as the search proposed it: landing points that the optimiser moved are none of the search's.
+        index: of the transition.
+    """
+    if index is None or not sequence.transitions:
         return []
-    index = min(index, len(transitions) - 1)
-    return [Exclusion.of(trial.solution.sequence.stances[index], transitions[index])]
+    index = min(index, len(sequence.transitions) - 1)
+    return [Exclusion.of(sequence.stances[index], sequence.transitions[index])]
 
 
 def _meets(solution: Solution, exclusions: list[Exclusion]) -> bool:

@@ -164,6 +164,7 @@ class ContactPlanner:
         time_limit: float,
         observer: Callable[[Progress], None] | None = None,
         exclusions: Sequence[Exclusion] = (),
+        palms: bool = True,
     ) -> SearchResult:
         """Search for contact sequences until the time is up or nothing can improve.
 
@@ -172,6 +173,7 @@ class ContactPlanner:
             time_limit: s, the heuristic not counted.
             observer: told of progress and of every solution.
             exclusions: transitions that later stages rejected; the search keeps away from them.
+            palms: whether this search may use palms, where `config.palms` allows them at all.
 
         Returns:
             Every solution found, and why there is none where there is none.
@@ -198,7 +200,7 @@ class ContactPlanner:
             self.world.goal,
             self._model(wide).longest_step + self.config.projection.shift,
             self._timings,
-            self.config.palms,
+            palms and self.config.palms,
             self.config.cost,
             self.config.reach,
             exclusions,
