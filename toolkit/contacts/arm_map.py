@@ -1,4 +1,4 @@
-"""ArmMap: where, and facing which way, a palm can be held with an upright trunk and joints off the ends of their ranges.
+"""ArmMap: where, and facing which way, a palm can be held with an upright trunk and no joint at the end of its range.
 
 A distance to the shoulder says little: near the trunk the elbow is at its end, and a wrist turns a palm only so far.
 The map holds what the arm does at evenly spread joint angles; a palm is served if one of them comes near to it.

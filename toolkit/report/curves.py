@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from toolkit.contacts.category import Category
 from toolkit.report.colors import EXECUTED, OPTIMISED, unit
 
-
 Losses = tuple[Sequence[float], Sequence[float]]
 
 

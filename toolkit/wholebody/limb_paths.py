@@ -24,7 +24,6 @@ from toolkit.wholebody.toe_pitch import SwingingLeg
 from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
 
-
 LEADING = 0.4  # authority of a palm's path in its middle
 
 
