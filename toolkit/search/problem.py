@@ -56,6 +56,8 @@ class CostConfig:
         time: per s; counts only where the planner may choose between timings, lest slower always look better.
         stagger: per m that one foot is ahead of the other in the final stance.
         swing_speed: m/s; a foot may not have to fly faster on average.
+        arrival: m; a plan ends so far inside the goal, as robots land a little beside their plans (at most half of the
+            goal's radius).
         miss: per m by which a transition not yet judged would have to bend the motion; only for the order in which
             transitions are judged.
         doubt: of a transition that the evaluator rejects and the second one has not judged yet; likewise.
@@ -66,6 +68,7 @@ class CostConfig:
     time: float = 5.0
     stagger: float = 5.0
     swing_speed: float = 4.0
+    arrival: float = 0.01
     miss: float = 30.0
     doubt: float = 3.0
 
@@ -180,7 +183,9 @@ class ContactProblem:
         return judged & self._at_goal(self.feet(unpack_all(states)[:, CONTACTS])[0])
 
     def _at_goal(self, centre: np.ndarray) -> np.ndarray:
-        return np.hypot(*(centre[:, :2] - self._goal.position[:2]).T) <= self._goal.radius
+        radius = self._goal.radius
+        inner = max(radius - self._config.arrival, 0.5 * radius)
+        return np.hypot(*(centre[:, :2] - self._goal.position[:2]).T) <= inner
 
     def crowd(self, states: Sequence[bytes]) -> list[tuple]:
         """See `SearchProblem`: states with the mean of the feet in the same square of 0.1 m, and about as fast."""
