@@ -309,7 +309,7 @@ def run(
             if tested == config.candidates or _meets(solution, exclusions):
                 continue
             with_palms = any(not item.limb.is_foot for item in solution.sequence.transitions)
-            if with_palms and tested >= config.candidates // 2:
+            if with_palms and tested >= max(1, config.candidates // 2):
                 continue  # the other half is for the feet alone
             tested += 1
             failed_with_palms |= with_palms

@@ -1,0 +1,67 @@
+"""The pipeline's order of things: which sequences are tested, and what is searched again."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from toolkit import pipeline
+from toolkit.geometry.limb import Limb
+
+
+def solution(name, *limbs):
+    return SimpleNamespace(
+        name=name,
+        sequence=SimpleNamespace(transitions=[SimpleNamespace(limb=limb) for limb in limbs], stances=[]),
+    )
+
+
+class Planner:
+    """Finds what it is given: with palms, and for the feet alone."""
+
+    def __init__(self, with_palms, without):
+        self.found, self.calls = {True: with_palms, False: without}, []
+
+    def search(self, rng, time_limit, observer=None, exclusions=(), palms=True):
+        self.calls.append(palms)
+        return SimpleNamespace(
+            solutions=self.found[palms], reason="", warning="", seconds=0.0, heuristic_seconds=0.0, expansions=1
+        )
+
+
+def run(planner, passing, monkeypatch, candidates=6):
+    tested = []
+
+    def test(robot, world, item, config, observer):
+        tested.append(item.name)
+        passed = item.name in passing
+        return SimpleNamespace(passed=passed, merit=(len(tested),), reason="it fell", failed_transition=None)
+
+    monkeypatch.setattr(pipeline, "test_solution", test)
+    config = pipeline.PipelineConfig(candidates=candidates)
+    return pipeline.run(None, None, planner, config), tested  # pyright: ignore[reportArgumentType]
+
+
+FOOT, PALM = Limb.LEFT_FOOT, Limb.RIGHT_PALM
+
+
+def test_the_newest_sequence_comes_first_and_ends_the_run_where_it_passes(monkeypatch):
+    planner = Planner([solution("old", FOOT), solution("new", FOOT, PALM)], [])
+    result, tested = run(planner, {"new", "old"}, monkeypatch)
+    assert tested == ["new"] and planner.calls == [True]
+    assert result.passed and result.tested == 1
+
+
+def test_where_palms_fail_the_feet_are_searched_alone(monkeypatch):
+    palms = [solution(f"palms {number}", FOOT, PALM) for number in range(5)]
+    planner = Planner(palms, [solution("feet", FOOT)])
+    result, tested = run(planner, {"feet"}, monkeypatch)
+    assert tested == ["palms 4", "palms 3", "palms 2", "feet"]  # palms get half of the six
+    assert planner.calls == [True, False] and result.passed
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_no_more_than_the_candidates_are_tested(monkeypatch, count):
+    planner = Planner([solution("palms", PALM)], [solution(f"feet {number}", FOOT) for number in range(9)])
+    result, tested = run(planner, set(), monkeypatch, candidates=count)
+    assert len(tested) <= count and not result.passed
+    assert result.reason == "it fell"
