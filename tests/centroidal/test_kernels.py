@@ -5,7 +5,7 @@ import pytest
 
 from toolkit.centroidal.build import transition_problem
 from toolkit.centroidal.fast import pack
-from toolkit.centroidal.kernels import cone, constraints, objective, riccati
+from toolkit.centroidal.kernels import cone, constraints, elimination, objective, riccati
 from toolkit.centroidal.sampling import sample_transition
 from toolkit.contacts.category import Category
 
@@ -170,7 +170,7 @@ def test_the_sweeps_solve_the_newton_system(data):
         gradient += both @ g_step[t]
     expected = -np.linalg.solve(hessian, gradient).reshape(contacts, 6)
 
-    riccati.factor_contacts(data, sweep)
+    elimination.factor(data.first, data.wrench, sweep.hessian, sweep.spread, sweep.total)
     riccati.factor_steps(data, knot_hessian, step_hessian, sweep)
     du, dx = np.empty((contacts, 6)), np.empty((n + 1, 9))
     riccati.solve(data, g_contact.copy(), g_knot, g_step, sweep, du, dx)

@@ -7,17 +7,15 @@ The first solution on a machine compiles the kernels (numba), which are then kep
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 from numba import njit
 
-from toolkit.centroidal.kernels import interior_point, setup
+from toolkit.centroidal.kernels import interior_point, setup, sources
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
 from toolkit.centroidal.residual import confirmed
 
@@ -156,19 +154,12 @@ def solve_many(problems: Iterable[CentroidalProblem], *, config: FastConfig | No
 
 @cache
 def _kernel() -> Callable:
-    """The compiled solver, from disk where its sources have not changed.
-
-    numba's disk cache watches the file of the compiled function only. A hash of all kernels' sources is captured by
-    the closure, and therefore part of the key.
-    """
-    digest = hashlib.sha256()
-    for path in sorted(Path(setup.__file__).parent.glob("*.py")):
-        digest.update(path.read_bytes())
-    sources = int.from_bytes(digest.digest()[:6], "little")
+    """The compiled solver, from disk where its sources have not changed."""
+    key = sources()
 
     @njit(cache=True, nogil=True)
     def run(tolerance, max_iterations, mass, dt, active, position, *arguments):
-        if sources < 0:  # never: makes the hash part of the closure
+        if key < 0:  # never: makes the hash part of the closure
             raise ValueError
         data, violation = setup.pack(mass, dt, active, position, *arguments)
         contacts, n = data.mu.shape[0], dt.shape[0]

@@ -12,13 +12,15 @@ step of all steps by one Riccati sweep over w, as in `toolkit.centroidal.kernels
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-compiled = njit(fastmath={"reassoc", "contract", "arcp", "nsz"}, error_model="numpy", cache=True)
+from toolkit.centroidal.kernels import compiled, elimination, sources
+from toolkit.centroidal.kernels.elimination import cholesky, solve_lower, solve_upper
 
 GIVEN = 12
 """Number of states that are given at the start; the ones after them are free."""
@@ -70,74 +72,21 @@ class _Sweep(NamedTuple):
 
 
 @compiled
-def _cholesky(a, n):
-    """Lower factor in place; small pivots are lifted."""
-    for j in range(n):
-        least = 1e-14 * abs(a[j, j]) + 1e-300
-        for k in range(j):
-            a[j, j] -= a[j, k] * a[j, k]
-        a[j, j] = math.sqrt(max(a[j, j], least))
-        inverse = 1.0 / a[j, j]
-        for i in range(j + 1, n):
-            value = a[i, j]
-            for k in range(j):
-                value -= a[i, k] * a[j, k]
-            a[i, j] = value * inverse
-
-
-@compiled
-def _solve_lower(lower, b, n):
-    """Solve L x = b in place."""
-    for i in range(n):
-        value = b[i]
-        for k in range(i):
-            value -= lower[i, k] * b[k]
-        b[i] = value / lower[i, i]
-
-
-@compiled
-def _solve_upper(lower, b, n):
-    """Solve L' x = b in place."""
-    for i in range(n - 1, -1, -1):
-        value = b[i]
-        for k in range(i + 1, n):
-            value -= lower[k, i] * b[k]
-        b[i] = value / lower[i, i]
-
-
-@compiled
 def _factor(p, hard_scale, soft_scale, s):
     """Factor the Newton system for the barrier's curvatures of hard (C, m) and soft (K,) rows."""
     n, steps, rows = p.a.shape[1], p.a.shape[0], p.rows.shape[1]
-    for t in range(steps):
-        s.total[t] = 0.0
-        for j in range(p.first[t], p.first[t + 1]):
-            h = s.hessian[j]
-            h[:] = 0.0
+    for j in range(p.rows.shape[0]):
+        h = s.hessian[j]
+        h[:] = 0.0
+        for i in range(6):
+            h[i, i] = p.weight[j, i]
+        for r in range(rows):
+            scale = hard_scale[j, r]
             for i in range(6):
-                h[i, i] = p.weight[j, i]
-            for r in range(rows):
-                scale = hard_scale[j, r]
-                for i in range(6):
-                    value = scale * p.rows[j, r, i]
-                    for k in range(i + 1):
-                        h[i, k] += value * p.rows[j, r, k]
-            _cholesky(h, 6)
-            for c in range(6):
-                for i in range(6):
-                    value = p.spread[j, c, i]
-                    for k in range(i):
-                        value -= h[i, k] * s.half[j, k, c]
-                    s.half[j, i, c] = value / h[i, i]
-            for i in range(6):
-                for c in range(6):
-                    for d in range(c + 1):
-                        s.total[t, c, d] += s.half[j, i, c] * s.half[j, i, d]
-        if p.first[t + 1] > p.first[t]:
-            _cholesky(s.total[t], 6)
-        for c in range(6):
-            for d in range(c + 1, 6):
-                s.total[t, c, d] = 0.0
+                value = scale * p.rows[j, r, i]
+                for k in range(i + 1):
+                    h[i, k] += value * p.rows[j, r, k]
+    elimination.factor(p.first, p.spread, s.hessian, s.half, s.total)
     for t in range(steps + 1):
         s.value[t] = p.cost[t]
     for k in range(p.knot.shape[0]):
@@ -158,7 +107,7 @@ def _factor(p, hard_scale, soft_scale, s):
                 for k in range(n):
                     entry += bk[k, i] * right[k, c]
                 theta[i, c] = entry
-        _cholesky(theta, 6)
+        cholesky(theta, 6)
         for c in range(n):
             for i in range(6):
                 entry = 0.0
@@ -203,7 +152,7 @@ def _direction(p, hard_gradient, state_gradient, s, dx, du):
     for t in range(steps):
         for j in range(p.first[t], p.first[t + 1]):
             g = hard_gradient[j]
-            _solve_lower(s.hessian[j], g, 6)
+            solve_lower(s.hessian[j], g, 6)
             for c in range(6):
                 for i in range(6):
                     offset[t, c] += s.half[j, i, c] * g[i]
@@ -225,7 +174,7 @@ def _direction(p, hard_gradient, state_gradient, s, dx, du):
             for k in range(n):
                 entry += s.bk[t, k, i] * v[k]
             y[i] = entry
-        _solve_lower(s.theta[t], y, 6)
+        solve_lower(s.theta[t], y, 6)
         for i in range(n):
             entry = state_gradient[t, i]
             for k in range(n):
@@ -237,9 +186,9 @@ def _direction(p, hard_gradient, state_gradient, s, dx, du):
     dx[0] = 0.0
     if free:
         factor, chosen = s.value[0, GIVEN:, GIVEN:].copy(), -state_gradient[0, GIVEN:]
-        _cholesky(factor, free)
-        _solve_lower(factor, chosen, free)
-        _solve_upper(factor, chosen, free)
+        cholesky(factor, free)
+        solve_lower(factor, chosen, free)
+        solve_upper(factor, chosen, free)
         dx[0, GIVEN:] = chosen
     y, w = np.empty(6), np.empty(6)
     for t in range(steps):
@@ -248,7 +197,7 @@ def _direction(p, hard_gradient, state_gradient, s, dx, du):
             for k in range(n):
                 entry -= s.gain[t, i, k] * dx[t, k]
             y[i] = entry
-        _solve_upper(s.theta[t], y, 6)
+        solve_upper(s.theta[t], y, 6)
         for i in range(6):
             w[i] = -offset[t, i]
             for k in range(i + 1):
@@ -261,14 +210,14 @@ def _direction(p, hard_gradient, state_gradient, s, dx, du):
                 entry += p.b[t, i, k] * w[k]
             dx[t + 1, i] = entry
         if p.first[t + 1] > p.first[t]:
-            _solve_upper(s.total[t], y, 6)
+            solve_upper(s.total[t], y, 6)
         for j in range(p.first[t], p.first[t + 1]):
             for i in range(6):
                 entry = -hard_gradient[j, i]
                 for c in range(6):
                     entry += s.half[j, i, c] * y[c]
                 du[j, i] = entry
-            _solve_upper(s.hessian[j], du[j], 6)
+            solve_upper(s.hessian[j], du[j], 6)
 
 
 @compiled
@@ -303,20 +252,43 @@ def _longest(value, step):
     return longest
 
 
-@compiled
-def solve(p, u, free, max_iterations, tolerance):
+def solve(
+    p: Program, u: np.ndarray, free: np.ndarray, max_iterations: int, tolerance: float
+) -> tuple[np.ndarray, int, float, float]:
     """Solve a program.
+
+    The first call on a machine compiles the kernels, which are then kept on disk.
 
     Args:
         p: the program.
         u: (C, 6) start, overwritten with the solution.
-        free: (n - 9,) start of the free states.
+        free: (n - 12,) start of the free states.
         max_iterations: bound.
         tolerance: on rows' residuals and on the mean complementarity.
 
     Returns:
         (N + 1, n) states, iterations, last residual and complementarity.
     """
+    return _kernel()(p, u, free, max_iterations, tolerance)
+
+
+@cache
+def _kernel() -> Callable:
+    """The compiled solver, from disk where its sources have not changed."""
+    key = sources(__file__)
+
+    @njit(cache=True, nogil=True)
+    def run(p, u, free, max_iterations, tolerance):
+        if key < 0:  # never: makes the hash part of the closure
+            raise ValueError
+        return _solve(p, u, free, max_iterations, tolerance)
+
+    return run
+
+
+@compiled
+def _solve(p, u, free, max_iterations, tolerance):
+    """See `solve`."""
     steps, n = p.a.shape[0], p.a.shape[1]
     contacts, rows = p.rows.shape[0], p.rows.shape[1]
     soft = p.knot.shape[0]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled, cone, constraints, objective, riccati, start
+from toolkit.centroidal.kernels import compiled, cone, constraints, elimination, objective, riccati, start
 from toolkit.centroidal.kernels.setup import ROWS
 
 SOLVED, INFEASIBLE, UNDECIDED = 0, 1, 2
@@ -246,7 +246,7 @@ def solve(data, tolerance, max_iterations, u, x, w):
         if not (value < np.inf and gap < np.inf):
             break
         constraints.add_hessian(data, scaling.inverse, scaling.w, scaling.eta, sweep.hessian, model.knot_hessian)
-        riccati.factor_contacts(data, sweep)
+        elimination.factor(data.first, data.wrench, sweep.hessian, sweep.spread, sweep.total)
         riccati.factor_steps(data, model.knot_hessian, model.step_hessian, sweep)
 
         # Predictor; corrector; or a plain step where the corrector does not lower the barrier function.

@@ -6,19 +6,19 @@ u = H^-1 (B' nu - g) with S nu = w + w0. With S = K K' and w = K y - w0 the cont
 sweep is over 9 states and 6 well scaled controls, however many contacts there are.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from toolkit.centroidal.kernels import compiled
+from toolkit.centroidal.kernels.elimination import cholesky, solve_lower, solve_upper
 
 
 class Sweep(NamedTuple):
     """Factors of one iteration, for N steps and C contacts.
 
     Attributes:
-        hessian: (C, 6, 6) of the contacts; `factor_contacts` turns it into its lower factor.
+        hessian: (C, 6, 6) of the contacts; `elimination.factor` turns it into its lower factor.
         spread: (C, 6, 6) hessian^-1/2 B'.
         total: (N, 6, 6) K, lower.
         mixed: (N, 6, 15) Hessian rows of w against (x, w).
@@ -51,43 +51,6 @@ def allocate(n, contacts):
 
 
 @compiled
-def cholesky(a, n):
-    """Lower factor in place of a symmetric matrix whose lower triangle is given; small pivots are lifted."""
-    for j in range(n):
-        limit = 1e-14 * abs(a[j, j]) + 1e-300
-        for k in range(j):
-            a[j, j] -= a[j, k] * a[j, k]
-        pivot = math.sqrt(max(a[j, j], limit))
-        a[j, j] = pivot
-        inverse = 1.0 / pivot
-        for i in range(j + 1, n):
-            value = a[i, j]
-            for k in range(j):
-                value -= a[i, k] * a[j, k]
-            a[i, j] = value * inverse
-
-
-@compiled
-def solve_lower(lower, b, n):
-    """Solve L x = b in place."""
-    for i in range(n):
-        value = b[i]
-        for k in range(i):
-            value -= lower[i, k] * b[k]
-        b[i] = value / lower[i, i]
-
-
-@compiled
-def solve_upper(lower, b, n):
-    """Solve L' x = b in place."""
-    for i in range(n - 1, -1, -1):
-        value = b[i]
-        for k in range(i + 1, n):
-            value -= lower[k, i] * b[k]
-        b[i] = value / lower[i, i]
-
-
-@compiled
 def forward(h, x, w, out):
     """Out = A x + B w: the dynamics' linear part, gravity's constant left out."""
     for a in range(3):
@@ -113,31 +76,6 @@ def backward(h, y, x, w):
     x[4] -= h * h / 2 * y[6]
     w[0] += h**3 / 6 * y[7]
     w[1] -= h**3 / 6 * y[6]
-
-
-@compiled
-def factor_contacts(data, sweep):
-    """Factor the contacts' Hessians, and sum them up into K of each step."""
-    hessian, spread, total = sweep.hessian, sweep.spread, sweep.total
-    for t in range(data.h.shape[0]):
-        total[t] = 0.0
-        for j in range(data.first[t], data.first[t + 1]):
-            cholesky(hessian[j], 6)
-            for a in range(6):
-                for i in range(6):
-                    value = data.wrench[j, a, i]
-                    for k in range(i):
-                        value -= hessian[j, i, k] * spread[j, k, a]
-                    spread[j, i, a] = value / hessian[j, i, i]
-            for i in range(6):
-                for a in range(6):
-                    for b in range(a + 1):
-                        total[t, a, b] += spread[j, i, a] * spread[j, i, b]
-        if data.first[t + 1] > data.first[t]:
-            cholesky(total[t], 6)
-        for a in range(6):
-            for b in range(a + 1, 6):
-                total[t, a, b] = 0.0
 
 
 @compiled

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled, objective, riccati
+from toolkit.centroidal.kernels import compiled, elimination, objective, riccati
 from toolkit.centroidal.kernels.setup import ROWS
 
 FOLLOW = 30.0
@@ -106,7 +106,7 @@ def follow(data, sweep, u, x, w):
                     elif b == 13:
                         difference += data.guess[t, 0]
                 step_gradient[t, a] += step_hessian[t, a, b] * difference
-    riccati.factor_contacts(data, sweep)
+    elimination.factor(data.first, data.wrench, sweep.hessian, sweep.spread, sweep.total)
     riccati.factor_steps(data, knot_hessian, step_hessian, sweep)
     riccati.sweep_back(data, contact_gradient, knot_gradient, step_gradient, sweep)
     dx, du, before, planned = np.empty(9), np.zeros((contacts, 6)), x.copy(), u.copy()
