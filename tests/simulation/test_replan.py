@@ -12,9 +12,10 @@ from toolkit.simulation.disturbance import Disturbance
 from toolkit.simulation.reference import sample_reference
 from toolkit.simulation.replan_config import ReplanConfig
 from toolkit.simulation.replan_contacts import Cones, Situation
+from toolkit.simulation.replan_dynamics import G
 from toolkit.simulation.replan_kernel import solve
 from toolkit.simulation.replan_nominal import Nominal
-from toolkit.simulation.replan_problem import G, ReplanProblem
+from toolkit.simulation.replan_problem import ReplanProblem
 from toolkit.wholebody.limb_paths import limb_paths
 
 CONFIG = ReplanConfig(enabled=True)

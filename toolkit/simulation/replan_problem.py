@@ -15,18 +15,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.contacts.stance import Contact
-from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
 from toolkit.simulation.cone import friction_rows, sole_rows
 from toolkit.simulation.replan_config import ReplanConfig
 from toolkit.simulation.replan_contacts import Cones, ContactTable, Situation
+from toolkit.simulation.replan_dynamics import Dynamics, FreeLandings, Window
 from toolkit.simulation.replan_kernel import GIVEN, Program
 from toolkit.simulation.replan_landing import apart_row, landing_rows
 from toolkit.simulation.replan_nominal import Nominal
 from toolkit.world.surface import Surface
 
-G = 9.81
 SIDES = 8
 ROWS = SIDES + 12 + 10 + 1
 HARD = 1e4  # price of a landing point outside its region, per m
@@ -121,133 +120,79 @@ class ReplanProblem:
     ) -> Replan | None:
         """The best motion with given ends of the swings under way, and at most so many landing points free."""
         nominal, config, size = self._nominal, self._config, self._size
-        first = int(np.searchsorted(nominal.times, situation.time + 1e-6, side="right")) - 1
-        last = int(np.searchsorted(nominal.times, situation.time + config.horizon, side="left"))
-        last = min(last, len(nominal.times) - 1)
-        span, knots = slice(first, last), slice(first, last + 1)
-        steps = last - first
-        times = nominal.times[knots].copy()
-        times[0] = situation.time
-        dt = np.diff(times)
-        inside = situation.time - nominal.times[first]
-        com, velocity = nominal.com[knots].copy(), nominal.velocity[knots].copy()
-        spin, made = nominal.spin[knots].copy(), nominal.wrench_spin[knots].copy()
-        com[0] += inside * (velocity[0] + 0.5 * inside * nominal.acceleration[first])
-        velocity[0] += inside * nominal.acceleration[first]
-        for each in (spin, made):
-            each[0] += inside / (nominal.times[first + 1] - nominal.times[first]) * (each[1] - each[0])
-        origin = com[0].copy()
-
-        contacts = ContactTable.of(nominal, situation, first, times, early)
-        most = self._config.landings if landings is None else landings
-        free = self._free_landings(situation, first, last, most)
-        column, shift, planes = np.full((steps, 4), -1), contacts.shift, []
-        for index, event in enumerate(free):
-            limb = nominal.swings[event].limb
-            column[contacts.event[:, limb] == event, limb] = index
-            planes.append(self._landings[event].pose.rotation[:, :2])
-
-        # contacts
-        step, limb = np.nonzero(contacts.active)
-        count = np.concatenate([[0], np.cumsum(contacts.active.sum(1))]).astype(np.int64)
-        turn, base = contacts.rotation[step, limb], nominal.wrench[span][step, limb]
-        lever = contacts.position[step, limb] + shift[step, limb] - origin
-        spread = np.zeros((len(step), 6, 6))
-        spread[:, :3, :3] = spread[:, 3:, 3:] = G * turn
-        spread[:, 3:, :3] = G * np.cross(lever[:, None], turn.swapaxes(1, 2)).swapaxes(1, 2)
-        pull = np.einsum("cij,cj->ci", spread, base)
-        pulls = np.zeros((steps, 6))
-        np.add.at(pulls, step, pull)
-        pulls[:, 2] -= G
-        # The rates that the plan's wrenches make: its acceleration, and its angular momentum about the origin. That the
-        # postures have another one is left to the controller.
-        about = made + np.cross(com - origin, velocity)
-        wanted = np.zeros((steps, 6))
-        wanted[:, :3] = np.diff(velocity, axis=0) / dt[:, None]
-        weight_moment = np.zeros((steps, 3))
-        mean = com[:-1] + dt[:, None] * (velocity[:-1] / 2 + dt[:, None] * wanted[:, :3] / 6) - origin
-        weight_moment[:, 0], weight_moment[:, 1] = -G * mean[:, 1], G * mean[:, 0]
-        wanted[:, 3:] = np.diff(about, axis=0) / dt[:, None] - weight_moment
-        rate = pulls - wanted
-
-        # dynamics
-        a, b = np.tile(np.eye(size), (steps, 1, 1)), np.zeros((steps, size, 6))
-        axis = np.arange(3)
-        half, cube = dt**2 / 2, dt**3 / 6
-        a[:, axis, 3 + axis] = dt[:, None]
-        a[:, 6, 1], a[:, 6, 4], a[:, 7, 0], a[:, 7, 3] = -G * dt, -G * half, G * dt, G * half
-        b[:, axis, axis], b[:, 3 + axis, axis], b[:, 6 + axis, 3 + axis] = half[:, None], dt[:, None], dt[:, None]
-        b[:, 6, 1], b[:, 7, 0] = -G * cube, G * cube
-        for c in np.flatnonzero(column[step, limb] >= 0):
-            t, index = step[c], column[step[c], limb[c]]
-            force = pull[c, :3]
-            a[t, 6:9, GIVEN + 2 * index : GIVEN + 2 * index + 2] += dt[t] * np.cross(planes[index].T, force).T
-        drift = np.einsum("tij,tj->ti", b, rate)
-        turning = np.zeros((steps + 1, 3, size))
-        turning[:, :, :3], turning[:, :, 3:6] = _skew(velocity), -_skew(com - origin)
-        turning[:, axis, 6 + axis] = 1.0
-        a[:, 9:12] = turning[:-1]
-
-        cost, slope, constant = self._objective(dt, turning[1:], shift, column, planes, situation, free, span)
-        rows, bound = self._contact_rows(step, limb, base, situation.cones, first, contacts.friction[step, limb])
-        knot, soft, soft_bound, price = self._soft_rows(first, last, shift, column, planes, free, situation, early)
-        start = np.concatenate(
-            [
-                situation.com - com[0],
-                situation.velocity - velocity[0],
-                situation.spin
-                - spin[0]
-                + np.cross(situation.com - origin, situation.velocity)
-                - np.cross(com[0] - origin, velocity[0]),
-                np.zeros(3),
-            ]
-        )
-        start[:3] -= situation.com_shift
-        divergence = float(np.linalg.norm(start[:3] + start[3:6] / config.frequency))
-        start *= max(1.0 - config.deadband / max(divergence, 1e-9), 0.0)
-        start[:3] += situation.com_shift
-        weight = np.empty((len(step), 6))
-        weight[:, :3] = (config.force * dt[step])[:, None]
-        weight[:, 3:] = (np.where(limb < 2, config.moment, PALM_MOMENT) * dt[step])[:, None]
+        window = Window.of(nominal, situation.time, config.horizon)
+        contacts = ContactTable.of(nominal, situation, window.first, window.times, early)
+        events = self._free_landings(situation, window, config.landings if landings is None else landings)
+        planes = [self._landings[event].pose.rotation[:, :2] for event in events]
+        free = FreeLandings.of(events, planes, nominal, contacts)
+        dynamics = Dynamics.of(window, nominal.wrench[window.span], contacts, free, size)
+        cost, slope, constant = self._objective(window, contacts, free, situation)
+        rows, bound = self._contact_rows(window, contacts, dynamics, situation.cones)
+        knot, soft, soft_bound, price = self._soft_rows(window, contacts, free, situation, early)
+        weight = np.empty((len(dynamics.step), 6))
+        duration = window.dt[dynamics.step]
+        weight[:, :3] = (config.force * duration)[:, None]
+        weight[:, 3:] = (np.where(dynamics.limb < 2, config.moment, PALM_MOMENT) * duration)[:, None]
         program = Program(
-            a, b, drift, cost, slope, count, spread, weight, rows, bound, knot, soft, soft_bound, price, 0.05, start
+            a=dynamics.a,
+            b=dynamics.b,
+            drift=dynamics.drift,
+            cost=cost,
+            slope=slope,
+            first=dynamics.first,
+            spread=dynamics.spread,
+            weight=weight,
+            rows=rows,
+            bound=bound,
+            knot=knot,
+            soft_rows=soft,
+            soft_bound=soft_bound,
+            price=price,
+            softness=0.05,
+            start=self._start(window, situation),
         )
-        u = np.zeros((len(step), 6))
+        u = np.zeros((len(dynamics.step), 6))
         guess = np.zeros(size - GIVEN)
-        for index, event in enumerate(free):
-            guess[2 * index : 2 * index + 2] = planes[index].T @ situation.goal.get(event, np.zeros(3))
+        for index, (event, plane) in enumerate(zip(events, planes, strict=True)):
+            guess[2 * index : 2 * index + 2] = plane.T @ situation.goal.get(event, np.zeros(3))
         x, iterations, residual, gap = solver(program, u, guess, config.max_iterations, config.tolerance)
         if not (np.isfinite(x).all() and np.isfinite(u).all() and residual < 1e-3 and gap < 1e-3):
             return None
-        excess = np.maximum(np.einsum("ki,ki->k", soft, x[knot]) - soft_bound, 0.0)
+        excess = price * np.maximum(np.einsum("ki,ki->k", soft, x[knot]) - soft_bound, 0.0)
         objective = constant + 0.5 * np.einsum("ti,tij,tj", x, cost, x) + (slope * x).sum()
-        objective += 0.5 * (weight * u * u).sum() + (price * excess).sum()
+        objective += 0.5 * (weight * u * u).sum() + excess.sum()
         objective += config.early * sum(nominal.swings[k].end - t for k, t in early.items())
-        turned = x[:, 6:9] + np.cross(com - origin, velocity)
-        turned -= np.cross(com + x[:, :3] - origin, velocity + x[:, 3:6])
-        wrench = np.zeros((steps, 4, 6))
-        wrench[step, limb] = base + u
-        ends = [self._nominal.swings[event].end for event in self._landings]
+        wrench = np.zeros((window.steps, 4, 6))
+        wrench[dynamics.step, dynamics.limb] = dynamics.wrench + u
+        ends = [nominal.swings[event].end for event in self._landings]
         next_end = min((end for end in ends if end > situation.time), default=np.inf)
-        landing = {event: plane @ x[0, own] for event, plane, own in zip(free, planes, _columns(free), strict=True)}
+        times, dt, spin = window.times, window.dt[:, None], window.spin_of(x)
         return Replan(
             times=times,
             com=x[:, :3],
             velocity=x[:, 3:6],
-            spin=turned,
-            acceleration=np.diff(x[:, 3:6], axis=0) / dt[:, None],
-            spin_rate=np.diff(turned, axis=0) / dt[:, None],
+            spin=spin,
+            acceleration=np.diff(x[:, 3:6], axis=0) / dt,
+            spin_rate=np.diff(spin, axis=0) / dt,
             wrench=wrench,
-            landing=landing,
+            landing={event: planes[index] @ x[0, free.states(index)] for index, event in enumerate(events)},
             ends=early,
             objective=float(objective),
-            excess=float((price * excess).sum()),
+            excess=float(excess.sum()),
             divergence=np.linalg.norm(x[:, :3] + x[:, 3:6] / config.frequency, axis=1),
-            next_landing=int(np.searchsorted(times, next_end) if next_end < times[-1] else steps),
+            next_landing=int(np.searchsorted(times, next_end) if next_end < times[-1] else window.steps),
             iterations=iterations,
         )
 
-    def _free_landings(self, situation: Situation, first: int, last: int, most: int) -> list[int]:
+    def _start(self, window: Window, situation: Situation) -> np.ndarray:
+        """(12,) the measured deviation from the plan, less what is too small to be worth a reaction."""
+        start = window.deviation(situation)
+        divergence = float(np.linalg.norm(start[:3] + start[3:6] / self._config.frequency))
+        start *= max(1.0 - self._config.deadband / max(divergence, 1e-9), 0.0)
+        start[:3] += situation.com_shift
+        return start
+
+    def _free_landings(self, situation: Situation, window: Window, most: int) -> list[int]:
         """Swings of feet whose landing point is free, the next ones first."""
         nominal = self._nominal
         standing = {event for event, _, _ in situation.standing.values()}
@@ -256,23 +201,17 @@ class ReplanProblem:
             swing = nominal.swings[event]
             if event in standing or event in situation.fixed or swing.end <= situation.time:
                 continue
-            if swing.end >= nominal.times[last] - 1e-6 or len(free) == most:
+            if swing.end >= nominal.times[window.last] - 1e-6 or len(free) == most:
                 break
             free.append(event)
         return free
 
-    def _objective(self, dt, spin, shift, column, planes, situation, free, span):
-        """Quadratic costs of the knots."""
-        config, size, steps = self._config, self._size, len(dt)
-        share = self._nominal.share[span]
-        follow, offset = np.zeros((steps, 3, size)), np.zeros((steps, 3))
-        follow[:, np.arange(3), np.arange(3)] = 1.0
-        for foot in FEET:
-            offset += share[:, foot, None] * shift[:, foot]
-            for index, plane in enumerate(planes):
-                here = column[:, foot] == index
-                follow[here, :, GIVEN + 2 * index : GIVEN + 2 * index + 2] -= share[here, foot, None, None] * plane
-        cost, slope = np.zeros((steps + 1, size, size)), np.zeros((steps + 1, size))
+    def _objective(self, window: Window, contacts: ContactTable, free: FreeLandings, situation: Situation):
+        """Quadratic costs of the knots: Hessians, gradients and the constant."""
+        config, size, dt = self._config, self._size, window.dt
+        spin = window.spin_rows(size)[1:]
+        follow, offset = free.offset_of_feet(contacts.shift, self._nominal.share[window.span], size)
+        cost, slope = np.zeros((window.steps + 1, size, size)), np.zeros((window.steps + 1, size))
         duration = dt[:, None, None]
         cost[1:] += config.com * duration * np.einsum("tki,tkj->tij", follow, follow)
         slope[1:] -= config.com * dt[:, None] * np.einsum("tki,tk->ti", follow, offset)
@@ -287,27 +226,26 @@ class ReplanProblem:
         cost[-1] += config.final * end.T @ end + 0.1 * config.final * spin[-1].T @ spin[-1]
         slope[-1] -= config.final * end.T @ offset[-1]
         cost[0, GIVEN:, GIVEN:] += 1e-3 * np.eye(size - GIVEN)
-        for index, event in enumerate(free):
-            own = slice(GIVEN + 2 * index, GIVEN + 2 * index + 2)
+        for index, (event, plane) in enumerate(zip(free.events, free.planes, strict=True)):
+            own = free.states(index)
             cost[0, own, own] += (config.landing + config.landing_change) * np.eye(2)
-            slope[0, own] -= config.landing_change * planes[index].T @ situation.goal.get(event, np.zeros(3))
+            slope[0, own] -= config.landing_change * plane.T @ situation.goal.get(event, np.zeros(3))
         constant = 0.5 * (config.com * dt @ (offset**2).sum(1) + config.final * (offset[-1] ** 2).sum())
         return cost, slope, float(constant)
 
-    def _contact_rows(self, step, limb, base, cones: Cones, first: int, friction):
+    def _contact_rows(self, window: Window, contacts: ContactTable, dynamics: Dynamics, cones: Cones):
         """Rows and bounds of the wrenches' deviations."""
-        nominal = self._nominal
+        step, limb = dynamics.step, dynamics.limb
+        friction = contacts.friction[step, limb]
         rows, limit = np.zeros((len(step), ROWS, 6)), np.zeros((len(step), ROWS))
         for c in range(len(step)):
-            foot = limb[c] < 2
             rows[c, : SIDES + 12] = self._cone(int(limb[c]), float(friction[c]), cones)
             rows[c, -1, 2], limit[c, -1] = 1.0, 3.0
-            if foot:
-                torque = nominal.torque[first + step[c], limb[c]]
+            if limb[c] < 2:
+                torque = self._nominal.torque[window.first + step[c], limb[c]]
                 rows[c, SIDES + 12 : -1] = np.concatenate([torque, -torque])
                 limit[c, SIDES + 12 : -1] = self._config.body.torque
-        bound = np.maximum(limit - np.einsum("cri,ci->cr", rows, base), ROOM)
-        return rows, bound
+        return rows, np.maximum(limit - np.einsum("cri,ci->cr", rows, dynamics.wrench), ROOM)
 
     def _cone(self, limb: int, friction: float, cones: Cones) -> np.ndarray:
         """(SIDES + 12, 6) rows of a contact's cone."""
@@ -322,26 +260,26 @@ class ReplanProblem:
             self._cone_rows[key] = rows
         return rows
 
-    def _soft_rows(self, first: int, last: int, shift, column, planes, free: list[int], situation: Situation, early):
+    def _soft_rows(self, window: Window, contacts: ContactTable, free: FreeLandings, situation: Situation, early):
         """Limits of the body after the first knot, then regions of the landing points."""
-        table, size, config = self._nominal.rows, self._size, self._config
-        begin, end = np.searchsorted(table.knot, [first + 1, last + 1])
+        table, size, config, first = self._nominal.rows, self._size, self._config, window.first
+        begin, end = np.searchsorted(table.knot, [first + 1, window.last + 1])
         knot, limb = table.knot[begin:end] - first, table.limb[begin:end]
         gradient, clearance = table.gradient[begin:end], table.clearance[begin:end]
         rows = np.zeros((end - begin, size))
         rows[:, :3] = -gradient
         # The contact of the step before the knot, or where there is none of the one after it.
-        step = np.where(self._nominal.active[first + knot - 1, limb] | (knot >= len(shift)), knot - 1, knot)
+        step = np.where(self._nominal.active[first + knot - 1, limb] | (knot >= window.steps), knot - 1, knot)
         contact = limb >= 0
-        bound = clearance - np.where(contact, (gradient * shift[step, limb]).sum(1), 0.0)
-        for index, plane in enumerate(planes):
-            here = contact & (column[step, limb] == index)
-            rows[here, GIVEN + 2 * index : GIVEN + 2 * index + 2] = gradient[here] @ plane
+        bound = clearance - np.where(contact, (gradient * contacts.shift[step, limb]).sum(1), 0.0)
+        for index, plane in enumerate(free.planes):
+            here = contact & (free.column[step, limb] == index)
+            rows[here, free.states(index)] = gradient[here] @ plane
         blocks, bounds = [rows], [bound]
-        for index, event in enumerate(free):
+        for index, event in enumerate(free.events):
             region, room = self._region(event, situation, early)
             block = np.zeros((len(region), size))
-            block[:, GIVEN + 2 * index : GIVEN + 2 * index + 2] = region
+            block[:, free.states(index)] = region
             blocks.append(block)
             bounds.append(room)
         landing = sum(len(block) for block in blocks[1:])
@@ -374,16 +312,3 @@ class ReplanProblem:
             rows.append(row[None])
             bounds.append(np.array([room]))
         return np.concatenate(rows), np.concatenate(bounds)
-
-
-def _columns(free: list[int]) -> list[slice]:
-    """States of the shifts of free landing points."""
-    return [slice(GIVEN + 2 * index, GIVEN + 2 * index + 2) for index in range(len(free))]
-
-
-def _skew(v: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) matrices of the cross product with (n, 3) vectors."""
-    matrix = np.zeros((len(v), 3, 3))
-    matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = v[:, 2], -v[:, 1], v[:, 0]
-    return matrix
