@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import linprog
 
-from toolkit.simulation.cone import friction_rows, sole_rows
+from toolkit.simulation.cone import foot_rows, friction_rows, sole_rows, turning_rows
 
 HALF, FRICTION = np.array([0.11, 0.065]), 0.5
 CORNERS = np.array([[a * HALF[0], b * HALF[1], 0.0] for a in (-1, 1) for b in (-1, 1)])
@@ -89,3 +89,38 @@ def test_a_force_at_a_corner_keeps_its_own_yaw_moment_whatever_the_margin():
         angle = rng.uniform(0.0, 2.0 * np.pi)
         force = np.array([0.65 * FRICTION * np.cos(angle), 0.65 * FRICTION * np.sin(angle), 1.0])
         assert (rows @ np.r_[force, np.cross(point, force)] <= 1e-12).all()
+
+
+def sliding_wrench(rng):
+    """Unit load spread affinely over the corners, every corner at its circular cone against one motion of the sole."""
+    cop = rng.uniform(-0.5, 0.5, 2) * HALF
+    load = 0.25 * (1.0 + (CORNERS[:, :2] / HALF**2 * cop).sum(1))
+    angle, spin = rng.uniform(0.0, 2.0 * np.pi), rng.normal() * 20.0
+    velocity = np.array([np.cos(angle), np.sin(angle)]) + spin * np.c_[-CORNERS[:, 1], CORNERS[:, 0]]
+    tangent = -FRICTION * load[:, None] * velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
+    return wrench_of(np.c_[tangent, load], CORNERS)
+
+
+def test_turning_rows_are_near_the_limit_at_which_the_sole_slides():
+    rng, rows = np.random.default_rng(5), foot_rows(FRICTION, HALF)
+    for _ in range(400):
+        wrench = sliding_wrench(rng)
+        inside, beyond = wrench.copy(), wrench.copy()
+        inside[[0, 1, 5]] *= 0.97
+        beyond[[0, 1, 5]] *= 1.08
+        assert (rows @ inside <= 1e-12).all()
+        assert (rows @ beyond > 0.0).any()
+
+
+def test_a_sole_that_pushes_with_all_of_its_friction_cannot_turn():
+    wrench = np.array([-0.95 * FRICTION, 0.0, 1.0, 0.0, 0.0, 0.03])
+    assert (sole_rows(FRICTION, HALF) @ wrench <= 0.0).all()  # square cones at the corners could
+    assert (turning_rows(FRICTION, HALF) @ wrench > 0.0).any()
+    assert (foot_rows(FRICTION, HALF) @ np.append(wrench[:5], 0.0) <= 0.0).all()
+
+
+def test_yaw_factor_of_turning_rows_leaves_pure_pushes_alone():
+    wrench = np.array([0.97 * FRICTION, 0.0, 1.0, 0.0, 0.0, 0.0])
+    assert (foot_rows(FRICTION, HALF, 0.7) @ wrench <= 0.0).all()
+    turn = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.9 * FRICTION * np.hypot(*HALF)])
+    assert (turning_rows(FRICTION, HALF) @ turn <= 0.0).all() and (turning_rows(FRICTION, HALF, 0.7) @ turn > 0.0).any()

@@ -6,7 +6,7 @@ import daqp
 import numpy as np
 
 from toolkit.geometry.limb import Limb
-from toolkit.simulation.cone import friction_rows, sole_rows
+from toolkit.simulation.cone import foot_rows, friction_rows
 
 UNBOUNDED = 1e30
 FORCE_UNIT = 100.0  # N or N m per unit of the solver's variables: keeps the Hessian's entries alike
@@ -38,7 +38,8 @@ class ContactQP:
             self.slots[limb] = slice(start, start + (6 if limb.is_foot else 3))
             start = self.slots[limb].stop
         self.size = start
-        cones = {limb: 28 if limb.is_foot else 16 for limb in limbs}
+        foot, palm = len(foot_rows(1.0, np.ones(2))), len(friction_rows(1.0))
+        cones = {limb: foot if limb.is_foot else palm for limb in limbs}
         rows = nv + sum(cones.values())
         self._cone_rows: dict[Limb, slice] = {}
         start = nv
@@ -70,7 +71,7 @@ class ContactQP:
         if self._cones.get(limb) == key:
             return
         self._cones[limb] = key
-        cone = sole_rows(friction, half_size, yaw) if limb.is_foot else friction_rows(friction)
+        cone = foot_rows(friction, half_size, yaw) if limb.is_foot else friction_rows(friction)
         self.rows[self._cone_rows[limb], self.slots[limb]] = cone
 
     def set_dynamics(
