@@ -21,6 +21,7 @@ from toolkit.errors import DatasetError, InputError, NetworkError
 from toolkit.learning.collect import Progress as Collected
 from toolkit.learning.collect import collect
 from toolkit.learning.dataset import read_dataset
+from toolkit.learning.differentiate import differentiate
 from toolkit.learning.evaluate import Score, at_default, balanced, score
 from toolkit.learning.query import query_seconds
 from toolkit.learning.shard import CollectConfig
@@ -37,9 +38,10 @@ if TYPE_CHECKING:
 DESCRIPTION = """\
 Make the networks with which the contact search judges transitions.
 
-  collect    run the planner in random terrain and label every transition with the centroidal optimiser
-  fit        train a classifier and a regressor per category (needs torch: pip install -e '.[train]')
-  evaluate   score the trained networks on fresh transitions
+  collect        run the planner in random terrain and label every transition with the centroidal optimiser
+  differentiate  add to a data set of an earlier version how the optimiser's objective changes
+  fit            train a classifier and a regressor per category (needs torch: pip install -e '.[train]')
+  evaluate       score the trained networks on fresh transitions
 """
 
 
@@ -104,6 +106,18 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
         f"from before), feasible: {summary.feasible_share:.0%}; fewest of a category: "
         f"{min(total for _, total in summary.counts.values())}\n{args.out}"
     )
+    return 0
+
+
+def run_differentiate(args: argparse.Namespace, console: Console) -> int:
+    """`differentiate`."""
+    robot = load_robot(args.robot, args.robots)
+    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
+        task = progress.add_task("shards")
+        changed = differentiate(
+            args.data, robot, pool, lambda done, total: progress.update(task, completed=done, total=total)
+        )
+    console.print(f"{changed} shards had transitions without derivatives\n{args.data}")
     return 0
 
 
@@ -209,6 +223,12 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
     sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
     sub.set_defaults(run=run_collect)
+
+    sub = add("differentiate", "add derivatives to a data set of an earlier version; goes on where it was stopped")
+    sub.add_argument("--data", type=Path, required=True, help="data set folder")
+    sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
+    sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    sub.set_defaults(run=run_differentiate)
 
     sub = add("fit", "train a classifier and a regressor per category")
     sub.add_argument("--data", type=Path, required=True, help="data set folder")

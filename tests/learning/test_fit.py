@@ -1,5 +1,7 @@
 """Training: networks learn what can be learnt, files hold what was trained, and bad data are refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
 from toolkit.learning.dataset import Samples
 from toolkit.learning.fit import FitConfig, fit_category, train_networks
+from toolkit.learning.sensitivity import sensitivity_size
 from toolkit.prediction.features import COM, feature_size
 from toolkit.prediction.network import load_network, network_path, training_summary
 
@@ -71,6 +74,33 @@ def test_a_file_holds_what_was_trained(tmp_path, trained):
     np.testing.assert_array_equal(network.upper, samples().features.max(0))
     assert training_summary(network)["samples"] == 2500
     assert network_path(tmp_path, CATEGORY).stat().st_size < 1.5e6  # ten of them in 15 MB
+
+
+def with_sensitivity(rows, wrong=False):
+    """The samples with the derivatives of their made-up objective; a fifth of them unknown."""
+    scales = np.geomspace(0.01, 10, feature_size(CATEGORY))
+    known = np.zeros((len(rows), sensitivity_size(CATEGORY)), np.float32)
+    known[:, 1] = 20 * (1 + rows.features[:, 1] / scales[1]) / scales[1]  # of the first foot's y, on which it depends
+    known[:, 7] = 0.0
+    known[~rows.feasible] = np.nan
+    known[::5] = np.nan
+    return replace(rows, sensitivity=-known if wrong else known)
+
+
+def objective_error(trained, fresh):
+    good = fresh.feasible
+    return np.abs(trained.predict(fresh.features[good])[:, 0] - fresh.targets[good, 0]).mean()
+
+
+def test_derivatives_help_and_wrong_ones_do_harm():
+    few, fresh = samples(400), samples(500, seed=9)
+    config = replace(CONFIG, sensitivity_weight=3.0)
+    plain = objective_error(train_networks(few, config), fresh)
+    helped = objective_error(train_networks(with_sensitivity(few), config), fresh)
+    harmed = objective_error(train_networks(with_sensitivity(few, wrong=True), config), fresh)
+    assert helped < 0.8 * plain < plain < harmed
+    ignored = train_networks(with_sensitivity(few), replace(config, sensitivity_weight=0.0))
+    assert objective_error(ignored, fresh) == plain
 
 
 def test_too_few_of_a_label_are_refused(tmp_path):

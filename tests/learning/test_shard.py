@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from toolkit.contacts.category import Category
+from toolkit.learning.sensitivity import sensitivity_size
 from toolkit.learning.shard import PALMS_BEFORE, CollectConfig, Quota, categories_of, collect_shard
 from toolkit.learning.terrain import TerrainConfig, random_terrain
 from toolkit.prediction.features import CONTACT, contact_count, feature_size
@@ -33,6 +34,9 @@ def test_a_shard_holds_enough_of_every_category_and_both_labels(shard, config):
         assert (group.targets[~group.feasible] == 0).all()
         assert (group.targets[group.feasible, 0] >= 0).all()
         assert (group.targets[:, 0] <= config.objective_limit).all()
+        known = ~np.isnan(group.sensitivity).any(1)
+        assert not (known & ~group.feasible).any()
+        assert known[group.feasible].mean() > 0.6  # unknown where the CoM was out of reach by rounding
 
 
 def test_features_are_what_was_asked_for(shard, config):
@@ -53,7 +57,7 @@ def test_a_shard_is_a_function_of_its_arguments(shard, config):
     other = collect_shard(config, 5)
     another = collect_shard(replace(config, seed=4), 4)
     for category, group in shard.items():
-        for name in ("features", "feasible", "targets"):
+        for name in ("features", "feasible", "targets", "sensitivity"):
             np.testing.assert_array_equal(getattr(again[category], name), getattr(group, name))
         for different in (other, another):
             assert not np.array_equal(different[category].features[:10], group.features[:10])
@@ -73,7 +77,8 @@ def test_a_quota_counts():
     quota = Quota(3, [Category.MOVE_FOOT])
     size = feature_size(Category.MOVE_FOOT)
     assert not quota.full and quota.lack(Category.MOVE_FOOT) == 3
-    quota.add(Category.MOVE_FOOT, np.ones((4, size)), np.ones(4, bool), np.ones((4, 7)))
+    known = np.ones((4, sensitivity_size(Category.MOVE_FOOT)))
+    quota.add(Category.MOVE_FOOT, np.ones((4, size)), np.ones(4, bool), np.ones((4, 7)), known)
     assert quota.full and quota.lack(Category.MOVE_FOOT) == 0
     assert len(quota.samples()[Category.MOVE_FOOT]) == 4  # what was labelled is kept
 

@@ -1,10 +1,12 @@
 """Data sets of labelled transitions: a manifest and numbered shards, each written whole or not at all.
 
     DIR/manifest.json      what was asked for: robot, fingerprint, seed, versions, settings
-    DIR/shard-000000.npz   per category c: features_c (n, d) float32, feasible_c (n,) bool, targets_c (n, 7) float32
+    DIR/shard-000000.npz   per category c: features_c (n, d) float32, feasible_c (n,) bool, targets_c (n, 7) float32,
+                           sensitivity_c (n, k) float32
 
 Shard i depends on the manifest and on i alone. So a collection that was killed goes on with the shards that are
-missing, and nothing is lost or doubled.
+missing, and nothing is lost or doubled. Older shards have no sensitivities: they are unknown there, and
+`learning.differentiate` adds them.
 """
 
 from __future__ import annotations
@@ -19,9 +21,11 @@ import numpy as np
 
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
+from toolkit.learning.sensitivity import sensitivity_size
 from toolkit.prediction.features import TARGETS, feature_size
 
-SCHEMA = "transition-data-1"
+SCHEMA = "transition-data-2"
+READABLE = ("transition-data-1", SCHEMA)  # the first had no sensitivities
 
 
 @dataclass(frozen=True)
@@ -58,18 +62,38 @@ class Samples:
         features: (n, d) float32, canonical, see `features.encode`.
         feasible: (n,) bool.
         targets: (n, 7) float32; objective, CoM (m), CoM velocity (m/s); zero where not feasible.
+        sensitivity: (n, k) float32, derivatives of the objective, see `learning.sensitivity`; NaN where unknown. None:
+            all unknown.
     """
 
     features: np.ndarray
     feasible: np.ndarray
     targets: np.ndarray
+    sensitivity: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.features)
 
-    def select(self, rows: np.ndarray) -> Samples:
+    def select(self, rows: np.ndarray | slice) -> Samples:
         """The samples of these rows."""
-        return Samples(self.features[rows], self.feasible[rows], self.targets[rows])
+        known = None if self.sensitivity is None else self.sensitivity[rows]
+        return Samples(self.features[rows], self.feasible[rows], self.targets[rows], known)
+
+
+def join(groups: list[Samples], category: Category) -> Samples:
+    """Samples of a category one after the other; sensitivities that some lack are NaN there."""
+    known = None
+    if any(group.sensitivity is not None for group in groups):
+        unknown = np.full((1, sensitivity_size(category)), np.nan, np.float32)
+        known = np.concatenate(
+            [np.repeat(unknown, len(g), 0) if g.sensitivity is None else g.sensitivity for g in groups]
+        )
+    return Samples(
+        np.concatenate([group.features for group in groups]),
+        np.concatenate([group.feasible for group in groups]),
+        np.concatenate([group.targets for group in groups]),
+        known,
+    )
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -87,7 +111,7 @@ def read_manifest(folder: Path) -> Manifest:
         manifest = Manifest(**json.loads(path.read_text()))
     except (json.JSONDecodeError, TypeError) as error:
         raise DatasetError(f"{path}: not a manifest ({error}); collect into another folder") from None
-    if manifest.schema != SCHEMA:
+    if manifest.schema not in READABLE:
         raise DatasetError(f"{path}: schema {manifest.schema!r}, expected {SCHEMA!r}; collect the data again")
     return manifest
 
@@ -104,6 +128,8 @@ def write_shard(folder: Path, index: int, samples: dict[Category, Samples]) -> N
         arrays[f"features_{int(category)}"] = group.features
         arrays[f"feasible_{int(category)}"] = group.feasible
         arrays[f"targets_{int(category)}"] = group.targets
+        if group.sensitivity is not None:
+            arrays[f"sensitivity_{int(category)}"] = group.sensitivity
     path = shard_path(folder, index)
     temporary = path.with_suffix(".part")
     with temporary.open("wb") as file:
@@ -132,13 +158,19 @@ def read_shard(path: Path) -> dict[Category, Samples]:
             continue
         if not all(name in arrays for name in names):
             raise DatasetError(f"{path}: incomplete arrays for category {int(category)}; {remedy}")
-        group = Samples(*(arrays[name] for name in names))
+        known = arrays.get(f"sensitivity_{int(category)}")
+        features, feasible, targets = (arrays[name] for name in names)
+        group = Samples(features, feasible, targets, known)
         n = len(group.feasible)
         expected = [(n, feature_size(category)), (n,), (n, TARGETS)]
         shapes = [array.shape for array in (group.features, group.feasible, group.targets)]
+        if known is not None:
+            expected.append((n, sensitivity_size(category)))
+            shapes.append(known.shape)
         if shapes != expected:
             raise DatasetError(f"{path}: category {int(category)} has shapes {shapes}, expected {expected}; {remedy}")
-        if not (np.isfinite(group.features).all() and np.isfinite(group.targets).all()):
+        infinite = known is not None and bool(np.isinf(known).any())
+        if infinite or not (np.isfinite(group.features).all() and np.isfinite(group.targets).all()):
             raise DatasetError(f"{path}: category {int(category)} holds NaN or infinite values; {remedy}")
         samples[category] = group
     return samples
@@ -168,11 +200,4 @@ def read_dataset(folder: Path, fingerprint: str, *, limit: int | None = None) ->
     for path in paths:
         for category, samples in read_shard(path).items():
             groups.setdefault(category, []).append(samples)
-    return {
-        category: Samples(
-            np.concatenate([item.features for item in items])[:limit],
-            np.concatenate([item.feasible for item in items])[:limit],
-            np.concatenate([item.targets for item in items])[:limit],
-        )
-        for category, items in sorted(groups.items())
-    }
+    return {category: join(items, category).select(slice(limit)) for category, items in sorted(groups.items())}

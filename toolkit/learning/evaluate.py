@@ -12,6 +12,8 @@ from toolkit.prediction.network import TransitionNetwork
 from toolkit.world.timing import Timing
 
 DEFAULT_FRICTION = 0.5
+AT_DEFAULT = (Timing().shift, Timing().swing, DEFAULT_FRICTION)
+"""Last features of transitions with the paper's timing and friction."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,7 @@ def score(network: TransitionNetwork, samples: Samples) -> Score:
 
 def at_default(samples: Samples) -> Samples:
     """The samples with the paper's timing (1 s + 1 s) and friction (0.5)."""
-    timing = Timing()
-    wanted = np.array([timing.shift, timing.swing, DEFAULT_FRICTION], np.float32)
+    wanted = np.array(AT_DEFAULT, np.float32)
     return samples.select(np.flatnonzero(np.isclose(samples.features[:, -3:], wanted, rtol=0, atol=1e-5).all(1)))
 
 

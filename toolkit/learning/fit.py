@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -15,10 +16,13 @@ from torch import nn
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
 from toolkit.learning.dataset import Samples
+from toolkit.learning.evaluate import AT_DEFAULT
+from toolkit.learning.tangent import TangentSpace, with_gradient
 from toolkit.prediction.features import COM, TARGETS
 from toolkit.prediction.network import (
     HIDDEN,
     LAYERS,
+    OBJECTIVE_SCALE,
     SCHEMA,
     Perceptron,
     compressed,
@@ -44,6 +48,10 @@ class FitConfig:
         dropout: in the classifier.
         width: of the smooth L1 loss, below which it is quadratic, in standard deviations of an output.
         objective_weight: of the objective's loss beside those of the six other outputs.
+        sensitivity_weight: of the loss of the objective's derivatives, where samples have them: their mean, scaled by
+            the features' spreads, see `learning.tangent`. They tell as much as many more labels.
+        sensitivity_width: of their smooth L1 loss; nearly L1, for the objective has edges.
+        default_weight: of samples with the paper's timing and friction beside the others, for the regressor.
         validation: share of the data held out for early stopping: the last ones, which come from other terrain.
         patience: epochs without a better validation loss before stopping.
         coarse: share of the epochs that compute in bfloat16, twice as fast on processors that have it.
@@ -61,6 +69,9 @@ class FitConfig:
     dropout: float = 0.0
     width: float = 0.02
     objective_weight: float = 3.0
+    sensitivity_weight: float = 30.0
+    sensitivity_width: float = 0.005
+    default_weight: float = 2.0
     validation: float = 0.05
     patience: int = 15
     coarse: float = 0.8
@@ -104,19 +115,92 @@ def _perceptron(inputs: int, outputs: int, dropout: float) -> nn.Sequential:
     return nn.Sequential(*layers[:-2])
 
 
+class _Task(Protocol):
+    """What a network learns from numbered samples."""
+
+    def loss(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
+        """What training lowers."""
+        ...
+
+    def error(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
+        """What is watched on samples that were held out."""
+        ...
+
+
+class _Classification:
+    """Inputs (n, d), and whether each is feasible (n, 1)."""
+
+    def __init__(self, inputs: torch.Tensor, targets: torch.Tensor):
+        self._inputs, self._targets = inputs, targets
+
+    def loss(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
+        return nn.functional.binary_cross_entropy_with_logits(net(self._inputs[rows]).float(), self._targets[rows])
+
+    error = loss
+
+
+class _Regression:
+    """Inputs (n, d) and scaled outputs (n, 7), by the smooth L1 loss; the derivatives of the objective where known.
+
+    Args:
+        features: (n, d), and
+        inputs: (n, d) the same z-scored by
+        std: (d,).
+        targets: (n, 7).
+        slopes: (n, k) derivatives of the first target (`learning.sensitivity`), NaN where unknown; None without any.
+        config: of the training.
+    """
+
+    def __init__(
+        self,
+        features: torch.Tensor,
+        inputs: torch.Tensor,
+        std: torch.Tensor,
+        targets: torch.Tensor,
+        slopes: torch.Tensor | None,
+        config: FitConfig,
+    ):
+        self._features, self._inputs, self._std, self._targets, self._config = features, inputs, std, targets, config
+        self._weights = torch.ones(TARGETS, device=targets.device)
+        self._weights[0] = config.objective_weight
+        default = features.new_tensor(AT_DEFAULT)
+        self._importance = 1.0 + (config.default_weight - 1.0) * ((features[:, -3:] - default).abs() < 1e-5).all(1)
+        self._importance /= self._importance.mean()
+        self._known = self._slopes = None
+        if slopes is not None and config.sensitivity_weight > 0.0:
+            self._tangent = TangentSpace(features)
+            self._known = ~slopes.isnan().any(1)
+            self._slopes = self._tangent.of_sensitivity(features, slopes.nan_to_num())
+
+    def loss(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
+        importance = self._importance[rows]
+        if self._known is None or self._slopes is None:
+            return self._of_values(net(self._inputs[rows]), rows, importance)
+        outputs, gradient = with_gradient(net, self._inputs[rows])
+        found = self._tangent.of_gradient(self._features[rows], gradient.float() / self._std)
+        width = self._config.sensitivity_width
+        each = nn.functional.smooth_l1_loss(found, self._slopes[rows], beta=width, reduction="none").mean(1)
+        slope = (each * self._known[rows] * importance).mean()
+        return self._of_values(outputs, rows, importance) + self._config.sensitivity_weight * slope
+
+    def error(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
+        return self._of_values(net(self._inputs[rows]), rows, self._importance[rows])
+
+    def _of_values(self, outputs: torch.Tensor, rows: torch.Tensor, importance: torch.Tensor) -> torch.Tensor:
+        width = self._config.width
+        each = nn.functional.smooth_l1_loss(outputs.float(), self._targets[rows], beta=width, reduction="none")
+        return ((each * importance[:, None]).mean(0) * self._weights).mean()
+
+
 def _train(
-    net: nn.Sequential,
-    data: tuple[torch.Tensor, torch.Tensor],
-    loss: Callable[[torch.Tensor, torch.Tensor], torch.Tensor],
-    config: FitConfig,
-    progress: Callable[[int, float, float], None],
+    net: nn.Sequential, samples: int, task: _Task, config: FitConfig, progress: Callable[[int, float, float], None]
 ) -> Curve:
     """Train in place with early stopping; the weights of the best epoch are kept."""
     device = torch.device(config.device)
-    inputs, targets = (part.to(device) for part in data)
     net.to(device)
     generator = torch.Generator(device).manual_seed(config.seed)
-    count = len(inputs) - max(1, int(config.validation * len(inputs)))
+    count = samples - max(1, int(config.validation * samples))
+    held_out = torch.arange(count, samples, device=device)
     size = min(config.batch, count)
     steps = count // size
     optimiser = torch.optim.AdamW(net.parameters(), config.learning_rate, weight_decay=config.weight_decay, fused=True)
@@ -134,15 +218,14 @@ def _train(
             rows = order[step * size : (step + 1) * size]
             optimiser.zero_grad(set_to_none=True)
             with torch.autocast("cpu", torch.bfloat16, enabled=coarse):
-                outputs = net(inputs[rows])
-            value = loss(outputs.float(), targets[rows])
+                value = task.loss(net, rows)
             value.backward()
             optimiser.step()
             schedule.step()
             total += value.detach()
         net.eval()
         with torch.no_grad():
-            held = float(loss(net(inputs[count:]), targets[count:]))
+            held = float(task.error(net, held_out))
         training.append(float(total) / steps)
         validation.append(held)
         progress(epoch, training[-1], held)
@@ -154,18 +237,6 @@ def _train(
     net.load_state_dict(kept)
     net.cpu().eval()
     return Curve(np.array(training), np.array(validation), best_epoch)
-
-
-def _weighted(config: FitConfig) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
-    """The smooth L1 loss with the objective's own weight."""
-    weights = torch.ones(TARGETS, device=config.device)
-    weights[0] = config.objective_weight
-
-    def loss(outputs: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
-        each = nn.functional.smooth_l1_loss(outputs, targets, beta=config.width, reduction="none")
-        return (each.mean(0) * weights).mean()
-
-    return loss
 
 
 def _folded(
@@ -189,7 +260,8 @@ def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SI
     """Train both networks on samples, in any encoding whose last columns are those of `features.encode`.
 
     The classifier minimises the logistic loss, the regressor the smooth L1 loss of its scaled outputs: the
-    compressed objective, not centred, as in the original; way of the CoM and velocity z-scored.
+    compressed objective, not centred, as in the original; way of the CoM and velocity z-scored. Where samples say how
+    their objective changes, the regressor learns that too (Sobolev training; only in the encoding of `features`).
 
     Args:
         samples: labelled transitions of one category.
@@ -200,15 +272,16 @@ def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SI
     feasible = samples.feasible
     features = samples.features.astype(np.float64)
     mean, std = features.mean(0), np.maximum(features.std(0), 1e-3)
-    inputs = torch.from_numpy(((features - mean) / std).astype(np.float32))
+    inputs = torch.from_numpy(((features - mean) / std).astype(np.float32)).to(config.device)
     size = features.shape[1]
 
     classifier = _perceptron(size, 1, config.dropout)
+    truth = torch.from_numpy(feasible.astype(np.float32)[:, None]).to(config.device)
     curves = {
         "classifier": _train(
             classifier,
-            (inputs, torch.from_numpy(feasible.astype(np.float32)[:, None])),
-            nn.functional.binary_cross_entropy_with_logits,
+            len(samples),
+            _Classification(inputs, truth),
             replace(config, epochs=max(1, round(config.classifier_share * config.epochs))),
             lambda *state: progress("classifier", *state),
         )
@@ -220,14 +293,21 @@ def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SI
     targets[:, 1:4] -= features[kept, COM]
     out_mean = np.concatenate([[0.0], targets[:, 1:].mean(0)])
     out_std = np.maximum(targets.std(0), 1e-4)
+    slopes = None
+    if samples.sensitivity is not None:
+        scale = (OBJECTIVE_SCALE + samples.targets[kept, :1]) * out_std[0]  # of the compressed objective
+        slopes = torch.from_numpy((samples.sensitivity[kept] / scale).astype(np.float32)).to(config.device)
+    rows = torch.from_numpy(np.flatnonzero(kept)).to(config.device)
     regressor = _perceptron(size, TARGETS, 0.0)
-    curves["regressor"] = _train(
-        regressor,
-        (inputs[torch.from_numpy(kept)], torch.from_numpy(((targets - out_mean) / out_std).astype(np.float32))),
-        _weighted(config),
+    task = _Regression(
+        torch.from_numpy(samples.features[kept]).to(config.device),
+        inputs[rows],
+        torch.from_numpy(std.astype(np.float32)).to(config.device),
+        torch.from_numpy(((targets - out_mean) / out_std).astype(np.float32)).to(config.device),
+        slopes,
         config,
-        lambda *state: progress("regressor", *state),
     )
+    curves["regressor"] = _train(regressor, len(rows), task, config, lambda *state: progress("regressor", *state))
     return TrainedNetworks(
         _folded(classifier, mean, std, np.zeros(1), np.ones(1)),
         _folded(regressor, mean, std, out_mean, out_std),

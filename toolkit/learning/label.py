@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from toolkit.centroidal import fast
@@ -15,6 +17,18 @@ from toolkit.prediction.reach import within_reach
 from toolkit.robot.model import RobotModel
 
 
+@dataclass(frozen=True)
+class Labels(TransitionBatch):
+    """What the optimiser says of n transitions, and how its objective changes.
+
+    Attributes:
+        sensitivity: n derivatives of the objective in the world; None where infeasible, or where the CoM had to be
+            moved to where it is within reach: what was solved is not quite what is asked for.
+    """
+
+    sensitivity: tuple[fast.Sensitivity | None, ...]
+
+
 def label(
     robot: RobotModel,
     stance: Stance,
@@ -22,7 +36,7 @@ def label(
     com_velocity: np.ndarray,
     transitions: list[ContactTransition],
     config: ProblemConfig | None = None,
-) -> TransitionBatch:
+) -> Labels:
     """Solve every transition; each "feasible" is confirmed by the compiled residual check.
 
     Args:
@@ -39,14 +53,18 @@ def label(
     n = len(transitions)
     feasible, objective = np.zeros(n, bool), np.full(n, np.inf)
     final_com, velocity = np.array(com, float), np.zeros((n, 3))
+    sensitivity: list[fast.Sensitivity | None] = [None] * n
     start = within_reach(robot, stance, com, config)
     for row, transition in enumerate(transitions):
         problem = transition_problem(robot, stance, start[row], com_velocity[row], transition, config=config)
-        motion = fast.wrenches(problem)
-        if motion is None:
+        found = fast.sensitive_wrenches(problem)
+        if found is None:
             continue
+        motion, derivatives = found
         worst, value = residual_and_objective(problem, motion)
         if worst <= TOLERANCE:
             feasible[row], objective[row] = True, value
             final_com[row], velocity[row] = motion[0][-1], motion[1][-1] / problem.mass
-    return TransitionBatch(feasible, objective, final_com, velocity)
+            if (start[row] == com[row]).all():
+                sensitivity[row] = derivatives
+    return Labels(feasible, objective, final_com, velocity, tuple(sensitivity))

@@ -23,8 +23,9 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import PALMS
-from toolkit.learning.dataset import Samples
+from toolkit.learning.dataset import Samples, join
 from toolkit.learning.label import label
+from toolkit.learning.sensitivity import canonical, sensitivity_size
 from toolkit.learning.terrain import SlopeConfig, TerrainConfig, random_slope, random_terrain
 from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.prediction.features import LAYOUT, TARGETS, encode, feature_size
@@ -135,11 +136,13 @@ class Quota:
     features: dict[Category, list[np.ndarray]] = field(default_factory=dict)
     feasible: dict[Category, list[np.ndarray]] = field(default_factory=dict)
     targets: dict[Category, list[np.ndarray]] = field(default_factory=dict)
+    sensitivity: dict[Category, list[np.ndarray]] = field(default_factory=dict)
     counts: dict[Category, int] = field(default_factory=dict)
 
     def __post_init__(self):
         for category in self.categories:
-            self.features[category], self.feasible[category], self.targets[category] = [], [], []
+            self.features[category], self.feasible[category] = [], []
+            self.targets[category], self.sensitivity[category] = [], []
             self.counts[category] = 0
 
     def lack(self, category: Category) -> int:
@@ -151,13 +154,21 @@ class Quota:
         """Whether nothing is wanted any more."""
         return all(count >= self.wanted for count in self.counts.values())
 
-    def add(self, category: Category, features: np.ndarray, feasible: np.ndarray, targets: np.ndarray) -> None:
-        """Enter samples (n, d), (n,), (n, 7); those of other categories are dropped."""
+    def add(
+        self,
+        category: Category,
+        features: np.ndarray,
+        feasible: np.ndarray,
+        targets: np.ndarray,
+        sensitivity: np.ndarray,
+    ) -> None:
+        """Enter samples (n, d), (n,), (n, 7), (n, k); those of other categories are dropped."""
         if category not in self.counts:
             return
         self.features[category].append(features.astype(np.float32))
         self.feasible[category].append(feasible)
         self.targets[category].append(targets.astype(np.float32))
+        self.sensitivity[category].append(sensitivity.astype(np.float32))
         self.counts[category] += len(feasible)
 
     def samples(self) -> dict[Category, Samples]:
@@ -167,6 +178,7 @@ class Quota:
                 np.concatenate([np.zeros((0, feature_size(category)), np.float32), *self.features[category]]),
                 np.concatenate([np.zeros(0, bool), *self.feasible[category]]),
                 np.concatenate([np.zeros((0, TARGETS), np.float32), *self.targets[category]]),
+                np.concatenate([np.zeros((0, sensitivity_size(category)), np.float32), *self.sensitivity[category]]),
             )
             for category in self.categories
         }
@@ -260,7 +272,11 @@ class _Recorder:
         targets[good, 0] = batch.objective[good]
         targets[good, 1:4] = frame.point(batch.com[good])
         targets[good, 4:7] = frame.vector(batch.com_velocity[good])
-        self._quota.add(category, features[kept], batch.feasible[kept], targets[kept])
+        known = np.full((n, sensitivity_size(category)), np.nan)
+        for row, found in enumerate(batch.sensitivity):
+            if found is not None:
+                known[row] = canonical(frame, category, found)
+        self._quota.add(category, features[kept], batch.feasible[kept], targets[kept], known[kept])
         self._balance.count(category, self._kind, batch.feasible[kept])
         on = good[~is_far[good]]  # what follows a large disturbance is nothing that a planner meets
         result.feasible[rows[on]], result.objective[rows[on]] = True, batch.objective[on]
@@ -371,7 +387,8 @@ def collect_shard(config: CollectConfig, index: int) -> dict[Category, Samples]:
         _walk(robot, random_slope(rng, SlopeConfig()), recorder, config.slope_expansions, rng)
     samples = tilted.samples()
     for category, more in slopes.samples().items():
-        samples[category] = _mixed(samples[category], more, rng)
+        joined = join([samples[category], more], category)
+        samples[category] = joined.select(rng.permutation(len(joined)))
     return samples
 
 
@@ -384,10 +401,3 @@ def _walk(robot: RobotModel, text: str, recorder: _Recorder, expansions: int, rn
     )
     with suppress(PlanningError):  # the ground at the start is too steep to stand on: another terrain
         planner.search(rng, np.inf)
-
-
-def _mixed(first: Samples, second: Samples, rng: np.random.Generator) -> Samples:
-    """Both in random order."""
-    parts = ("features", "feasible", "targets")
-    joined = Samples(*(np.concatenate([getattr(first, part), getattr(second, part)]) for part in parts))
-    return joined.select(rng.permutation(len(joined)))

@@ -191,7 +191,7 @@ def direction(data, model, sweep, scaling, residual, s, z, gap, correct, targets
 
 
 @compiled
-def solve(data, tolerance, max_iterations, u, x, w):
+def solve(data, tolerance, max_iterations, u, x, w, z):
     """Solve a problem.
 
     Args:
@@ -201,6 +201,7 @@ def solve(data, tolerance, max_iterations, u, x, w):
         u: (C, 6) contact wrenches, filled.
         x: (N + 1, 9) states, filled.
         w: (N, 6) total wrenches, filled.
+        z: multipliers of the constraints, filled.
 
     Returns:
         Status and number of iterations.
@@ -208,12 +209,8 @@ def solve(data, tolerance, max_iterations, u, x, w):
     n, contacts = data.h.shape[0], data.mu.shape[0]
     lines, rounds = contacts * ROWS + data.plane_offset.shape[0], contacts + data.ball_radius.shape[0]
     degree = float(lines + rounds)
-    s, z, ds = constraints.room(lines, rounds), constraints.room(lines, rounds), constraints.room(lines, rounds)
-    dz, targets, trial = (
-        constraints.room(lines, rounds),
-        constraints.room(lines, rounds),
-        constraints.room(lines, rounds),
-    )
+    s, ds, dz = constraints.room(lines, rounds), constraints.room(lines, rounds), constraints.room(lines, rounds)
+    targets, trial = constraints.room(lines, rounds), constraints.room(lines, rounds)
     constant, residual = constraints.room(lines, rounds), constraints.room(lines, rounds)
     scaling = Scaling(np.empty(lines), np.empty((rounds, 4)), np.empty(rounds), np.empty((rounds, 4)))
     model = Model(

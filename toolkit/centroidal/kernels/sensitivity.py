@@ -1,0 +1,147 @@
+"""How the least objective of one transition changes with what it is asked for.
+
+By the envelope theorem this is the derivative of the Lagrangian at fixed multipliers and wrenches. Those are kept in
+the contacts' frames and the states follow from them, so it is the derivative of one smooth function, taken by central
+differences: a rollout each.
+"""
+
+import math
+
+import numpy as np
+
+from toolkit.centroidal.kernels import compiled, constraints, objective, setup
+
+STEP = 1e-5
+"""m, m/s, rad, s or friction; of the central differences, which err by 1e-9 relatively."""
+NEW = 4
+"""Row of the new contact, after those of the limbs."""
+PLACE, ROTATION, COM, VELOCITY, DURATION, FRICTION = 0, 1, 2, 3, 4, 5
+"""What is varied."""
+
+
+@compiled
+def lagrangian(data, u, z, x, w, slack, constant):
+    """Objective less multipliers z times slacks of wrenches u (C, 6), no final rest; the other arrays are room."""
+    objective.rollout(data, u, x, w)
+    constraints.constants(data, constant)
+    constraints.apply(data, u, x, slack)
+    constraints.add(slack, 1.0, constant)
+    return objective.value(data, u, x, w) - constraints.dot(z, slack)
+
+
+@compiled
+def turn(rotation, axis, angle):
+    """Turn a frame (3, 3) in place about an axis of the world."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    b, c = (axis + 1) % 3, (axis + 2) % 3
+    for k in range(3):
+        first, second = rotation[b, k], rotation[c, k]
+        rotation[b, k], rotation[c, k] = cos * first - sin * second, sin * first + cos * second
+
+
+@compiled
+def heading(left, right):
+    """Mean heading in rad of two feet with frames (3, 3), as in `build`."""
+    x = y = 0.0
+    for frame in (left, right):
+        dx, dy = frame[0, 0], frame[1, 0]
+        length = math.hypot(dx, dy)
+        if length > 0.0:
+            dx, dy = dx / length, dy / length
+        x, y = x + dx, y + dy
+    return math.atan2(y, x)
+
+
+@compiled
+def vary(kind, row, axis, step, arguments):
+    """The arguments of `setup.pack` with one thing changed by a step, and what follows from it.
+
+    Args:
+        kind: PLACE or ROTATION of the contact `row`, COM, VELOCITY, DURATION of the phase `axis`, or FRICTION.
+        row: limb, or NEW.
+        axis: of the world.
+        step: how much.
+        arguments: of a problem from `build.transition_problem`.
+    """
+    (mass, dt, active, position, rotation, friction, half_size, reduced, force, yaw, com, velocity, angular, root, tip,
+     reach, height, center, box, rest, weights, grip, yaw_margin, limb, place, frame) = arguments  # fmt: skip
+    n = dt.shape[0]
+    half = n // 2
+    if kind == PLACE:
+        if row == NEW:
+            place = place.copy()
+            place[axis] += step
+        else:
+            position = position.copy()
+            for t in range(n):
+                position[t, row, axis] += step
+        # The final box stands over the mean of the feet after the transition.
+        if (row == NEW and limb < 2) or (row < 2 and row != limb):
+            center = center.copy()
+            center[axis] += 0.5 * step
+    elif kind == ROTATION:
+        if row == NEW:
+            frame = frame.copy()
+            turn(frame, axis, step)
+        else:
+            rotation = rotation.copy()
+            for t in range(n):
+                turn(rotation[t, row], axis, step)
+        left, right = rotation[0, 0], rotation[0, 1]
+        begin = heading(left, right)
+        change = heading(frame if limb == 0 else left, frame if limb == 1 else right) - begin
+        change -= 2.0 * math.pi * round(change / (2.0 * math.pi))
+        yaw = yaw.copy()
+        for t in range(n + 1):
+            yaw[t] = begin + change * max(t - half, 0) / half
+    elif kind == COM:
+        com = com.copy()
+        com[axis] += step
+    elif kind == VELOCITY:
+        velocity = velocity.copy()
+        velocity[axis] += step
+    elif kind == DURATION:
+        dt = dt.copy()
+        for t in range(half):
+            dt[t + half * axis] += step / half
+    else:
+        friction = friction + step
+    return (mass, dt, active, position, rotation, friction, half_size, reduced, force, yaw, com, velocity, angular,
+            root, tip, reach, height, center, box, rest, weights, grip, yaw_margin, limb, place, frame)  # fmt: skip
+
+
+@compiled
+def derivatives(u, z, arguments):
+    """Derivatives of the least objective of a transition.
+
+    Args:
+        u: (C, 6) wrenches, and
+        z: multipliers of the solution.
+        arguments: of `setup.pack`, of a problem from `build.transition_problem`.
+
+    Returns:
+        (5, 6) and (9,), as in `fast.Sensitivity`.
+    """
+    active, limb, n = arguments[2], arguments[23], arguments[1].shape[0]
+    contacts, others = np.zeros((5, 6)), np.zeros(9)
+    x, w = np.zeros((n + 1, 9)), np.zeros((n, 6))
+    slack = constraints.room(z.line.shape[0], z.round.shape[0])
+    constant = constraints.room(z.line.shape[0], z.round.shape[0])
+    for k in range(39):
+        row, axis, kind = k // 6, k % 3, (k // 3) % 2
+        if k >= 30:
+            kind = COM + (k - 30) // 3
+        if k == 38:
+            kind = FRICTION
+        if (row < NEW and not active[0, row]) or (row == NEW and limb < 0):
+            continue
+        change = 0.0
+        for sign in (-1.0, 1.0):
+            data, _ = setup.pack(*vary(kind, row, axis, sign * STEP, arguments))
+            change += sign * lagrangian(data, u, z, x, w, slack, constant)
+        change /= 2.0 * STEP * setup.SCALE
+        if k < 30:
+            contacts[row, k % 6] = change
+        else:
+            others[k - 30] = change
+    return contacts, others

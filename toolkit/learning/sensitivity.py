@@ -1,0 +1,75 @@
+"""Derivatives of the optimiser's objective as the networks' features see them, and transitions back from features.
+
+Columns: for each contact, in the order of `features.encode`, its place (3) and a rotation vector (3); CoM, velocity,
+shift, swing, friction. All in canonical form; NaN where unknown.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.centroidal import fast
+from toolkit.contacts.category import Category
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.geometry.limb import Limb
+from toolkit.geometry.pose import Pose
+from toolkit.prediction.features import COM, CONTACT, LAYOUT, TIMING_AND_FRICTION, Canonical, contact_count
+from toolkit.world.timing import Timing
+
+PART = 6  # numbers per contact
+_NEW = 4  # row of the new contact in `fast.Sensitivity.contacts`
+# The limb that moves, in canonical form.
+MOVING: dict[Category, Limb] = {
+    category: Limb.LEFT_FOOT if "FOOT" in category.name else Limb.LEFT_PALM for category in Category
+}
+
+
+def sensitivity_size(category: Category) -> int:
+    """Number of derivatives of a category."""
+    return PART * contact_count(category) + 9
+
+
+def canonical(frame: Canonical, category: Category, found: fast.Sensitivity) -> np.ndarray:
+    """(sensitivity_size,) derivatives in canonical form.
+
+    Args:
+        frame: of the transition's features.
+        category: of the transition.
+        found: derivatives in the world.
+    """
+    limbs, makes = LAYOUT[category]
+    rows = [int(limb.mirrored if frame.mirrored else limb) for limb in limbs] + [_NEW] * makes
+    parts = found.contacts[rows].reshape(-1, 2, 3)
+    turned = frame.vector(parts)
+    if frame.mirrored:
+        turned[:, 1] *= -1.0  # a mirror turns rotations round
+    others = found.others.copy()
+    others[:3], others[3:6] = frame.vector(others[:3]), frame.vector(others[3:6])
+    return np.concatenate([turned.ravel(), others])
+
+
+def decode(features: np.ndarray, category: Category) -> tuple[Stance, np.ndarray, np.ndarray, ContactTransition]:
+    """The transition that has given features: `features.encode` the other way round.
+
+    Args:
+        features: (d,) of one transition; axes are made orthonormal again.
+        category: of the transition.
+
+    Returns:
+        Stance, CoM (3,) in m, its velocity (3,) in m/s, and the transition, in the canonical frame.
+    """
+    limbs, makes = LAYOUT[category]
+    values = np.asarray(features, float)
+    rows = values[: CONTACT * contact_count(category)].reshape(-1, 3, 3)
+    shift, swing, friction = values[TIMING_AND_FRICTION].tolist()
+    contacts = []
+    for limb, (place, x, z) in zip([*limbs, MOVING[category]], rows, strict=False):
+        z = z / np.linalg.norm(z)
+        x = x - (x @ z) * z
+        x /= np.linalg.norm(x)
+        contacts.append(Contact(limb, Pose(np.column_stack([x, np.cross(z, x), z]), place), friction))
+    new = contacts.pop() if makes else None
+    velocity = values[COM.stop : TIMING_AND_FRICTION.start]
+    transition = ContactTransition(MOVING[category], new, Timing(shift, swing))
+    return Stance(tuple(contacts)), values[COM], velocity, transition
