@@ -1,5 +1,7 @@
 """Robot and world in one model."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -83,8 +85,11 @@ def test_world_changed_since_it_was_loaded(stool, tmp_path):
 
 
 def test_robot_that_brings_its_own_floor_is_refused(stool, make_world):
-    from dataclasses import replace
-
     own = stool.mjcf.replace("<worldbody>", '<worldbody><geom type="plane" size="0 0 1"/>')
     with pytest.raises(RobotError, match="static geoms of the robot"):
         compose_scene(replace(stool, mjcf=own), make_world('<geom type="plane" size="0 0 1"/>'))
+
+
+def test_robot_with_meshes_in_a_world_without(stool, make_world):
+    # Warnings are errors here: MuJoCo warns of assets on one side alone.
+    compose_scene(replace(stool, assets={"unused.obj": b"v 0 0 0"}), make_world('<geom type="plane" size="0 0 1"/>'))

@@ -54,6 +54,8 @@ def compose_scene(robot: RobotModel, world: World) -> mujoco.MjModel:
             setattr(part, size, -1)
     _copy_fields(scenery.visual, spec.visual)
     _copy_fields(scenery.stat, spec.stat)
+    if spec.assets and not scenery.assets:
+        scenery.assets = dict(spec.assets)  # MuJoCo warns of a child without any
     try:
         spec.attach(scenery, prefix=WORLD_PREFIX, frame=spec.worldbody.add_frame())
         model = spec.compile()
