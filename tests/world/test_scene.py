@@ -91,5 +91,8 @@ def test_robot_that_brings_its_own_floor_is_refused(stool, make_world):
 
 
 def test_robot_with_meshes_in_a_world_without(stool, make_world):
-    # Warnings are errors here: MuJoCo warns of assets on one side alone.
-    compose_scene(replace(stool, assets={"unused.obj": b"v 0 0 0"}), make_world('<geom type="plane" size="0 0 1"/>'))
+    obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    own = stool.mjcf.replace("<worldbody>", '<asset><mesh file="shell.obj"/></asset><worldbody>')
+    robot = replace(stool, mjcf=own, assets={"shell.obj": obj.encode()})
+    # Warnings are errors here: MuJoCo warns where only one side of an attachment has files.
+    assert compose_scene(robot, make_world(FLOORS, assets=ASSETS, more=MORE)).nmesh == 1
