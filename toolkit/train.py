@@ -155,8 +155,17 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
             if args.resume and _is_trained(robot, out, category, config, len(data[category])):
                 console.print(f"category {int(category)}: trained already")
                 continue
+            kept = None
+            if args.keep_classifiers:
+                kept = load_network(network_path(out, category), category, robot.fingerprint)
             curves = fit_category(
-                category, data[category], fingerprint=robot.fingerprint, folder=out, config=config, progress=tick
+                category,
+                data[category],
+                fingerprint=robot.fingerprint,
+                folder=out,
+                config=config,
+                progress=tick,
+                kept=kept,
             )
             if not console.is_terminal:
                 losses = {name: round(float(curve.validation.min()), 4) for name, curve in curves.items()}
@@ -233,9 +242,10 @@ def main(argv: list[str] | None = None) -> int:
     sub = add("fit", "train a classifier and a regressor per category")
     sub.add_argument("--data", type=Path, required=True, help="data set folder")
     sub.add_argument("--out", type=Path, help="folder for the networks (default: the robot's networks/)")
-    sub.add_argument("--epochs", type=cli.positive(int), default=60, help="at most (default: %(default)s)")
+    sub.add_argument("--epochs", type=cli.positive(int), default=120, help="at most (default: %(default)s)")
     sub.add_argument("--limit", type=cli.positive(int), help="transitions per category at most")
     sub.add_argument("--resume", action="store_true", help="keep what was trained with the same settings before a stop")
+    sub.add_argument("--keep-classifiers", action="store_true", help="train the regressors alone, of networks in --out")
     sub.add_argument("--categories", type=int, nargs="+", choices=range(10), metavar="0..9", help="only these")
     sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="threads (default: all cores)")
     sub.add_argument("--device", default="cpu", help="where torch computes, such as cuda (default: %(default)s)")

@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
 from toolkit.learning.dataset import Samples
-from toolkit.learning.fit import FitConfig, fit_category, train_networks
+from toolkit.learning.fit import FitConfig, _draw, fit_category, train_networks
 from toolkit.learning.sensitivity import sensitivity_size
 from toolkit.prediction.features import COM, feature_size
 from toolkit.prediction.network import load_network, network_path, training_summary
@@ -94,13 +95,25 @@ def objective_error(trained, fresh):
 
 def test_derivatives_help_and_wrong_ones_do_harm():
     few, fresh = samples(400), samples(500, seed=9)
-    config = replace(CONFIG, sensitivity_weight=3.0)
+    config = replace(CONFIG, sensitivity_weight=30.0, epochs=60)
     plain = objective_error(train_networks(few, config), fresh)
     helped = objective_error(train_networks(with_sensitivity(few), config), fresh)
     harmed = objective_error(train_networks(with_sensitivity(few, wrong=True), config), fresh)
     assert helped < 0.8 * plain < plain < harmed
     ignored = train_networks(with_sensitivity(few), replace(config, sensitivity_weight=0.0))
     assert objective_error(ignored, fresh) == plain
+
+
+def test_what_matters_less_takes_part_less_often():
+    share = torch.where(torch.arange(600) < 300, 1.0, 1.0 / 3.0).double()
+    generator, counts = torch.Generator().manual_seed(0), np.zeros(600)
+    for _ in range(300):
+        drawn = _draw(share, generator)
+        assert len(drawn) in (399, 400, 401)
+        counts[drawn.numpy()] += 1
+    assert (counts[:300] == 300).all()
+    # Binomial with a deviation of 8.2; 600 draws stay within 5 of them.
+    assert abs(counts[300:].mean() - 100) < 1 and np.abs(counts[300:] - 100).max() < 41
 
 
 def test_too_few_of_a_label_are_refused(tmp_path):
@@ -116,6 +129,6 @@ def test_training_stops_early_without_progress():
     noise = samples(600)
     noise.feasible[:] = rng.random(600) < 0.5
     noise.targets[:] = rng.random((600, 7))
-    curves = train_networks(noise, FitConfig(epochs=60, batch=64, patience=3)).curves
+    curves = train_networks(noise, FitConfig(epochs=60, batch=64, patience=3, classifier_share=0.5)).curves
     assert len(curves["classifier"].training) < 60
     assert curves["classifier"].best == len(curves["classifier"].training) - 4

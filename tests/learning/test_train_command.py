@@ -1,12 +1,14 @@
 """`python -m toolkit.train fit`: what a user sees of it."""
 
+import numpy as np
 import pytest
 
 from tests.learning.test_fit import samples
 from toolkit import train
 from toolkit.contacts.category import Category
-from toolkit.errors import InputError
+from toolkit.errors import InputError, NetworkError
 from toolkit.learning.dataset import SCHEMA, Manifest, write_shard
+from toolkit.prediction.network import load_network, training_summary
 from toolkit.robot.loader import load_robot
 
 
@@ -33,6 +35,20 @@ def test_fit_writes_networks_and_curves_and_goes_on_after_a_stop(dataset, tmp_pa
     assert fit(dataset, tmp_path, "--resume", "--seed", "1") == 0
     assert "trained already" not in capsys.readouterr().out
     assert (tmp_path / "category_0.safetensors").read_bytes() != first
+
+
+def test_classifiers_are_kept(dataset, tmp_path):
+    with pytest.raises(NetworkError, match="no such network"):
+        fit(dataset, tmp_path, "--keep-classifiers")
+    fit(dataset, tmp_path)
+    robot = load_robot(None)
+    before = load_network(tmp_path / "category_0.safetensors", Category.MOVE_FOOT, robot.fingerprint)
+    fit(dataset, tmp_path, "--keep-classifiers", "--seed", "1")
+    after = load_network(tmp_path / "category_0.safetensors", Category.MOVE_FOOT, robot.fingerprint)
+    for one, other in zip(before.classifier.weights, after.classifier.weights, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert not np.array_equal(before.regressor.weights[0], after.regressor.weights[0])
+    assert set(training_summary(after)["curves"]) == {"classifier", "regressor"}
 
 
 def test_a_device_that_is_not_there_is_refused(dataset, tmp_path):

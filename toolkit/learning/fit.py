@@ -25,10 +25,12 @@ from toolkit.prediction.network import (
     OBJECTIVE_SCALE,
     SCHEMA,
     Perceptron,
+    TransitionNetwork,
     compressed,
     feasibility,
     network_path,
     outcome,
+    training_summary,
 )
 
 Progress = Callable[[str, int, float, float], None]
@@ -51,7 +53,9 @@ class FitConfig:
         sensitivity_weight: of the loss of the objective's derivatives, where samples have them: their mean, scaled by
             the features' spreads, see `learning.tangent`. They tell as much as many more labels.
         sensitivity_width: of their smooth L1 loss; nearly L1, for the objective has edges.
-        default_weight: of samples with the paper's timing and friction beside the others, for the regressor.
+        default_weight: of samples with the paper's timing and friction beside the others, for the regressor: the others
+            take part in one of so many epochs.
+        orthogonal: whether the regressor's hidden layers are trained with Muon, which needs fewer steps; else by AdamW.
         validation: share of the data held out for early stopping: the last ones, which come from other terrain.
         patience: epochs without a better validation loss before stopping.
         coarse: share of the epochs that compute in bfloat16, twice as fast on processors that have it.
@@ -61,19 +65,20 @@ class FitConfig:
         seed: of the initial weights and the shuffling.
     """
 
-    epochs: int = 60
-    classifier_share: float = 0.5
-    batch: int = 256
+    epochs: int = 120
+    classifier_share: float = 0.2
+    batch: int = 512
     learning_rate: float = 4e-3
     weight_decay: float = 1e-4
     dropout: float = 0.0
     width: float = 0.02
     objective_weight: float = 3.0
-    sensitivity_weight: float = 30.0
+    sensitivity_weight: float = 20.0
     sensitivity_width: float = 0.005
-    default_weight: float = 2.0
+    default_weight: float = 3.0
+    orthogonal: bool = True
     validation: float = 0.05
-    patience: int = 15
+    patience: int = 40
     coarse: float = 0.8
     objective_limit: float = 5e4
     minimum: int = 50
@@ -116,7 +121,13 @@ def _perceptron(inputs: int, outputs: int, dropout: float) -> nn.Sequential:
 
 
 class _Task(Protocol):
-    """What a network learns from numbered samples."""
+    """What a network learns from numbered samples.
+
+    Attributes:
+        share: (n,) of the epochs that each sample takes part in.
+    """
+
+    share: torch.Tensor
 
     def loss(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
         """What training lowers."""
@@ -132,6 +143,7 @@ class _Classification:
 
     def __init__(self, inputs: torch.Tensor, targets: torch.Tensor):
         self._inputs, self._targets = inputs, targets
+        self.share = torch.ones(len(inputs), dtype=torch.float64, device=inputs.device)
 
     def loss(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
         return nn.functional.binary_cross_entropy_with_logits(net(self._inputs[rows]).float(), self._targets[rows])
@@ -164,8 +176,10 @@ class _Regression:
         self._weights = torch.ones(TARGETS, device=targets.device)
         self._weights[0] = config.objective_weight
         default = features.new_tensor(AT_DEFAULT)
-        self._importance = 1.0 + (config.default_weight - 1.0) * ((features[:, -3:] - default).abs() < 1e-5).all(1)
-        self._importance /= self._importance.mean()
+        others = ((features[:, -3:] - default).abs() > 1e-5).any(1)
+        self.share = torch.where(others, 1.0 / config.default_weight, 1.0).double()
+        if others.all():
+            self.share[:] = 1.0
         self._known = self._slopes = None
         if slopes is not None and config.sensitivity_weight > 0.0:
             self._tangent = TangentSpace(features)
@@ -173,55 +187,86 @@ class _Regression:
             self._slopes = self._tangent.of_sensitivity(features, slopes.nan_to_num())
 
     def loss(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
-        importance = self._importance[rows]
         if self._known is None or self._slopes is None:
-            return self._of_values(net(self._inputs[rows]), rows, importance)
+            return self._of_values(net(self._inputs[rows]), rows).mean()
         outputs, gradient = with_gradient(net, self._inputs[rows])
         found = self._tangent.of_gradient(self._features[rows], gradient.float() / self._std)
         width = self._config.sensitivity_width
         each = nn.functional.smooth_l1_loss(found, self._slopes[rows], beta=width, reduction="none").mean(1)
-        slope = (each * self._known[rows] * importance).mean()
-        return self._of_values(outputs, rows, importance) + self._config.sensitivity_weight * slope
+        slope = (each * self._known[rows]).mean()
+        return self._of_values(outputs, rows).mean() + self._config.sensitivity_weight * slope
 
     def error(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
-        return self._of_values(net(self._inputs[rows]), rows, self._importance[rows])
+        share = self.share[rows].float()
+        return (self._of_values(net(self._inputs[rows]), rows) * share).sum() / share.sum()
 
-    def _of_values(self, outputs: torch.Tensor, rows: torch.Tensor, importance: torch.Tensor) -> torch.Tensor:
+    def _of_values(self, outputs: torch.Tensor, rows: torch.Tensor) -> torch.Tensor:
+        """(n,) loss of each sample's outputs."""
         width = self._config.width
         each = nn.functional.smooth_l1_loss(outputs.float(), self._targets[rows], beta=width, reduction="none")
-        return ((each * importance[:, None]).mean(0) * self._weights).mean()
+        return (each * self._weights).mean(1)
+
+
+def _optimisers(net: nn.Sequential, config: FitConfig, orthogonal: bool) -> list[torch.optim.Optimizer]:
+    """AdamW, or Muon for the matrices of all layers but the last."""
+    hidden = [layer.weight for layer in net if isinstance(layer, nn.Linear)][:-1] if orthogonal else []
+    others = [part for part in net.parameters() if not any(part is weight for weight in hidden)]
+    rate, decay = config.learning_rate, config.weight_decay
+    result: list[torch.optim.Optimizer] = [torch.optim.AdamW(others, rate, weight_decay=decay, fused=True)]
+    if hidden:
+        result.append(torch.optim.Muon(hidden, rate, weight_decay=decay, adjust_lr_fn="match_rms_adamw"))
+    return result
+
+
+def _draw(share: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+    """Rows in random order, each with its share as probability; the sum of the shares, rounded down, or one more."""
+    order = torch.randperm(len(share), generator=generator, device=share.device)
+    wheel = share[order].cumsum(0) + torch.rand(1, generator=generator, device=share.device, dtype=share.dtype)
+    return order[wheel.floor() > (wheel - share[order]).floor()]
 
 
 def _train(
-    net: nn.Sequential, samples: int, task: _Task, config: FitConfig, progress: Callable[[int, float, float], None]
+    net: nn.Sequential,
+    task: _Task,
+    config: FitConfig,
+    progress: Callable[[int, float, float], None],
+    *,
+    orthogonal: bool = False,
 ) -> Curve:
     """Train in place with early stopping; the weights of the best epoch are kept."""
+    samples = len(task.share)
     device = torch.device(config.device)
     net.to(device)
     generator = torch.Generator(device).manual_seed(config.seed)
     count = samples - max(1, int(config.validation * samples))
     held_out = torch.arange(count, samples, device=device)
-    size = min(config.batch, count)
-    steps = count // size
-    optimiser = torch.optim.AdamW(net.parameters(), config.learning_rate, weight_decay=config.weight_decay, fused=True)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, config.learning_rate, total_steps=steps * config.epochs, pct_start=0.15
-    )
+    share = task.share[:count]
+    drawn = int(share.sum() - 1e-6 * count) if bool((share < 1.0).any()) else count
+    size = max(1, min(config.batch, drawn))
+    steps = max(1, drawn // size)
+    optimisers = _optimisers(net, config, orthogonal)
+    schedules = [
+        torch.optim.lr_scheduler.OneCycleLR(
+            each, config.learning_rate, total_steps=steps * config.epochs, pct_start=0.15, cycle_momentum=False
+        )
+        for each in optimisers
+    ]
     best, best_epoch, kept = float("inf"), 0, {k: v.clone() for k, v in net.state_dict().items()}
     training, validation = [], []
     for epoch in range(config.epochs):
         net.train()
-        order = torch.randperm(count, generator=generator, device=device)
+        order = _draw(share, generator)
         total = torch.zeros((), device=device)
         coarse = device.type == "cpu" and epoch < config.coarse * config.epochs
         for step in range(steps):
             rows = order[step * size : (step + 1) * size]
-            optimiser.zero_grad(set_to_none=True)
+            net.zero_grad(set_to_none=True)
             with torch.autocast("cpu", torch.bfloat16, enabled=coarse):
                 value = task.loss(net, rows)
             value.backward()
-            optimiser.step()
-            schedule.step()
+            for optimiser, schedule in zip(optimisers, schedules, strict=True):
+                optimiser.step()
+                schedule.step()
             total += value.detach()
         net.eval()
         with torch.no_grad():
@@ -256,7 +301,9 @@ def _folded(
     )
 
 
-def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SILENT) -> TrainedNetworks:
+def train_networks(
+    samples: Samples, config: FitConfig, progress: Progress = _SILENT, *, classifier: Perceptron | None = None
+) -> TrainedNetworks:
     """Train both networks on samples, in any encoding whose last columns are those of `features.encode`.
 
     The classifier minimises the logistic loss, the regressor the smooth L1 loss of its scaled outputs: the
@@ -267,6 +314,7 @@ def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SI
         samples: labelled transitions of one category.
         config: settings.
         progress: called with ("classifier" or "regressor", epoch, training loss, validation loss).
+        classifier: kept as it is where given; only the regressor is trained.
     """
     torch.manual_seed(config.seed)
     feasible = samples.feasible
@@ -275,17 +323,17 @@ def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SI
     inputs = torch.from_numpy(((features - mean) / std).astype(np.float32)).to(config.device)
     size = features.shape[1]
 
-    classifier = _perceptron(size, 1, config.dropout)
-    truth = torch.from_numpy(feasible.astype(np.float32)[:, None]).to(config.device)
-    curves = {
-        "classifier": _train(
-            classifier,
-            len(samples),
+    curves = {}
+    if classifier is None:
+        net = _perceptron(size, 1, config.dropout)
+        truth = torch.from_numpy(feasible.astype(np.float32)[:, None]).to(config.device)
+        curves["classifier"] = _train(
+            net,
             _Classification(inputs, truth),
             replace(config, epochs=max(1, round(config.classifier_share * config.epochs))),
             lambda *state: progress("classifier", *state),
         )
-    }
+        classifier = _folded(net, mean, std, np.zeros(1), np.ones(1))
 
     kept = feasible & (samples.targets[:, 0] < config.objective_limit)
     targets = samples.targets[kept].astype(np.float64)
@@ -307,12 +355,10 @@ def train_networks(samples: Samples, config: FitConfig, progress: Progress = _SI
         slopes,
         config,
     )
-    curves["regressor"] = _train(regressor, len(rows), task, config, lambda *state: progress("regressor", *state))
-    return TrainedNetworks(
-        _folded(classifier, mean, std, np.zeros(1), np.ones(1)),
-        _folded(regressor, mean, std, out_mean, out_std),
-        curves,
+    curves["regressor"] = _train(
+        regressor, task, config, lambda *state: progress("regressor", *state), orthogonal=config.orthogonal
     )
+    return TrainedNetworks(classifier, _folded(regressor, mean, std, out_mean, out_std), curves)
 
 
 def fit_category(
@@ -323,6 +369,7 @@ def fit_category(
     folder: Path,
     config: FitConfig,
     progress: Progress = _SILENT,
+    kept: TransitionNetwork | None = None,
 ) -> dict[str, Curve]:
     """Train both networks of a category and write its file.
 
@@ -333,6 +380,7 @@ def fit_category(
         folder: where `category_<i>.safetensors` goes.
         config: settings.
         progress: called with ("classifier" or "regressor", epoch, training loss, validation loss).
+        kept: whose classifier is taken over; only the regressor is trained.
 
     Returns:
         Learning curves by network.
@@ -347,7 +395,7 @@ def fit_category(
             f"category {int(category)} has {counts[0]} feasible and {counts[1]} infeasible transitions; "
             f"{config.minimum} of each are needed: collect more"
         )
-    trained = train_networks(samples, config, progress)
+    trained = train_networks(samples, config, progress, classifier=None if kept is None else kept.classifier)
     tensors = {
         f"{name}.{layer}.{part}": array
         for name, net in (("classifier", trained.classifier), ("regressor", trained.regressor))
@@ -356,14 +404,17 @@ def fit_category(
     }
     tensors["features.lower"] = samples.features.min(0)
     tensors["features.upper"] = samples.features.max(0)
-    curves = trained.curves
+    curves, before = trained.curves, {} if kept is None else training_summary(kept)
     summary = {
         "samples": len(samples),
         "feasible": counts[0],
         "config": asdict(config),
-        "epochs": {name: len(curve.training) for name, curve in curves.items()},
-        "validation_loss": {name: float(curve.validation.min()) for name, curve in curves.items()},
-        "curves": {
+        "known_sensitivities": 0 if samples.sensitivity is None else int((~np.isnan(samples.sensitivity[:, 0])).sum()),
+        "epochs": before.get("epochs", {}) | {name: len(curve.training) for name, curve in curves.items()},
+        "validation_loss": before.get("validation_loss", {})
+        | {name: float(curve.validation.min()) for name, curve in curves.items()},
+        "curves": before.get("curves", {})
+        | {
             name: [[float(f"{value:.3g}") for value in losses] for losses in (curve.training, curve.validation)]
             for name, curve in curves.items()
         },
