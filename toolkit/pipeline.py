@@ -248,7 +248,7 @@ def _optimised(
     wanted = motion.problem.margins == config.sequence.problem.margins
     if config.landing is None or (motion.feasible and wanted):
         return solution, schedule, motion
-    room = landing_room(robot, world.surfaces, sequence, config.landing)
+    room = landing_room(robot, world.surfaces, sequence, config.landing, world.goal)
     if not room.any():
         return solution, schedule, motion
     moved = optimise(robot, schedule, com, rest, config=config.sequence, room=room)

@@ -12,6 +12,7 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
 from toolkit.robot.loader import find_robots, load_robot
 from toolkit.world.surface import Surface
+from toolkit.world.world import Goal
 
 
 @pytest.fixture(scope="module", params=find_robots())
@@ -35,22 +36,10 @@ def step(robot, x, y, size=1.0, surface=0):
     return ContactSequence(Stance(tuple(contacts)), (ContactTransition(Limb.LEFT_FOOT, landing),)), [square(size)]
 
 
-def first_room(robot, surfaces, sequence, config=RoomConfig()):  # noqa: B008 (frozen)
-    """Room of the first landing, where the foot steps on later: its last contact does not move."""
-    later = Contact(Limb.LEFT_FOOT, Pose.from_yaw(np.array([9.0, 0.0, 0.0]), 0.0), 0.5, -1)
-    longer = ContactSequence(sequence.start, (*sequence.transitions, ContactTransition(Limb.LEFT_FOOT, later)))
-    return landing_room(robot, surfaces, longer, config)[0]
-
-
-def test_the_last_contact_of_a_foot_does_not_move(robot):
-    sequence, surfaces = step(robot, 0.1, 4 * robot.half_sizes[0, 1], size=4.0)
-    assert not landing_room(robot, surfaces, sequence).any()
-
-
 def test_room_is_the_reach_in_the_open(robot):
     sequence, surfaces = step(robot, 0.1, 4 * robot.half_sizes[0, 1], size=4.0)
     config = RoomConfig()
-    room = first_room(robot, surfaces, sequence, config)
+    (room,) = landing_room(robot, surfaces, sequence, config)
     np.testing.assert_allclose(room, np.outer([-1.0, 1.0], config.reach), atol=1e-12)
 
 
@@ -58,7 +47,7 @@ def test_soles_stay_on_the_surface_anywhere_in_the_room(robot):
     half = robot.half_sizes[0]
     edge = 0.5 - half[0] - 0.035  # 3.5 cm from the edge ahead
     sequence, surfaces = step(robot, edge, 0.5 - half[1] - 0.02, size=1.0)
-    room = first_room(robot, surfaces, sequence)
+    (room,) = landing_room(robot, surfaces, sequence)
     assert 0.01 < room[1, 0] <= 0.035 and room[0, 0] < -0.05
     region = shapely.Polygon(surfaces[0].boundary[0])
     contact = sequence.transitions[0].contact
@@ -74,15 +63,15 @@ def test_soles_stay_apart_though_both_may_move(robot):
     half = robot.half_sizes[0]
     config = RoomConfig()
     sequence, surfaces = step(robot, 0.6, -2 * half[1] + 2 * half[1] + config.gap + 0.02, size=4.0)
-    room = first_room(robot, surfaces, sequence, config)
+    (room,) = landing_room(robot, surfaces, sequence, config)
     assert room[0, 1] == pytest.approx(-0.01, abs=1e-9)  # half of the 2 cm beyond the gap
 
 
 def test_contacts_without_a_surface_and_soles_beyond_the_edge_do_not_move(robot):
     sequence, surfaces = step(robot, 0.1, 0.3, surface=-1)
-    assert not first_room(robot, surfaces, sequence).any()
+    assert not landing_room(robot, surfaces, sequence).any()
     sequence, surfaces = step(robot, 0.5, 0.3, size=1.0)
-    assert not first_room(robot, surfaces, sequence).any()
+    assert not landing_room(robot, surfaces, sequence).any()
 
 
 def test_a_moved_sequence_has_its_contacts_where_the_motion_has_them(robot):
@@ -97,3 +86,15 @@ def test_a_moved_sequence_has_its_contacts_where_the_motion_has_them(robot):
     np.testing.assert_array_equal(contact.pose.position, [0.15, 0.31, 0.0])
     assert contact.surface == 0 and moved.start is sequence.start
     assert moved.transitions[0].timing == sequence.transitions[0].timing
+
+
+def test_the_mean_of_the_last_feet_stays_at_the_goal(robot):
+    sequence, surfaces = step(robot, 0.1, 4 * robot.half_sizes[0, 1], size=4.0)
+    centre = sequence.stances[-1].mean_feet.position
+    goal = Goal(centre - [0.1, 0.0, 0.0], 0.2)
+    config = RoomConfig()
+    (room,) = landing_room(robot, surfaces, sequence, config, goal)
+    assert room[0, 0] == -config.reach[0]  # towards the middle of the goal
+    assert 0.05 < room[1, 0] < 0.2 - config.arrival - 0.1 + 1e-9
+    (room,) = landing_room(robot, surfaces, sequence, config, Goal(centre - [0.195, 0.0, 0.0], 0.2))
+    assert room[1, 0] < 1e-6  # planned closer to the edge than wanted: no farther

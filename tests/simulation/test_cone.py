@@ -28,8 +28,8 @@ def test_friction_polygon_lies_inside_the_circular_cone_and_fills_it():
     inside = (forces @ rows.T <= 0.0).all(1)
     ratio = np.hypot(forces[:, 0], forces[:, 1]) / (FRICTION * np.maximum(forces[:, 2], 1e-12))
     assert (ratio[inside] <= 1.0 + 1e-12).all() and (forces[inside, 2] >= 0.0).all()
-    # The inscribed 16-gon reaches cos(pi / 16) = 0.981 of the circle everywhere.
-    assert inside[(ratio < np.cos(np.pi / 16)) & (forces[:, 2] > 0.0)].all()
+    # The inscribed 24-gon reaches cos(pi / 24) = 0.991 of the circle everywhere.
+    assert inside[(ratio < np.cos(np.pi / 24)) & (forces[:, 2] > 0.0)].all()
 
 
 def test_every_wrench_in_the_sole_cone_can_be_exerted_by_the_corners():
@@ -44,7 +44,7 @@ def test_every_wrench_in_the_sole_cone_can_be_exerted_by_the_corners():
         if within:
             inside += 1
             assert corners_can_exert(wrench, FRICTION)
-        elif (rows[16:] @ wrench > 1e-9).any() and np.abs(force[:2]).max() <= FRICTION:
+        elif (rows[24:] @ wrench > 1e-9).any() and np.abs(force[:2]).max() <= FRICTION:
             outside += 1
             assert not corners_can_exert(wrench, FRICTION)
     assert inside > 30 and outside > 30

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import shapely
@@ -15,6 +16,7 @@ from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
 from toolkit.world.polygon import region_of
 from toolkit.world.surface import Surface
+from toolkit.world.world import Goal
 
 
 @dataclass(frozen=True)
@@ -26,16 +28,22 @@ class RoomConfig:
         margin: m; kept between a sole and the edge of its surface, or as much as the planned contact keeps.
         gap: m; kept between a sole and the other one, or as much as the planned contacts keep.
         step: m; the room is found in such steps.
+        arrival: m; kept between the mean of the last feet and the edge of the goal, or as much as the plan keeps.
     """
 
     reach: tuple[float, float] = (0.15, 0.04)
     margin: float = 0.01
     gap: float = 0.03
     step: float = 0.01
+    arrival: float = 0.02
 
 
 def landing_room(
-    robot: RobotModel, surfaces: Sequence[Surface], sequence: ContactSequence, config: RoomConfig = RoomConfig()
+    robot: RobotModel,
+    surfaces: Sequence[Surface],
+    sequence: ContactSequence,
+    config: RoomConfig = RoomConfig(),
+    goal: Goal | None = None,
 ) -> np.ndarray:
     """Box of displacements along each new contact's own axes that keep a sole on its surface and off the other sole.
 
@@ -44,19 +52,17 @@ def landing_room(
         surfaces: of the world; contacts without one do not move.
         sequence: planned contacts.
         config: settings.
+        goal: that the last contacts of the feet do not leave; None: they may.
 
     Returns:
-        (transitions, 2, 2) m; lowest and highest displacement along x and y; zeros for palms, and for the last contact
-        of each foot: where they stand in the end is what the plan was made for.
+        (transitions, 2, 2) m; lowest and highest displacement along x and y; zeros for palms.
     """
     room = np.zeros((len(sequence.transitions), 2, 2))
     stances = sequence.stances
-    last = {transition.limb: index for index, transition in enumerate(sequence.transitions)}
+    final = {item.limb: index for index, item in enumerate(sequence.transitions)}
     for index, transition in enumerate(sequence.transitions):
         contact = transition.contact
         if contact is None or not contact.limb.is_foot or not 0 <= contact.surface < len(surfaces):
-            continue
-        if index == last[transition.limb]:
             continue
         other = stances[index][contact.limb.mirrored]
         following = [item.contact for item in sequence.transitions[index + 1 :] if item.limb == other.limb]
@@ -64,7 +70,9 @@ def landing_room(
         for sole in (other, *following[:1]):
             if sole is not None:
                 box = _apart(box, contact, sole, robot.half_sizes[contact.limb], config.gap)
-        room[index] = _inside(box, contact, surfaces[contact.surface], robot.half_sizes[contact.limb], config)
+        last = goal is not None and final[contact.limb] == index
+        arrived = partial(_arrived, goal, stances[-1].mean_feet.position, contact, config.arrival) if last else None
+        room[index] = _inside(box, contact, surfaces[contact.surface], robot.half_sizes[contact.limb], config, arrived)
     return room
 
 
@@ -84,10 +92,27 @@ def _apart(box: np.ndarray, contact: Contact, sole: Contact, half_size: np.ndarr
     return box
 
 
+def _arrived(goal: Goal, centre: np.ndarray, contact: Contact, margin: float, box: np.ndarray) -> bool:
+    """Whether the mean of the feet stays at the goal wherever in the box a foot lands.
+
+    If it does where both feet are displaced alike, it does where each is on its own: a disc is convex.
+    """
+    corners = np.array([[x, y, 0.0] for x in box[:, 0] for y in box[:, 1]])
+    moved = centre + corners @ contact.pose.rotation.T
+    planned = np.hypot(*(centre - goal.position)[:2])
+    farthest = np.hypot(*(moved - goal.position)[:, :2].T).max()
+    return bool(farthest <= max(goal.radius - margin, planned + 1e-9))
+
+
 def _inside(
-    box: np.ndarray, contact: Contact, surface: Surface, half_size: np.ndarray, config: RoomConfig
+    box: np.ndarray,
+    contact: Contact,
+    surface: Surface,
+    half_size: np.ndarray,
+    config: RoomConfig,
+    allowed: Callable[[np.ndarray], bool] | None,
 ) -> np.ndarray:
-    """The part of the box, grown evenly from zero, in which the sole stays on the surface's region."""
+    """The part of the box, grown evenly from zero, that is allowed and in which the sole stays on the surface."""
     region = region_of(surface)
     frame = surface.pose.inverse() @ contact.pose
     shapely.prepare(region)
@@ -109,7 +134,8 @@ def _inside(
             wider[end, axis] = (
                 max(found[0, axis] - config.step, limit) if end == 0 else min(found[1, axis] + config.step, limit)
             )
-            if wider[end, axis] == found[end, axis] or not holds(wider, margin):
+            stuck = wider[end, axis] == found[end, axis] or (allowed is not None and not allowed(wider))
+            if stuck or not holds(wider, margin):
                 growing.discard((end, axis))
             else:
                 found = wider

@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 
 
-def friction_rows(friction: float, sides: int = 16) -> np.ndarray:
-    """Rows of a regular polygon inside the circular friction cone.
+def friction_rows(friction: float, sides: int = 24) -> np.ndarray:
+    """Rows of a regular polygon inside the circular friction cone, with corners along the axes.
 
     Args:
         friction: Coulomb coefficient.
@@ -17,12 +17,12 @@ def friction_rows(friction: float, sides: int = 16) -> np.ndarray:
     Returns:
         (sides, 3); `rows @ f <= 0` implies |f_xy| <= friction * f_z.
     """
-    angles = 2.0 * np.pi * np.arange(sides) / sides
+    angles = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
     bound = np.full(sides, -friction * np.cos(np.pi / sides))
     return np.column_stack([np.cos(angles), np.sin(angles), bound])
 
 
-def sole_rows(friction: float, half_size: np.ndarray, yaw: float = 1.0, sides: int = 16) -> np.ndarray:
+def sole_rows(friction: float, half_size: np.ndarray, yaw: float = 1.0, sides: int = 24) -> np.ndarray:
     """Rows of the cone of wrenches that a rectangular sole can carry.
 
     Friction as in `friction_rows`; the centre of pressure inside the rectangle, |mx| <= Y fz and |my| <= X fz; and the

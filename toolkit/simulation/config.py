@@ -69,7 +69,7 @@ class ControllerConfig:
     swing_rotation: TaskGains = TaskGains(20.0, 400.0, 40.0)
     swing_share: float = 0.05
     hand: TaskGains = TaskGains(50.0, 200.0, 28.0)
-    com: TaskGains = TaskGains(100.0, 60.0, 14.0)
+    com: TaskGains = TaskGains(1000.0, 60.0, 14.0)
     base: TaskGains = TaskGains(50.0, 100.0, 20.0)
     posture: TaskGains = TaskGains(4.0, 60.0, 15.0)
     leg_posture: float = 0.005
