@@ -29,7 +29,7 @@ def test_friction_polygon_lies_inside_the_circular_cone_and_fills_it():
     ratio = np.hypot(forces[:, 0], forces[:, 1]) / (FRICTION * np.maximum(forces[:, 2], 1e-12))
     assert (ratio[inside] <= 1.0 + 1e-12).all() and (forces[inside, 2] >= 0.0).all()
     # The inscribed 24-gon reaches cos(pi / 24) = 0.991 of the circle everywhere.
-    assert inside[(ratio < np.cos(np.pi / 24)) & (forces[:, 2] > 0.0)].all()
+    assert np.asarray(inside)[(ratio < np.cos(np.pi / 24)) & (forces[:, 2] > 0.0)].all()
 
 
 def test_every_wrench_in_the_sole_cone_can_be_exerted_by_the_corners():

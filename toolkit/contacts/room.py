@@ -70,8 +70,9 @@ def landing_room(
         for sole in (other, *following[:1]):
             if sole is not None:
                 box = _apart(box, contact, sole, robot.half_sizes[contact.limb], config.gap)
-        last = goal is not None and final[contact.limb] == index
-        arrived = partial(_arrived, goal, stances[-1].mean_feet.position, contact, config.arrival) if last else None
+        arrived = None
+        if goal is not None and final[contact.limb] == index:
+            arrived = partial(_arrived, goal, stances[-1].mean_feet.position, contact, config.arrival)
         room[index] = _inside(box, contact, surfaces[contact.surface], robot.half_sizes[contact.limb], config, arrived)
     return room
 
