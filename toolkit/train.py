@@ -20,8 +20,9 @@ from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError, InputError, NetworkError
 from toolkit.learning.collect import Progress as Collected
 from toolkit.learning.collect import collect
-from toolkit.learning.dataset import read_dataset
+from toolkit.learning.dataset import read_dataset, read_datasets
 from toolkit.learning.differentiate import differentiate
+from toolkit.learning.enrich import EnrichConfig, enrich
 from toolkit.learning.evaluate import Score, at_default, balanced, score
 from toolkit.learning.query import query_seconds
 from toolkit.learning.shard import CollectConfig
@@ -40,6 +41,7 @@ Make the networks with which the contact search judges transitions.
 
   collect        run the planner in random terrain and label every transition with the centroidal optimiser
   differentiate  add to a data set of an earlier version how the optimiser's objective changes
+  enrich         label variations of transitions as well, the costly ones most of all
   fit            train a classifier and a regressor per category (needs torch: pip install -e '.[train]')
   evaluate       score the trained networks on fresh transitions
 """
@@ -121,6 +123,25 @@ def run_differentiate(args: argparse.Namespace, console: Console) -> int:
     return 0
 
 
+def run_enrich(args: argparse.Namespace, console: Console) -> int:
+    """`enrich`."""
+    robot = load_robot(args.robot, args.robots)
+    config = EnrichConfig(
+        robot=robot.name,
+        robots=str(robot.folder.parent.resolve()),
+        seed=args.seed,
+        categories=tuple(args.categories),
+        draws=args.draws,
+    )
+    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
+        task = progress.add_task("shards")
+        added = enrich(
+            args.data, args.out, robot, config, pool, lambda done, of: progress.update(task, completed=done, total=of)
+        )
+    console.print(f"{added} transitions added\n{args.out}")
+    return 0
+
+
 def run_fit(args: argparse.Namespace, console: Console) -> int:
     """`fit`."""
     try:
@@ -134,7 +155,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
     torch.set_num_threads(args.workers)
     robot = load_robot(args.robot, args.robots)
     out = args.out or robot.folder / "networks"
-    data = read_dataset(args.data, robot.fingerprint, limit=args.limit)
+    data = read_datasets(args.data, robot.fingerprint, limit=args.limit)
     wanted = [Category(index) for index in args.categories] if args.categories else list(data)
     try:
         torch.zeros(1, device=args.device)
@@ -146,7 +167,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
         task = progress.add_task("epochs", total=2 * config.epochs * len(wanted))
         for number, category in enumerate(wanted):
             if category not in data:
-                raise DatasetError(f"{args.data}: holds no transitions of category {int(category)}; collect more")
+                raise DatasetError(f"{args.data[0]}: holds no transitions of category {int(category)}; collect more")
 
             def tick(name: str, epoch: int, training: float, held: float, number=number, category=category) -> None:
                 done = (2 * number + (name == "regressor")) * config.epochs + epoch + 1
@@ -239,8 +260,21 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
     sub.set_defaults(run=run_differentiate)
 
-    sub = add("fit", "train a classifier and a regressor per category")
+    sub = add(
+        "enrich", "add variations of a data set's transitions, costly ones above all; goes on where it was stopped"
+    )
     sub.add_argument("--data", type=Path, required=True, help="data set folder")
+    sub.add_argument("--out", type=Path, required=True, help="data set folder for the variations, new or begun")
+    sub.add_argument(
+        "--draws", type=cli.positive(int), default=200, help="per category and shard (default: %(default)s)"
+    )
+    sub.add_argument("--categories", type=int, nargs="+", choices=range(10), metavar="0..9", default=list(range(10)))
+    sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
+    sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    sub.set_defaults(run=run_enrich)
+
+    sub = add("fit", "train a classifier and a regressor per category")
+    sub.add_argument("--data", type=Path, required=True, nargs="+", help="data set folder, or several")
     sub.add_argument("--out", type=Path, help="folder for the networks (default: the robot's networks/)")
     sub.add_argument("--epochs", type=cli.positive(int), default=120, help="at most (default: %(default)s)")
     sub.add_argument("--limit", type=cli.positive(int), help="transitions per category at most")

@@ -177,27 +177,38 @@ def read_shard(path: Path) -> dict[Category, Samples]:
 
 
 def read_dataset(folder: Path, fingerprint: str, *, limit: int | None = None) -> dict[Category, Samples]:
-    """All samples of a data set by category, in the order of the shards.
+    """All samples of a data set by category, in the order of the shards; see `read_datasets`."""
+    return read_datasets([folder], fingerprint, limit=limit)
+
+
+def read_datasets(folders: list[Path], fingerprint: str, *, limit: int | None = None) -> dict[Category, Samples]:
+    """All samples of data sets by category, in the order of the shards' numbers.
+
+    So a shard and the variations of its transitions (`learning.enrich`) come together, and what training holds out,
+    the last ones, has no variations among the others.
 
     Args:
-        folder: the data set.
+        folders: the data sets.
         fingerprint: of the robot that they must belong to.
         limit: at most so many samples per category.
 
     Raises:
         DatasetError: another robot's data, no shards, or a broken one.
     """
-    manifest = read_manifest(folder)
-    if manifest.fingerprint != fingerprint:
-        raise DatasetError(
-            f"{folder}: collected for robot {manifest.robot!r} with fingerprint "
-            f"{manifest.fingerprint[:12]}, not {fingerprint[:12]}; collect again for this robot"
-        )
-    paths = sorted(folder.glob("shard-*.npz"))
-    if not paths:
-        raise DatasetError(f"{folder}: holds no shards yet; run python -m toolkit.train collect")
+    paths: list[Path] = []
+    for folder in folders:
+        manifest = read_manifest(folder)
+        if manifest.fingerprint != fingerprint:
+            raise DatasetError(
+                f"{folder}: collected for robot {manifest.robot!r} with fingerprint "
+                f"{manifest.fingerprint[:12]}, not {fingerprint[:12]}; collect again for this robot"
+            )
+        found = list(folder.glob("shard-*.npz"))
+        if not found:
+            raise DatasetError(f"{folder}: holds no shards yet; run python -m toolkit.train collect")
+        paths += found
     groups: dict[Category, list[Samples]] = {}
-    for path in paths:
+    for path in sorted(paths, key=lambda path: path.name):
         for category, samples in read_shard(path).items():
             groups.setdefault(category, []).append(samples)
     return {category: join(items, category).select(slice(limit)) for category, items in sorted(groups.items())}

@@ -14,8 +14,8 @@ from toolkit.errors import DatasetError
 from toolkit.learning.dataset import Samples, read_manifest, read_shard, write_shard
 from toolkit.learning.label import label
 from toolkit.learning.sensitivity import canonical, decode, sensitivity_size
+from toolkit.learning.shard import robot_of
 from toolkit.prediction.features import encode
-from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 
 AGREEMENT = 0.01  # relative to the objective, plus 0.01: features are stored in single precision
@@ -55,7 +55,7 @@ def _job(path: Path, robot: str, robots: str) -> bool:
     lacking = [category for category, group in samples.items() if group.sensitivity is None]
     if not lacking:
         return False
-    model = load_robot(robot, Path(robots))
+    model = robot_of(robot, robots)
     for category in lacking:
         group = samples[category]
         samples[category] = replace(group, sensitivity=sensitivities(model, category, group))

@@ -348,7 +348,7 @@ def _with_friction(stance: Stance, friction: float | None) -> Stance:
 
 
 @lru_cache(maxsize=2)
-def _robot(name: str, robots: str | None) -> RobotModel:
+def robot_of(name: str, robots: str | None) -> RobotModel:
     """The robot, loaded once per process."""
     return load_robot(name, Path(robots) if robots else None)
 
@@ -370,7 +370,7 @@ def collect_shard(config: CollectConfig, index: int) -> dict[Category, Samples]:
         At least `config.per_shard` samples of every category that the robot can perform.
     """
     rng = np.random.default_rng([config.seed, index])
-    robot = _robot(config.robot, config.robots)
+    robot = robot_of(config.robot, config.robots)
     balance = _Balance(config.infeasible)
     tilted, slopes = Quota(config.per_shard, categories_of(robot)), Quota(config.per_slope, [Category.MOVE_FOOT])
     while not tilted.full:

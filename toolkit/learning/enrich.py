@@ -1,0 +1,173 @@
+"""More samples of what is rare and costly: variations of stored transitions.
+
+What nearly fails costs a hundred times more than what a planner mostly meets. So it decides how far off predictions are
+on average, and it is rare. A data set is enriched by transitions near those that it holds, the costly ones most often:
+the new contact is another's, contacts and state are displaced a little. They serve to learn from, never to test on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor, as_completed
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from toolkit.contacts.category import Category
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.errors import DatasetError
+from toolkit.geometry.pose import Pose
+from toolkit.learning.dataset import SCHEMA, Manifest, Samples, join, read_manifest, read_shard, shard_path, write_shard
+from toolkit.learning.evaluate import at_default
+from toolkit.learning.label import label
+from toolkit.learning.sensitivity import canonical, decode, sensitivity_size
+from toolkit.learning.shard import robot_of
+from toolkit.prediction.features import TARGETS, encode
+from toolkit.robot.model import RobotModel
+
+
+@dataclass(frozen=True)
+class EnrichConfig:
+    """How transitions are varied.
+
+    Attributes:
+        robot: name of the robot; robots: folder that holds it.
+        seed: of everything random.
+        categories: which ones.
+        draws: transitions that are tried for each category and shard, of those at the paper's timing and friction.
+        power: they are drawn in proportion to their objective to this power.
+        exchange: share of them that get the new contact of another one.
+        foot: m and rad, standard deviations of a foot's displacement;
+        palm: the same of a palm.
+        com: m, and
+        velocity: m/s; the same of the state.
+        limit: transitions with a larger objective are left out.
+    """
+
+    robot: str
+    robots: str
+    seed: int = 0
+    categories: tuple[int, ...] = tuple(int(category) for category in Category)
+    draws: int = 200
+    power: float = 0.7
+    exchange: float = 0.5
+    foot: tuple[float, float] = (0.01, 0.04)
+    palm: tuple[float, float] = (0.03, 0.08)
+    com: float = 0.02
+    velocity: float = 0.08
+    limit: float = 5e3
+
+
+def variations(
+    robot: RobotModel, category: Category, samples: Samples, config: EnrichConfig, rng: np.random.Generator
+) -> Samples:
+    """Feasible variations of samples, `config.draws` at most.
+
+    Args:
+        robot: the robot.
+        category: of the samples.
+        samples: labelled transitions; only those with the paper's timing and friction are varied.
+        config: how.
+        rng: randomness.
+    """
+    group = at_default(samples)
+    group = group.select(np.flatnonzero(group.feasible))
+    parts = [samples.select(slice(0))]
+    weight = np.maximum(group.targets[:, 0].astype(float), 1e-3) ** config.power
+    for row in rng.choice(len(group), config.draws, p=weight / weight.sum()) if len(group) else ():
+        stance, com, velocity, transition = decode(group.features[row], category)
+        if rng.random() < config.exchange:
+            transition = decode(group.features[rng.integers(len(group))], category)[3]
+        if transition.contact is not None:
+            transition = replace(transition, contact=_displaced(transition.contact, config, rng))
+        stance = Stance(tuple(_displaced(contact, config, rng) for contact in stance.contacts))
+        com = com + config.com * rng.normal(size=3)
+        velocity = velocity + config.velocity * rng.normal(size=3)
+        labels = label(robot, stance, com[None], velocity[None], [transition])
+        if not labels.feasible[0] or labels.objective[0] > config.limit:
+            continue
+        frame, features = encode(stance, com, velocity, [transition])
+        targets = np.concatenate([labels.objective, frame.point(labels.com[0]), frame.vector(labels.com_velocity[0])])
+        known = np.full(sensitivity_size(category), np.nan)
+        if labels.sensitivity[0] is not None:
+            known = canonical(frame, category, labels.sensitivity[0])
+        one = (array.astype(np.float32).reshape(1, -1) for array in (features, targets, known))
+        features, targets, known = one
+        parts.append(Samples(features, labels.feasible, targets.reshape(1, TARGETS), known))
+    return join(parts, category)
+
+
+def _displaced(contact: Contact, config: EnrichConfig, rng: np.random.Generator) -> Contact:
+    place, turn = config.foot if contact.limb.is_foot else config.palm
+    rotation = Rotation.from_rotvec(turn * rng.normal(size=3)).as_matrix() @ contact.pose.rotation
+    return replace(contact, pose=Pose(rotation, contact.pose.position + place * rng.normal(size=3)))
+
+
+def _job(source: Path, folder: Path, config: EnrichConfig) -> int:
+    """Write the variations of one shard; their number."""
+    index = int(source.stem.split("-")[1])
+    robot, shard = robot_of(config.robot, config.robots), read_shard(source)
+    found = {}
+    for category in (Category(number) for number in config.categories):
+        if category in shard:
+            rng = np.random.default_rng([config.seed, index, int(category)])
+            found[category] = variations(robot, category, shard[category], config, rng)
+    write_shard(folder, index, found)
+    return sum(len(group) for group in found.values())
+
+
+def enrich(
+    source: Path,
+    folder: Path,
+    robot: RobotModel,
+    config: EnrichConfig,
+    executor: Executor,
+    progress: Callable[[int, int], None] = lambda done, of: None,
+) -> int:
+    """Write a data set of variations beside a data set; goes on where it was stopped, shard by shard.
+
+    Args:
+        source: the data set that is varied.
+        folder: the new one, or one begun with the same configuration.
+        robot: that both are for.
+        config: how.
+        executor: where shards are worked on.
+        progress: told how many shards of how many are done.
+
+    Returns:
+        Number of transitions that this call added.
+
+    Raises:
+        DatasetError: another robot's data, no shards, a broken one, or a folder with something else in it.
+    """
+    manifest = read_manifest(source)
+    if manifest.fingerprint != robot.fingerprint:
+        raise DatasetError(f"{source}: collected for another robot ({manifest.robot!r}); collect again for this robot")
+    settings = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(config).items() if k != "robots"}
+    settings["varied_seed"] = manifest.seed
+    wanted = Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, manifest.versions)
+    if (folder / "manifest.json").is_file():
+        if replace(read_manifest(folder), versions=wanted.versions) != wanted:
+            raise DatasetError(f"{folder}: begun with other settings; use another --out, or the same options")
+    elif folder.exists() and any(folder.iterdir()):
+        raise DatasetError(f"{folder}: not empty and not a data set; use another --out")
+    else:
+        folder.mkdir(parents=True, exist_ok=True)
+        wanted.write(folder)
+    paths = sorted(source.glob("shard-*.npz"))
+    if not paths:
+        raise DatasetError(f"{source}: holds no shards yet; run python -m toolkit.train collect")
+    missing = [path for path in paths if not shard_path(folder, int(path.stem.split("-")[1])).is_file()]
+    jobs = [executor.submit(_job, path.resolve(), folder.resolve(), config) for path in missing]
+    added = 0
+    try:
+        for done, job in enumerate(as_completed(jobs), len(paths) - len(missing) + 1):
+            added += job.result()
+            progress(done, len(paths))
+    except BaseException:
+        for job in jobs:
+            job.cancel()
+        raise
+    return added
