@@ -42,7 +42,7 @@ class CheckConfig:
     range_tolerance: float = 1e-3
     velocity_ratio: float = 1.0
     torque_ratio: float = 1.0
-    free_torque_ratio: float = 2.0
+    free_torque_ratio: float = 4.0
     collision: CollisionConfig = field(default_factory=CollisionConfig)
 
 
