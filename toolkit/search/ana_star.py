@@ -19,7 +19,6 @@ Reference:
 
 from __future__ import annotations
 
-import heapq
 import math
 import time
 from collections.abc import Callable, Hashable
@@ -29,6 +28,7 @@ from typing import Any, Generic
 import numpy as np
 
 from toolkit.search.graph import Edge, Judge, Path, Progress, SearchProblem, State
+from toolkit.search.open_list import OpenList
 
 _TINY = 1e-9  # divisor in place of h = 0
 
@@ -39,6 +39,7 @@ class AnaStarConfig:
 
     Attributes:
         epsilon: probability of expanding a random open state.
+        layer: random draws take the best state of a random interval of h, so wide; inf: they are uniform.
         initial_cost: stands for G before there is a solution, for the order of expansion only: inf expands the least
             h (depth first, fastest), a smaller value weighs the cost so far as well. Nothing is pruned by it.
         crowding: added to h for the order of expansion, per state already expanded in the same crowd. While there is no
@@ -51,6 +52,7 @@ class AnaStarConfig:
     """
 
     epsilon: float = 0.1
+    layer: float = math.inf
     initial_cost: float = math.inf
     crowding: float = 0.3
     patience: int = 200
@@ -112,10 +114,7 @@ class AnaStar(Generic[State]):
         self._delay: list[float] = []
         self._crowd: list[Hashable] = []
         self._expanded_in: dict[Hashable, int] = {}
-        self._open: list[int] = []  # in no order, for random draws
-        self._place: list[int] = []  # of each node in _open, -1 where it is not open
-        self._heap: list[tuple[float, int, int, float]] = []
-        self._pushes = 0
+        self._open = OpenList(self._priority, self._g, self._h, self._config.layer)
         self._crowding = self._config.crowding
         self._forbidden: set[tuple[State, State]] = set()
 
@@ -150,10 +149,9 @@ class AnaStar(Generic[State]):
             if stopped_by != "exhausted":
                 break
             node = self._next()
-            self._close(node)
             goals = self._expand(node)
             if goals is None:
-                self._reopen(node)
+                self._open.add(node)
                 stopped_by = "time"
                 break
             expanded.append(self._state[node])
@@ -212,25 +210,13 @@ class AnaStar(Generic[State]):
             self._payload.append(edge.payload)
             self._delay.append(edge.delay)
             self._crowd.append(crowd)
-            self._place.append(-1)
         elif g < self._g[node]:
             self._g[node], self._parent[node] = g, parent
             self._edge_cost[node], self._payload[node] = edge.cost, edge.payload
             self._delay[node] = edge.delay
         else:
             return
-        self._reopen(node)
-
-    def _reopen(self, node: int) -> None:
-        if self._place[node] < 0:
-            self._place[node] = len(self._open)
-            self._open.append(node)
-        self._push(node)
-
-    def _push(self, node: int) -> None:
-        self._pushes += 1
-        # Equal priorities: the newest first, which keeps the search going in depth.
-        heapq.heappush(self._heap, (self._priority(node), -self._pushes, node, self._g[node]))
+        self._open.add(node)
 
     def _priority(self, node: int) -> float:
         """Falls as e(s) rises."""
@@ -244,23 +230,10 @@ class AnaStar(Generic[State]):
         return -margin / max(h, _TINY) if margin > 0 else -margin * h  # second case: only before a solution
 
     def _next(self) -> int:
+        """Close and return the node to expand."""
         if self._config.epsilon > 0 and self._rng.random() < self._config.epsilon:
-            return self._open[int(self._rng.integers(len(self._open)))]
-        while True:  # entries of closed nodes and of older paths are stale; every open node has a fresh one
-            priority, order, node, g = heapq.heappop(self._heap)
-            if self._place[node] < 0 or g != self._g[node]:
-                continue
-            now = self._priority(node)
-            if now > priority:  # its crowd has grown since: back with it
-                heapq.heappush(self._heap, (now, order, node, g))
-                continue
-            return node
-
-    def _close(self, node: int) -> None:
-        place, last = self._place[node], self._open[-1]
-        self._open[place], self._place[last] = last, place
-        self._open.pop()
-        self._place[node] = -1
+            return self._open.take_random(self._rng)
+        return self._open.take_best()
 
     def _reach(self, node: int, edge: Edge[State], began: float, expansions: int) -> Path[State] | None:
         """Take an edge to a goal if it improves on the best solution and the judge agrees."""
@@ -318,14 +291,4 @@ class AnaStar(Generic[State]):
 
     def _prune(self) -> None:
         """Close what cannot improve on the new G and sort the rest by the new e."""
-        kept = [node for node in self._open if self._g[node] + self._h[node] < self._best]
-        for node in self._open:
-            self._place[node] = -1
-        for place, node in enumerate(kept):
-            self._place[node] = place
-        self._open = kept
-        self._heap = []
-        for node in sorted(kept):
-            self._pushes += 1
-            self._heap.append((self._priority(node), -self._pushes, node, self._g[node]))
-        heapq.heapify(self._heap)
+        self._open.reset([node for node in self._open if self._g[node] + self._h[node] < self._best])

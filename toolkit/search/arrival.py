@@ -11,8 +11,9 @@ from typing import Any
 
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.search import screen
+from toolkit.search.cost import CostConfig
 from toolkit.search.graph import Edge
-from toolkit.search.problem import ContactProblem, CostConfig
+from toolkit.search.problem import ContactProblem
 from toolkit.search.state import is_pending
 
 

@@ -4,88 +4,42 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from toolkit.contacts.arm_map import ArmMap
-from toolkit.contacts.projection import Projected, ProjectionConfig, Projector
-from toolkit.contacts.sequence import ContactSequence, ContactTransition
+from toolkit.contacts.projection import Projected, Projector
+from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.contacts.transition_model import TransitionModel, steps_38, steps_60, wide_steps
-from toolkit.errors import InputError, PlanningError
+from toolkit.errors import PlanningError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
-from toolkit.search.ana_star import AnaStar, AnaStarConfig, AnaStarResult
+from toolkit.search.ana_star import AnaStar, AnaStarResult
 from toolkit.search.arrival import Arrival
 from toolkit.search.contact_table import ContactTable
 from toolkit.search.exclusion import Exclusion
-from toolkit.search.graph import Path, Progress
-from toolkit.search.heuristic import Distance, EuclideanDistance, GridConfig
-from toolkit.search.moves import MoveConfig, MoveGenerator
-from toolkit.search.problem import ContactProblem, CostConfig
-from toolkit.search.reach_check import ReachConfig
-from toolkit.search.result import SearchResult, Solution
+from toolkit.search.graph import Progress
+from toolkit.search.heuristic import Distance, EuclideanDistance
+from toolkit.search.moves import MoveGenerator
+from toolkit.search.outcome import reason_of, solution_of
+from toolkit.search.planner_config import PlannerConfig
+from toolkit.search.problem import ContactProblem
+from toolkit.search.result import SearchResult
 from toolkit.search.start import place_feet
-from toolkit.search.state import COM, CONTACTS, VELOCITY, is_pending, unpack
+from toolkit.search.state import CONTACTS, is_pending, unpack
 from toolkit.search.terrain_distance import TerrainDistance, resting_surfaces
-from toolkit.world.timing import Timing
 from toolkit.world.world import World
 
 _UNTRAINED = (
     "timing or friction outside what the networks were trained for; the optimiser judged there instead, which is slower"
 )
 _DEEP = 10  # patience of a search over slippery ground, in multiples of the patience elsewhere
+_LAYER, _EPSILON, _CROWDING = 1.5, 0.15, 0.6  # of a search that has to slide: see `AnaStarConfig`
 _LAZY = 20  # expansions with one transition judged in each that count as one with all judged
-
-
-@dataclass(frozen=True)
-class PlannerConfig:
-    """Settings of the planner.
-
-    Attributes:
-        steps: 60 or 38; rows of the foot transition model.
-        wide_steps: "on", "off", or "auto": where normal steps do not lead to the goal, or where some ground holds no
-            resting foot and has to be crossed fast.
-        palms: whether palms may be used.
-        heuristic: "grid" or "euclidean".
-        timings: of a transition, to choose from; empty: the world's.
-        rest_friction: ground steeper than this part of its friction angle's tangent holds no foot at all; None: the
-            evaluator decides.
-        cost: edge costs.
-        reach: what legs and arms may reach.
-        moves: kinematic limits.
-        projection: how patches find their place.
-        grid: of the heuristic.
-        acceptable_cost: per m of way; order of magnitude of the first solution's cost, where `search.initial_cost`
-            leaves it open: the lower, the more the cost so far counts before there is a solution; inf: the search goes
-            straight for the goal.
-        search: of ANA*. Time decides when a search stops, so the same seed gives the same plan only as long as the
-            machine gets through the same expansions; `search.max_expansions` makes it exact.
-    """
-
-    steps: int = 60
-    wide_steps: str = "auto"
-    palms: bool = True
-    heuristic: str = "grid"
-    timings: tuple[Timing, ...] = ()
-    rest_friction: float | None = None
-    cost: CostConfig = field(default_factory=CostConfig)
-    reach: ReachConfig = field(default_factory=ReachConfig)
-    moves: MoveConfig = field(default_factory=MoveConfig)
-    projection: ProjectionConfig = field(default_factory=ProjectionConfig)
-    grid: GridConfig = field(default_factory=GridConfig)
-    acceptable_cost: float = 2500.0
-    search: AnaStarConfig = field(default_factory=lambda: AnaStarConfig(max_expansions=20_000))
-
-    def __post_init__(self):
-        for name, allowed in (("steps", (60, 38)), ("wide_steps", ("auto", "on", "off"))):
-            if getattr(self, name) not in allowed:
-                raise InputError(f"planner setting {name} is {getattr(self, name)!r}; it must be one of {allowed}")
-        if self.heuristic not in ("grid", "euclidean"):
-            raise InputError(f"planner setting heuristic is {self.heuristic!r}; it must be 'grid' or 'euclidean'")
 
 
 class ContactPlanner:
@@ -188,7 +142,9 @@ class ContactPlanner:
         moves, table = self._generator(wide)
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
         evaluator, outside = self._suited(start, com)
-        lazy, slippery = getattr(evaluator, "costly", False), self._terrain.has_slippery_ground()
+        lazy, forced = getattr(evaluator, "costly", False), self._terrain.forced_acceleration()
+        slippery = forced > 0.0
+        slides = slippery and not lazy and not self._rests(start, wide)
         problem = ContactProblem(
             self.robot,
             moves,
@@ -206,6 +162,8 @@ class ContactPlanner:
             exclusions,
             lazy=lazy,
             second=getattr(evaluator, "outside", None) if slippery else None,
+            haste=self.config.haste if slides else None,
+            forced=forced,
         )
         judge = None if self._goal_evaluator is None else Arrival(problem, self._goal_evaluator, self.config.cost)
         settings = self.config.search
@@ -213,7 +171,9 @@ class ContactPlanner:
             settings = replace(settings, max_expansions=settings.max_expansions * _LAZY)
         if slippery:  # what crosses it is rare and lies deep: less width than a way out of a cul-de-sac needs
             settings = replace(settings, patience=settings.patience * _DEEP)
-        if settings.initial_cost == np.inf:
+        if slides:  # whoever gets that far has paid for it: the cost so far only leads back
+            settings = replace(settings, layer=_LAYER, epsilon=_EPSILON, crowding=_CROWDING)
+        elif settings.initial_cost == np.inf:
             way = float(distance(start.mean_feet.position[None], np.array([start.mean_feet.yaw]))[0])
             settings = replace(settings, initial_cost=self.config.acceptable_cost * max(way, 1.0))
         problem.deadline = time.perf_counter() + time_limit
@@ -221,7 +181,7 @@ class ContactPlanner:
         judged = [state for state in result.expanded if not is_pending(state)]
         expanded = problem.feet(unpack(judged)[:, CONTACTS]) if judged else (np.zeros((0, 3)), [])
         return SearchResult(
-            solutions=tuple(_solution(problem, path) for path in result.paths),
+            solutions=tuple(solution_of(problem, path) for path in result.paths),
             seconds=result.seconds,
             heuristic_seconds=heuristic_seconds,
             expansions=result.expansions,
@@ -251,7 +211,7 @@ class ContactPlanner:
 
     def _reason(self, result: AnaStarResult[bytes], problem: ContactProblem) -> str:
         dynamics = getattr(self._evaluator, "rejection", screen.REASONS[screen.DYNAMICS])
-        return _reason(result.stopped_by, result.seconds, result.expansions, problem.rejected, dynamics)
+        return reason_of(result.stopped_by, result.seconds, result.expansions, problem.rejected, dynamics)
 
     def _model(self, wide: bool) -> TransitionModel:
         steps = steps_60() if self.config.steps == 60 else steps_38()
@@ -272,6 +232,15 @@ class ContactPlanner:
         )
         return moves, table
 
+    def _rests(self, start: Stance, wide: bool) -> bool:
+        """Whether a way leads to the goal over ground alone that holds a resting foot."""
+        surfaces, world, config = resting_surfaces(self.world.surfaces, 1.0), self.world, self.config
+        projector = Projector(self.robot, surfaces, world.mujoco_model, config.projection)
+        if not projector.table.foot.any():
+            return False
+        terrain = TerrainDistance(self.robot, world, projector, config.grid)
+        return terrain.distance(start.mean_feet, self._model(wide).longest_step) is not None
+
     def _distance(self, start: Stance) -> tuple[Distance, bool]:
         """Distance to the goal, and whether wide steps are to be used.
 
@@ -283,7 +252,7 @@ class ContactPlanner:
         if self.config.heuristic == "euclidean":
             return EuclideanDistance(self.world.goal), wide != "off"
         choices = {"on": [True], "off": [False], "auto": [False, True]}[wide]
-        if wide == "auto" and self._terrain.has_slippery_ground():
+        if wide == "auto" and self._terrain.forced_acceleration() > 0.0:
             choices = [True]
         for choice in choices:
             distance = self._terrain.distance(start.mean_feet, strides[choice])
@@ -295,43 +264,3 @@ class ContactPlanner:
             if terrain.distance(start.mean_feet, strides[choices[-1]]) is not None:
                 raise PlanningError(terrain.too_steep(self.config.rest_friction))
         raise PlanningError(self._terrain.obstacle(start.mean_feet, strides[choices[-1]]))
-
-
-def _solution(problem: ContactProblem, path: Path[bytes]) -> Solution:
-    """A path as a contact sequence with its predicted motion."""
-    states = [state for state in path.states if not is_pending(state)]
-    payloads = [payload for payload in path.payloads if payload is not None]
-    rows = unpack(states)
-    steps = list(zip(states[1:], payloads, strict=True))
-    return Solution(
-        sequence=ContactSequence(
-            problem.stance(states[0]), tuple(problem.transition(state, payload) for state, payload in steps)
-        ),
-        cost=path.cost,
-        bound=path.bound,
-        seconds=path.seconds,
-        com=rows[:, COM] / 1000.0,
-        com_velocity=rows[:, VELOCITY] / 1000.0,
-        objective=np.array([payload[0] for payload in payloads]),
-    )
-
-
-def _reason(stopped_by: str, seconds: float, expansions: int, rejected: np.ndarray, dynamics: str) -> str:
-    """One line on why there is no solution and what rejected most candidates, the choice of palms apart."""
-    how = {
-        "exhausted": f"every stance that can be reached was looked at ({expansions})",
-        "time": f"the time limit of {seconds:.3g} s was reached after {expansions} expansions; a longer one may help",
-        "expansions": f"the limit of {expansions} expansions was reached; a higher one may help",
-        "memory": f"the limit on memory was reached after {expansions} expansions",
-    }[stopped_by]
-    rejected = np.where(np.isin(np.arange(len(screen.REASONS)), screen.PALM_REASONS), 0, rejected)
-    total = int(rejected.sum())
-    if total == 0:
-        return f"no contact sequence found: {how}"
-    order = np.argsort(-rejected, kind="stable")[:4]
-    shares = ", ".join(
-        f"{dynamics if code == screen.DYNAMICS else screen.REASONS[code]} {100 * rejected[code] / total:.0f} %"
-        for code in order
-        if rejected[code] > 0
-    )
-    return f"no contact sequence found: {how}; candidates were rejected for: {shares}"

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,9 +19,11 @@ from toolkit.robot.model import RobotModel
 from toolkit.search import screen
 from toolkit.search.candidates import CandidateGenerator, Candidates, mean_feet
 from toolkit.search.contact_table import ContactTable
+from toolkit.search.cost import CostConfig
 from toolkit.search.drift import Drift
 from toolkit.search.exclusion import Exclusion
 from toolkit.search.graph import Edge
+from toolkit.search.haste import Haste, HasteConfig
 from toolkit.search.heuristic import Distance
 from toolkit.search.moves import MoveGenerator
 from toolkit.search.reach_check import ReachCheck, ReachConfig
@@ -46,33 +47,6 @@ _LIMBS = tuple(Limb)
 _CROWD, _PACE = 0.1, 0.25  # m, m/s
 
 
-@dataclass(frozen=True)
-class CostConfig:
-    """Edge cost d + step + dynamics * objective (+ time * duration), and the limits that hold on edges.
-
-    Attributes:
-        step: w_s of the paper.
-        dynamics: w_dyn of the paper.
-        time: per s; counts only where the planner may choose between timings, lest slower always look better.
-        stagger: per m that one foot is ahead of the other in the final stance.
-        swing_speed: m/s; a foot may not have to fly faster on average.
-        arrival: m; a plan ends so far inside the goal, as robots land a little beside their plans (at most half of the
-            goal's radius).
-        miss: per m by which a transition not yet judged would have to bend the motion; only for the order in which
-            transitions are judged.
-        doubt: of a transition that the evaluator rejects and the second one has not judged yet; likewise.
-    """
-
-    step: float = 3.0
-    dynamics: float = 0.1
-    time: float = 5.0
-    stagger: float = 5.0
-    swing_speed: float = 4.0
-    arrival: float = 0.01
-    miss: float = 30.0
-    doubt: float = 3.0
-
-
 class ContactProblem:
     """Graph of one search; see `toolkit.search.graph.SearchProblem`. Edge payloads are (objective, timing index).
 
@@ -93,6 +67,9 @@ class ContactProblem:
         exclusions: transitions that later stages rejected.
         lazy: whether a transition is judged only when it is the best to go on with.
         second: judges, in the same way, what the evaluator rejects; None: nobody does.
+        haste: delays states that run ahead of their feet; the second judge is then asked only where the first sees no
+            way on. None: nothing is delayed.
+        forced: m/s^2; most that the robot accelerates on the way whatever it does; for `haste`.
 
     Attributes:
         rejected: (len(REASONS),) int; candidates that fell, by reason.
@@ -118,6 +95,8 @@ class ContactProblem:
         *,
         lazy: bool = False,
         second: TransitionEvaluator | None = None,
+        haste: HasteConfig | None = None,
+        forced: float = 0.0,
     ):
         self._table, self._evaluator, self._distance, self._goal = table, evaluator, distance, goal
         self._lazy, self._second = lazy, second
@@ -130,6 +109,8 @@ class ContactProblem:
         )
         self._reach = ReachCheck(robot, moves.legs, moves.shanks, moves.arms, table, limbs, timings, reach)
         self._drift = Drift(robot, table, timings)
+        per_metre = 1.0 + config.step / longest
+        self._haste = None if haste is None else Haste(table, robot.com_height, forced, per_metre, haste)
         self._durations = np.array([item.shift + item.swing for item in timings])
         numbers = np.full((1, 4), -1)
         for contact in start.contacts:
@@ -244,7 +225,7 @@ class ContactProblem:
         self.rejected += np.bincount(codes, minlength=len(screen.REASONS))
         self.rejected[0] = 0
         later: list[Edge[bytes]] = []
-        if self._second is not None and not pending:
+        if self._second is not None and not pending and (self._haste is None or (codes != 0).all()):
             doubtful = candidates.select(codes == screen.DYNAMICS)
             later = self._postpone(row, doubtful, self._config.doubt) if len(doubtful) else []
         kept = np.flatnonzero(codes == 0)
@@ -254,9 +235,13 @@ class ContactProblem:
         cost = self._config.dynamics * objective
         if not pending:
             cost = cost + self._known_cost(candidates)
-        states = pack(candidates.contacts, candidates.limb, batch.com[kept], batch.com_velocity[kept])
+        end, end_velocity = batch.com[kept], batch.com_velocity[kept]
+        states = pack(candidates.contacts, candidates.limb, end, end_velocity)
         payloads = zip(objective.tolist(), candidates.timing.tolist(), strict=True)
-        return [Edge(*item) for item in zip(states, cost.tolist(), payloads, strict=True)] + later
+        delay = (
+            np.zeros(len(kept)) if self._haste is None else self._haste.delay(candidates.contacts, end, end_velocity)
+        )
+        return [Edge(*item) for item in zip(states, cost.tolist(), payloads, delay.tolist(), strict=True)] + later
 
     def _postpone(self, row: np.ndarray, candidates: Candidates, doubt: float = 0.0) -> list[Edge[bytes]]:
         """Edges to pending states, with the known part of the cost."""
@@ -264,6 +249,8 @@ class ContactProblem:
         miss = self._drift.miss(row[CONTACTS], com, velocity, candidates)
         states = pack_pending(row, candidates.contacts, candidates.limb, candidates.timing)
         cost, delay = self._known_cost(candidates), doubt + self._config.miss * miss
+        if self._haste is not None:
+            delay = delay + self._haste.delay(row[None, CONTACTS], com[None], velocity[None])
         return [Edge(*item) for item in zip(states, cost.tolist(), [None] * len(states), delay.tolist(), strict=True)]
 
     def _pending(self, row: np.ndarray) -> Candidates:

@@ -26,7 +26,8 @@ from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.robot.model import RobotModel
 from toolkit.search.legs import legs_of, violated
 from toolkit.search.moves import MoveConfig
-from toolkit.search.planner import ContactPlanner, PlannerConfig
+from toolkit.search.planner import ContactPlanner
+from toolkit.search.planner_config import PlannerConfig
 from toolkit.world.surface import Surface
 from toolkit.world.world import World
 

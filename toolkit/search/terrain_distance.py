@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from toolkit.centroidal.problem import GRAVITY
 from toolkit.contacts.projection import Projector
 from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
@@ -132,9 +133,13 @@ class TerrainDistance:
             f"{most:.3g} deg), so that no foot can rest on it; a planner that knows dynamics may cross it"
         )
 
-    def has_slippery_ground(self) -> bool:
-        """Whether a foot surface on the way is steeper than its friction angle, so that no foot rests there."""
+    def forced_acceleration(self) -> float:
+        """m/s^2; most that the robot gains horizontally, whatever it does, on a foot surface on the way; 0: none.
+
+        Foot surfaces steeper than their friction angle, on which no foot rests, are what forces it to.
+        """
         table, bounds = self._projector.table, self._bounds[0]
-        tilt = np.tan(np.arccos(np.clip(table.rotation[:, 2, 2], 1e-6, 1.0)))
+        upright = np.clip(table.rotation[:, 2, 2], 1e-6, 1.0)
         near = (table.centre[:, :2] >= bounds[:2]).all(1) & (table.centre[:, :2] <= bounds[2:]).all(1)
-        return bool((table.foot & near & (tilt > table.friction)).any())
+        gain = (np.sqrt(1.0 - upright**2) - table.friction * upright) * upright * -GRAVITY[2]
+        return float(max(gain[table.foot & near].max(initial=0.0), 0.0))
