@@ -98,13 +98,14 @@ class TimedPlanner:
         time_limit: float,
         observer: Callable[[Progress], None] | None = None,
         exclusions: Sequence[Exclusion] = (),
+        palms: bool = True,
     ) -> SearchResult:
         """See `ContactPlanner.search`."""
         if self.search_result is not None:
-            return self._planner.search(rng, time_limit, observer, exclusions)
+            return self._planner.search(rng, time_limit, observer, exclusions, palms)
         before = memory()
         clock = SearchClock.start()
-        search = self._planner.search(rng, time_limit, clock, exclusions)
+        search = self._planner.search(rng, time_limit, clock, exclusions, palms)
         share, after = clock.share(), memory()
         first = search.solutions[0].seconds if search.solutions else None
         first_share = clock.processor_share or share
