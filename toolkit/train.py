@@ -162,7 +162,13 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
     except (RuntimeError, AssertionError) as error:
         reason = str(error).splitlines()[0]
         raise InputError(f"--device {args.device}: torch cannot compute there ({reason}); use --device cpu") from None
-    config = FitConfig(epochs=args.epochs, device=args.device, seed=args.seed)
+    config = FitConfig(
+        epochs=args.epochs,
+        learning_rate=args.learning_rate,
+        sensitivity_weight=args.sensitivity_weight,
+        device=args.device,
+        seed=args.seed,
+    )
     with progress_bar(console) as progress:
         task = progress.add_task("epochs", total=2 * config.epochs * len(wanted))
         for number, category in enumerate(wanted):
@@ -177,7 +183,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
                 console.print(f"category {int(category)}: trained already")
                 continue
             kept = None
-            if args.keep_classifiers:
+            if args.keep_classifiers or args.refine:
                 kept = load_network(network_path(out, category), category, robot.fingerprint)
             curves = fit_category(
                 category,
@@ -187,6 +193,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
                 config=config,
                 progress=tick,
                 kept=kept,
+                refine=args.refine,
             )
             if not console.is_terminal:
                 losses = {name: round(float(curve.validation.min()), 4) for name, curve in curves.items()}
@@ -279,6 +286,11 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument("--epochs", type=cli.positive(int), default=120, help="at most (default: %(default)s)")
     sub.add_argument("--limit", type=cli.positive(int), help="transitions per category at most")
     sub.add_argument("--resume", action="store_true", help="keep what was trained with the same settings before a stop")
+    sub.add_argument("--learning-rate", type=cli.positive(float), default=4e-3, help="peak (default: %(default)s)")
+    sub.add_argument(
+        "--sensitivity-weight", type=float, default=20.0, help="of the derivatives' loss (default: %(default)s)"
+    )
+    sub.add_argument("--refine", action="store_true", help="go on from the regressors in --out, classifiers kept")
     sub.add_argument("--keep-classifiers", action="store_true", help="train the regressors alone, of networks in --out")
     sub.add_argument("--categories", type=int, nargs="+", choices=range(10), metavar="0..9", help="only these")
     sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="threads (default: all cores)")

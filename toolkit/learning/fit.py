@@ -301,8 +301,35 @@ def _folded(
     )
 
 
+def _unfolded(
+    net: nn.Sequential,
+    start: Perceptron,
+    mean: np.ndarray,
+    std: np.ndarray,
+    out_mean: np.ndarray,
+    out_std: np.ndarray,
+) -> None:
+    """Give the layers the values of a trained network: `_folded` the other way round."""
+    weights = [weight.astype(np.float64) for weight in start.weights]
+    biases = [bias.astype(np.float64) for bias in start.biases]
+    biases[0] += mean @ weights[0]
+    weights[0] *= std[:, None]
+    weights[-1] /= out_std
+    biases[-1] = (biases[-1] - out_mean) / out_std
+    linear = [layer for layer in net if isinstance(layer, nn.Linear)]
+    with torch.no_grad():
+        for layer, weight, bias in zip(linear, weights, biases, strict=True):
+            layer.weight.copy_(torch.from_numpy(weight.T))
+            layer.bias.copy_(torch.from_numpy(bias))
+
+
 def train_networks(
-    samples: Samples, config: FitConfig, progress: Progress = _SILENT, *, classifier: Perceptron | None = None
+    samples: Samples,
+    config: FitConfig,
+    progress: Progress = _SILENT,
+    *,
+    classifier: Perceptron | None = None,
+    start: Perceptron | None = None,
 ) -> TrainedNetworks:
     """Train both networks on samples, in any encoding whose last columns are those of `features.encode`.
 
@@ -315,6 +342,7 @@ def train_networks(
         config: settings.
         progress: called with ("classifier" or "regressor", epoch, training loss, validation loss).
         classifier: kept as it is where given; only the regressor is trained.
+        start: regressor to go on from; None: from random weights.
     """
     torch.manual_seed(config.seed)
     feasible = samples.feasible
@@ -347,6 +375,8 @@ def train_networks(
         slopes = torch.from_numpy((samples.sensitivity[kept] / scale).astype(np.float32)).to(config.device)
     rows = torch.from_numpy(np.flatnonzero(kept)).to(config.device)
     regressor = _perceptron(size, TARGETS, 0.0)
+    if start is not None:
+        _unfolded(regressor, start, mean, std, out_mean, out_std)
     task = _Regression(
         torch.from_numpy(samples.features[kept]).to(config.device),
         inputs[rows],
@@ -370,6 +400,7 @@ def fit_category(
     config: FitConfig,
     progress: Progress = _SILENT,
     kept: TransitionNetwork | None = None,
+    refine: bool = False,
 ) -> dict[str, Curve]:
     """Train both networks of a category and write its file.
 
@@ -381,6 +412,7 @@ def fit_category(
         config: settings.
         progress: called with ("classifier" or "regressor", epoch, training loss, validation loss).
         kept: whose classifier is taken over; only the regressor is trained.
+        refine: whether training goes on from the regressor of `kept`.
 
     Returns:
         Learning curves by network.
@@ -395,7 +427,8 @@ def fit_category(
             f"category {int(category)} has {counts[0]} feasible and {counts[1]} infeasible transitions; "
             f"{config.minimum} of each are needed: collect more"
         )
-    trained = train_networks(samples, config, progress, classifier=None if kept is None else kept.classifier)
+    classifier, start = (None, None) if kept is None else (kept.classifier, kept.regressor if refine else None)
+    trained = train_networks(samples, config, progress, classifier=classifier, start=start)
     tensors = {
         f"{name}.{layer}.{part}": array
         for name, net in (("classifier", trained.classifier), ("regressor", trained.regressor))
@@ -409,6 +442,7 @@ def fit_category(
         "samples": len(samples),
         "feasible": counts[0],
         "config": asdict(config),
+        "config_before": before.get("config"),
         "known_sensitivities": 0 if samples.sensitivity is None else int((~np.isnan(samples.sensitivity[:, 0])).sum()),
         "epochs": before.get("epochs", {}) | {name: len(curve.training) for name, curve in curves.items()},
         "validation_loss": before.get("validation_loss", {})
