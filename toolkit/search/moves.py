@@ -234,7 +234,7 @@ class MoveGenerator:
         relative, normals = (palms.position - shoulder) @ turn, palms.rotation[:, :, 2] @ turn
         open_palms = np.flatnonzero(codes == 0)
         served = self.arms[limb].serves(relative[open_palms], normals[open_palms])
-        codes[open_palms[~served]] = screen.FACING
+        codes[open_palms[~served]] = screen.POSTURE
         numbers = table.add(limb, palms.select(codes == 0))
         return Moves(np.unique(numbers), _count(codes))
 

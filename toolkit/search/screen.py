@@ -32,10 +32,12 @@ REASONS = (
     "rejected by a later stage",
     "a leg hits the world",
     "legs hit each other",
+    "no posture of the arm holds the palm",
 )
 NO_SURFACE, CLOSE, HIGH, BODY, LEG = 1, 2, 3, 4, 5
-PALM_REASONS = (14, 15, 16, 17)  # palms are an option: where they find no wall is no reason why there is no plan
+PALM_REASONS = (14, 15, 16, 17, 24)  # palms are an option: where they find no wall is no reason why there is no plan
 CROSSES, FAST, STILL, NO_WALL, FAR, WRONG_SIDE, FACING, DYNAMICS, COSTLY, ARM, EXCLUDED, SHANK, KNEES = range(11, 24)
+POSTURE = 24
 
 
 @numba.njit(cache=True, error_model="numpy")
