@@ -27,10 +27,12 @@ class HasteConfig:
     Attributes:
         capture: per m that the capture point lies ahead of the foremost foot, in the h of 1 m of way.
         early: per m that v^2 / 2 a is long, likewise; with 1 or more nothing would be gained by going on.
+        turn: per rad between the feet's headings, likewise: legs that turn in fast swings touch each other.
     """
 
     capture: float = 1.0
     early: float = 0.7
+    turn: float = 0.5
 
 
 class Haste:
@@ -47,6 +49,7 @@ class Haste:
     def __init__(self, table: ContactTable, com_height: float, forced: float, per_metre: float, config: HasteConfig):
         self._table = table
         self._capture = config.capture * per_metre
+        self._turn = config.turn * per_metre
         self._energy = config.early * per_metre / (2.0 * forced) if forced > 0.0 else 0.0
         self._time = float(np.sqrt(-com_height / GRAVITY[2]))
 
@@ -63,4 +66,6 @@ class Haste:
         ahead = velocity / np.maximum(np.sqrt(square), 1e-9)[:, None]
         foremost = np.maximum(*((position[contacts[:, foot]] * ahead).sum(1) for foot in (0, 1)))
         capture = ((com[:, :2] + self._time * velocity) * ahead).sum(1) - foremost
-        return self._capture * np.maximum(capture, 0.0) + self._energy * square
+        turn = self._table.yaw[contacts[:, 0]] - self._table.yaw[contacts[:, 1]]
+        turn = np.abs(np.arctan2(np.sin(turn), np.cos(turn)))
+        return self._capture * np.maximum(capture, 0.0) + self._energy * square + self._turn * turn

@@ -39,6 +39,7 @@ _UNTRAINED = (
 )
 _DEEP = 10  # patience of a search over slippery ground, in multiples of the patience elsewhere
 _LAYER, _EPSILON, _CROWDING = 1.5, 0.15, 0.6  # of a search that has to slide: see `AnaStarConfig`
+_SLIDING = 3  # times the expansions, of such a search: most of them see that they have come too fast
 _LAZY = 20  # expansions with one transition judged in each that count as one with all judged
 
 
@@ -171,6 +172,8 @@ class ContactPlanner:
             settings = replace(settings, max_expansions=settings.max_expansions * _LAZY)
         if slippery:  # what crosses it is rare and lies deep: less width than a way out of a cul-de-sac needs
             settings = replace(settings, patience=settings.patience * _DEEP)
+        if slides and settings.max_expansions is not None:
+            settings = replace(settings, max_expansions=settings.max_expansions * _SLIDING)
         if slides:  # whoever gets that far has paid for it: the cost so far only leads back
             settings = replace(settings, layer=_LAYER, epsilon=_EPSILON, crowding=_CROWDING)
         elif settings.initial_cost == np.inf:
