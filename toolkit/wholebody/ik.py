@@ -170,9 +170,7 @@ class WholeBodyIK:
         self.drift, self.last_step = self._base_motion(before), self.joints - angles
         return self.order.qpos_from_q(self.wrapper.state.q)
 
-    def _posture(
-        self, time: float, angles: np.ndarray, paths: LimbPaths, motion: CentroidalMotion
-    ) -> np.ndarray:
+    def _posture(self, time: float, angles: np.ndarray, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
         """(n,) rad; where joints tend to: home, and for an arm that holds or reaches a contact what suits that."""
         posture = self.robot.home[7:].copy()
         for palm in self.palms:
