@@ -18,7 +18,7 @@ from toolkit.centroidal.body import BodyMargins, knot_contacts
 from toolkit.centroidal.build import ProblemConfig, sequence_problem
 from toolkit.centroidal.layout import indices
 from toolkit.centroidal.pieces import WRENCH, G
-from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem, Margins
+from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem, Margins, Weights
 from toolkit.centroidal.program import Landing, Program, Regularisers
 from toolkit.centroidal.verdict import judged
 from toolkit.contacts.schedule import ContactSchedule
@@ -27,6 +27,8 @@ from toolkit.geometry.limb import FEET
 from toolkit.robot.model import RobotModel
 
 WANTED = Margins(friction=0.66, cop=(0.055, 0.045), yaw=0.6)
+CALM = Weights(angular_momentum=20.0, angular_momentum_rate=1.0)
+"""The paper's weights but for the angular momentum: what fast swings ask for with the paper's, no body can follow."""
 WANTED_BODY = BodyMargins(length=0.015, ankle=0.1, hip=0.05, height=0.02, torque=0.85)
 CONVERGED = "converged"
 HOPELESS = (0.05, 1.5)  # excess and slack of the body at which a sequence is infeasible, the solver converged or not
@@ -48,7 +50,7 @@ class SequenceConfig:
         tolerance: of either solver; its constraints are met to about this.
     """
 
-    problem: ProblemConfig = field(default_factory=lambda: ProblemConfig(margins=WANTED, min_dt=0.02))
+    problem: ProblemConfig = field(default_factory=lambda: ProblemConfig(weights=CALM, margins=WANTED, min_dt=0.02))
     body: BodyMargins = WANTED_BODY
     regularisers: Regularisers = field(default_factory=Regularisers)
     solver: str = "fatrop"

@@ -99,7 +99,7 @@ def slope(
     width: float = 1.0,
     friction: float = 0.5,
     shift: float = 0.05,
-    swing: float = 0.25,
+    swing: float = 0.3,
 ) -> str:
     """A slope downwards, level above and below.
 
