@@ -57,6 +57,16 @@ def test_without_forced_acceleration_speed_alone_is_no_haste(standing):
     assert delay(standing, [0.0, 0.0, 0.9], [0.3, 0.0, 0.0], forced=0.0) == 0.0
 
 
+@pytest.mark.parametrize("left, right", [(0.4, 0.0), (0.0, -0.4), (np.pi - 0.1, 0.3 - np.pi)])
+def test_turn_between_the_feet_waits_whichever_way(left, right):
+    table = ContactTable(np.array([0.5]))
+    feet = ((Limb.LEFT_FOOT, 0.1, left), (Limb.RIGHT_FOOT, -0.1, right))
+    numbers = [table.add_contact(Contact(i, Pose.from_yaw(np.array([0.0, y, 0.0]), yaw), 0.5, 0)) for i, y, yaw in feet]
+    standing = table, np.array([[*numbers, -1, -1]])
+    config = HasteConfig(turn=0.5)
+    assert delay(standing, [0.0, 0.0, 0.9], [0.0, 0.0, 0.0], config=config) == pytest.approx(5.0 * 0.5 * 0.4, rel=1e-9)
+
+
 def test_layers_share_the_random_draws():
     """Of a thousand nodes in one layer and one in another, random draws soon take the one."""
     g, h = [0.0] * 1001, [0.5] * 1000 + [9.5]
