@@ -3,8 +3,9 @@
 The capture point c + v / w, w^2 = g / h, of an inverted pendulum is where the robot would have to step to come to rest.
 The farther it lies ahead of the foremost foot, the longer the next stride has to be, until no stride is long enough.
 On ground steeper than its friction angle the robot moreover gains v^2 = 2 a with every metre, whatever it does, so that
-whoever is fast early is too fast for its legs later: v^2 / 2 a is the way by which it is too far on. And legs that turn in
-fast swings touch each other. All of it only delays a state: an estimate for the order of expansion, never a verdict.
+whoever is fast early is too fast for its legs later: v^2 / 2 a is the way by which it is too far on. And legs that
+turn in fast swings touch each other. All of it only delays a state: an estimate for the order of expansion, never a
+verdict.
 
 Reference:
     Koolen, de Boer, Rebula, Goswami, Pratt: Capturability-based analysis and control of legged locomotion, IJRR 2012.
