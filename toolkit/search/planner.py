@@ -214,7 +214,9 @@ class ContactPlanner:
 
     def _reason(self, result: AnaStarResult[bytes], problem: ContactProblem) -> str:
         dynamics = getattr(self._evaluator, "rejection", screen.REASONS[screen.DYNAMICS])
-        return reason_of(result.stopped_by, result.seconds, result.expansions, problem.rejected, dynamics)
+        limit = self.config.search.max_expansions  # as it was asked for, whatever the search made of it
+        expansions = limit if result.stopped_by == "expansions" and limit is not None else result.expansions
+        return reason_of(result.stopped_by, result.seconds, expansions, problem.rejected, dynamics)
 
     def _model(self, wide: bool) -> TransitionModel:
         steps = steps_60() if self.config.steps == 60 else steps_38()
