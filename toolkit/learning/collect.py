@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from dataclasses import asdict, dataclass
+from concurrent.futures import Executor
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
@@ -13,8 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from toolkit.contacts.category import Category
-from toolkit.errors import DatasetError
-from toolkit.learning.dataset import SCHEMA, Manifest, Samples, read_manifest, read_shard, shard_path, write_shard
+from toolkit.learning.dataset import (
+    SCHEMA,
+    Manifest,
+    Samples,
+    begin,
+    plain_settings,
+    read_shard,
+    shard_path,
+    write_shard,
+)
+from toolkit.learning.jobs import run_jobs
 from toolkit.learning.shard import CollectConfig, categories_of, collect_shard
 from toolkit.robot.model import RobotModel
 
@@ -90,7 +99,7 @@ def collect(
         DatasetError: the folder holds something else, or data of other settings or of another robot.
     """
     began = time.perf_counter()
-    _prepare(folder, robot, config)
+    begin(folder, _manifest(robot, config))
     counts = {category: np.zeros(2, int) for category in categories_of(robot)}
     missing = []
     for index in range(config.shards):
@@ -102,20 +111,15 @@ def collect(
     resumed = labelled = _total(counts)
     done = config.shards - len(missing)
     progress(Progress(done, labelled, 0.0))
-    waiting: set[Future] = set()
-    try:
-        while missing or waiting:
-            while missing and len(waiting) < ahead:
-                waiting.add(executor.submit(_job, config, missing.pop(0), str(folder.resolve())))
-            finished, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-            for future in finished:
-                _add(counts, future.result())
-                done, labelled = done + 1, _total(counts)
-                progress(Progress(done, labelled, time.perf_counter() - began))
-    except BaseException:
-        for future in waiting:
-            future.cancel()
-        raise
+
+    def take(more: Counts) -> None:
+        nonlocal done, labelled
+        _add(counts, more)
+        done, labelled = done + 1, _total(counts)
+        progress(Progress(done, labelled, time.perf_counter() - began))
+
+    jobs = [(config, index, str(folder.resolve())) for index in missing]
+    run_jobs(executor, _job, jobs, take, ahead=ahead)
     return CollectSummary(
         labelled,
         resumed,
@@ -138,22 +142,8 @@ def _total(counts: dict[Category, np.ndarray]) -> int:
     return int(sum(pair[1] for pair in counts.values()))
 
 
-def _prepare(folder: Path, robot: RobotModel, config: CollectConfig) -> None:
-    """Make the folder and its manifest, or check the manifest that is there."""
-    settings = {k: v for k, v in asdict(config).items() if k not in ("robot", "robots", "seed", "samples_per_category")}
-    settings = {k: list(v) if isinstance(v, tuple) else v for k, v in settings.items()}
+def _manifest(robot: RobotModel, config: CollectConfig) -> Manifest:
+    """What a collection asks for: a larger one of the same kind goes on with the same data set."""
+    settings = plain_settings(config, "robot", "robots", "seed", "samples_per_category")
     versions = {name: metadata.version(name) for name in PACKAGES}
-    wanted = Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, versions)
-    if (folder / "manifest.json").is_file():
-        found = read_manifest(folder)
-        for name in ("robot", "fingerprint", "seed", "settings"):
-            if getattr(found, name) != getattr(wanted, name):
-                raise DatasetError(
-                    f"{folder}: begun with {name} {getattr(found, name)!r}, now {getattr(wanted, name)!r}; "
-                    "use another --out, or the same options"
-                )
-        return
-    if folder.exists() and any(folder.iterdir()):
-        raise DatasetError(f"{folder}: not empty and not a data set; use another --out")
-    folder.mkdir(parents=True, exist_ok=True)
-    wanted.write(folder)
+    return Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, versions)

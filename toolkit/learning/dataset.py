@@ -16,6 +16,7 @@ import os
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -116,9 +117,63 @@ def read_manifest(folder: Path) -> Manifest:
     return manifest
 
 
+def plain_settings(config: Any, *without: str) -> dict:
+    """Fields of a configuration, but for some, as plain values that come back from a manifest unchanged."""
+    fields = {name: value for name, value in asdict(config).items() if name not in without}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in fields.items()}
+
+
+def begin(folder: Path, wanted: Manifest) -> None:
+    """Make the folder of a data set with its manifest, or check the manifest that is there.
+
+    Raises:
+        DatasetError: the folder holds something else, or data of other settings or of another robot.
+    """
+    if (folder / "manifest.json").is_file():
+        found = read_manifest(folder)
+        for name in ("robot", "fingerprint", "seed", "settings"):
+            if getattr(found, name) != getattr(wanted, name):
+                raise DatasetError(
+                    f"{folder}: begun with other settings; it was begun with {name} {getattr(found, name)!r}, now "
+                    f"{getattr(wanted, name)!r}; use another --out, or the same options"
+                )
+        return
+    if folder.exists() and any(folder.iterdir()):
+        raise DatasetError(f"{folder}: not empty and not a data set; use another --out")
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted.write(folder)
+
+
+def shards_of(folder: Path, fingerprint: str) -> list[Path]:
+    """Files of the shards of a data set, in order.
+
+    Args:
+        folder: the data set.
+        fingerprint: of the robot that it must belong to.
+
+    Raises:
+        DatasetError: no data set, another robot's, or one without shards.
+    """
+    manifest = read_manifest(folder)
+    if manifest.fingerprint != fingerprint:
+        raise DatasetError(
+            f"{folder}: collected for another robot; it was collected for robot {manifest.robot!r} with fingerprint "
+            f"{manifest.fingerprint[:12]}, not {fingerprint[:12]}; collect again for this robot"
+        )
+    paths = sorted(folder.glob("shard-*.npz"))
+    if not paths:
+        raise DatasetError(f"{folder}: holds no shards yet; run python -m toolkit.train collect")
+    return paths
+
+
 def shard_path(folder: Path, index: int) -> Path:
     """File of shard `index`."""
     return folder / f"shard-{index:06d}.npz"
+
+
+def shard_index(path: Path) -> int:
+    """Number of the shard in a file."""
+    return int(path.stem.split("-")[1])
 
 
 def write_shard(folder: Path, index: int, samples: dict[Category, Samples]) -> None:
@@ -195,18 +250,7 @@ def read_datasets(folders: list[Path], fingerprint: str, *, limit: int | None = 
     Raises:
         DatasetError: another robot's data, no shards, or a broken one.
     """
-    paths: list[Path] = []
-    for folder in folders:
-        manifest = read_manifest(folder)
-        if manifest.fingerprint != fingerprint:
-            raise DatasetError(
-                f"{folder}: collected for robot {manifest.robot!r} with fingerprint "
-                f"{manifest.fingerprint[:12]}, not {fingerprint[:12]}; collect again for this robot"
-            )
-        found = list(folder.glob("shard-*.npz"))
-        if not found:
-            raise DatasetError(f"{folder}: holds no shards yet; run python -m toolkit.train collect")
-        paths += found
+    paths = [path for folder in folders for path in shards_of(folder, fingerprint)]
     groups: dict[Category, list[Samples]] = {}
     for path in sorted(paths, key=lambda path: path.name):
         for category, samples in read_shard(path).items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +11,8 @@ import numpy as np
 
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
-from toolkit.learning.dataset import Samples, read_manifest, read_shard, write_shard
+from toolkit.learning.dataset import Samples, read_shard, shard_index, shards_of, write_shard
+from toolkit.learning.jobs import run_jobs
 from toolkit.learning.label import label
 from toolkit.learning.sensitivity import canonical, decode, sensitivity_size
 from toolkit.learning.shard import robot_of
@@ -59,7 +60,7 @@ def _job(path: Path, robot: str, robots: str) -> bool:
     for category in lacking:
         group = samples[category]
         samples[category] = replace(group, sensitivity=sensitivities(model, category, group))
-    write_shard(path.parent, int(path.stem.split("-")[1]), samples)
+    write_shard(path.parent, shard_index(path), samples)
     return True
 
 
@@ -80,21 +81,13 @@ def differentiate(
     Raises:
         DatasetError: another robot's data, no shards, a broken one, or labels of something else.
     """
-    manifest = read_manifest(folder)
-    if manifest.fingerprint != robot.fingerprint:
-        raise DatasetError(f"{folder}: collected for another robot ({manifest.robot!r}); collect again for this robot")
-    paths = sorted(folder.glob("shard-*.npz"))
-    if not paths:
-        raise DatasetError(f"{folder}: holds no shards yet; run python -m toolkit.train collect")
-    robots = str(robot.folder.parent.resolve())
-    jobs = [executor.submit(_job, path.resolve(), robot.name, robots) for path in paths]
-    changed = 0
-    try:
-        for done, job in enumerate(as_completed(jobs), 1):
-            changed += job.result()
-            progress(done, len(paths))
-    except BaseException:
-        for job in jobs:
-            job.cancel()
-        raise
+    paths, robots = shards_of(folder, robot.fingerprint), str(robot.folder.parent.resolve())
+    done = changed = 0
+
+    def take(lacked: bool) -> None:
+        nonlocal done, changed
+        done, changed = done + 1, changed + lacked
+        progress(done, len(paths))
+
+    run_jobs(executor, _job, [(path.resolve(), robot.name, robots) for path in paths], take)
     return changed

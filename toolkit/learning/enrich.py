@@ -8,8 +8,8 @@ the new contact is another's, contacts and state are displaced a little. They se
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Executor, as_completed
-from dataclasses import asdict, dataclass, replace
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +17,23 @@ from scipy.spatial.transform import Rotation
 
 from toolkit.contacts.category import Category
 from toolkit.contacts.stance import Contact, Stance
-from toolkit.errors import DatasetError
 from toolkit.geometry.pose import Pose
-from toolkit.learning.dataset import SCHEMA, Manifest, Samples, join, read_manifest, read_shard, shard_path, write_shard
+from toolkit.learning.dataset import (
+    SCHEMA,
+    Manifest,
+    Samples,
+    begin,
+    join,
+    plain_settings,
+    read_manifest,
+    read_shard,
+    shard_index,
+    shard_path,
+    shards_of,
+    write_shard,
+)
 from toolkit.learning.evaluate import at_default
+from toolkit.learning.jobs import run_jobs
 from toolkit.learning.label import label
 from toolkit.learning.sensitivity import canonical, decode, sensitivity_size
 from toolkit.learning.shard import robot_of
@@ -107,7 +120,7 @@ def _displaced(contact: Contact, config: EnrichConfig, rng: np.random.Generator)
 
 def _job(source: Path, folder: Path, config: EnrichConfig) -> int:
     """Write the variations of one shard; their number."""
-    index = int(source.stem.split("-")[1])
+    index = shard_index(source)
     robot, shard = robot_of(config.robot, config.robots), read_shard(source)
     found = {}
     for category in (Category(number) for number in config.categories):
@@ -142,32 +155,16 @@ def enrich(
     Raises:
         DatasetError: another robot's data, no shards, a broken one, or a folder with something else in it.
     """
-    manifest = read_manifest(source)
-    if manifest.fingerprint != robot.fingerprint:
-        raise DatasetError(f"{source}: collected for another robot ({manifest.robot!r}); collect again for this robot")
-    settings = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(config).items() if k != "robots"}
-    settings["varied_seed"] = manifest.seed
-    wanted = Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, manifest.versions)
-    if (folder / "manifest.json").is_file():
-        if replace(read_manifest(folder), versions=wanted.versions) != wanted:
-            raise DatasetError(f"{folder}: begun with other settings; use another --out, or the same options")
-    elif folder.exists() and any(folder.iterdir()):
-        raise DatasetError(f"{folder}: not empty and not a data set; use another --out")
-    else:
-        folder.mkdir(parents=True, exist_ok=True)
-        wanted.write(folder)
-    paths = sorted(source.glob("shard-*.npz"))
-    if not paths:
-        raise DatasetError(f"{source}: holds no shards yet; run python -m toolkit.train collect")
-    missing = [path for path in paths if not shard_path(folder, int(path.stem.split("-")[1])).is_file()]
-    jobs = [executor.submit(_job, path.resolve(), folder.resolve(), config) for path in missing]
-    added = 0
-    try:
-        for done, job in enumerate(as_completed(jobs), len(paths) - len(missing) + 1):
-            added += job.result()
-            progress(done, len(paths))
-    except BaseException:
-        for job in jobs:
-            job.cancel()
-        raise
+    paths, varied = shards_of(source, robot.fingerprint), read_manifest(source)
+    settings = plain_settings(config, "robots") | {"varied_seed": varied.seed}
+    begin(folder, Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, varied.versions))
+    missing = [path for path in paths if not shard_path(folder, shard_index(path)).is_file()]
+    done, added = len(paths) - len(missing), 0
+
+    def take(number: int) -> None:
+        nonlocal done, added
+        done, added = done + 1, added + number
+        progress(done, len(paths))
+
+    run_jobs(executor, _job, [(path.resolve(), folder.resolve(), config) for path in missing], take)
     return added
