@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from toolkit.centroidal import fast
 from toolkit.centroidal.build import transition_problem
@@ -12,7 +11,6 @@ from toolkit.centroidal.bulk_check import residual_and_objective
 from toolkit.centroidal.sampling import SamplingConfig, sample_transition
 from toolkit.contacts.category import Category
 from toolkit.contacts.stance import Stance
-from toolkit.geometry.pose import Pose
 from toolkit.robot.loader import load_robot
 from toolkit.world.timing import Timing
 
@@ -38,8 +36,7 @@ def objective(robot, case):
 
 def moved(contact, axis, step):
     change = step * np.eye(6)[axis]
-    rotation = Rotation.from_rotvec(change[3:]).as_matrix() @ contact.pose.rotation
-    return replace(contact, pose=Pose(rotation, contact.pose.position + change[:3]))
+    return replace(contact, pose=contact.pose.moved(change[:3], change[3:]))
 
 
 def varied(case, index, step):

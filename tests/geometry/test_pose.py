@@ -7,8 +7,10 @@ from toolkit.geometry.pose import (
     Pose,
     quaternion_from_rotation,
     rotation_about_z,
+    rotation_exponential,
     rotation_from_quaternion,
     rotation_on_surface,
+    rotation_vector,
     yaw_of,
 )
 
@@ -55,3 +57,20 @@ def test_frames_on_a_surface_have_its_normal_and_the_heading():
 
 def test_yaw_of_an_upright_frame():
     np.testing.assert_allclose(yaw_of(rotation_about_z(np.array([0.3, -2.0]))), [0.3, -2.0], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 1.0, np.pi - 1e-6])
+def test_rotation_vector_inverts_the_exponential(angle):
+    axis = np.random.default_rng(1).normal(size=3)
+    rotation = rotation_exponential(angle * axis / np.linalg.norm(axis))
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+    vector = rotation_vector(rotation)
+    np.testing.assert_allclose(np.linalg.norm(vector), angle, atol=1e-8)
+    np.testing.assert_allclose(rotation_exponential(vector), rotation, atol=1e-8)
+
+
+def test_a_moved_pose_is_shifted_and_turned_on_the_spot():
+    pose = Pose.from_quaternion(np.array([0.3, -0.2, 0.5]), QUATERNIONS[0])
+    moved = pose.moved(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 0.4]))
+    np.testing.assert_allclose(moved.position, [0.4, 0.0, 0.8], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(moved.rotation, rotation_about_z(0.4) @ pose.rotation, rtol=0, atol=1e-15)

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from tests.prediction.test_features import mirrored, moved, random_case
 from toolkit.centroidal.fast import Sensitivity
@@ -32,8 +31,7 @@ def robot():
 
 def turned(contact, axis, step):
     change = step * np.eye(6)[axis]
-    rotation = Rotation.from_rotvec(change[3:]).as_matrix() @ contact.pose.rotation
-    return replace(contact, pose=Pose(rotation, contact.pose.position + change[:3]))
+    return replace(contact, pose=contact.pose.moved(change[:3], change[3:]))
 
 
 def varied(case, index, step):

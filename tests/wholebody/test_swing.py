@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from toolkit.geometry.pose import Pose, rotation_on_surface
+from toolkit.geometry.pose import Pose, rotation_exponential, rotation_on_surface, rotation_vector
 from toolkit.wholebody.profile import Window
-from toolkit.wholebody.swing import Move, SwingPath, rotation_exponential, rotation_vector
+from toolkit.wholebody.swing import Move, SwingPath
 
 
 def random_rotation(rng, angle):
@@ -53,15 +53,6 @@ def test_arrays_and_samples_agree(path):
         sample = path.sample(path.begin + share * path.duration)
         np.testing.assert_allclose(sample.pose.position, positions[index], atol=1e-12)
         np.testing.assert_allclose(sample.pose.rotation, rotations[index], atol=1e-12)
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 1.0, np.pi - 1e-6])
-def test_rotation_vector_inverts_the_exponential(angle):
-    rotation = random_rotation(np.random.default_rng(1), angle)
-    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
-    vector = rotation_vector(rotation)
-    np.testing.assert_allclose(np.linalg.norm(vector), angle, atol=1e-8)
-    np.testing.assert_allclose(rotation_exponential(vector), rotation, atol=1e-8)
 
 
 def test_orientation_turns_about_one_axis():

@@ -59,6 +59,26 @@ def rotation_about_z(angle: np.ndarray | float) -> np.ndarray:
     return np.stack([np.stack([c, -s, zero], -1), np.stack([s, c, zero], -1), np.stack([zero, zero, one], -1)], -2)
 
 
+def rotation_exponential(vector: np.ndarray) -> np.ndarray:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad (Rodrigues)."""
+    vector = np.asarray(vector, float)
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vector, -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
+    # numpy's sinc is sin(pi x) / (pi x): exact through zero.
+    return np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (cross @ cross)
+
+
+def rotation_vector(rotation: np.ndarray) -> np.ndarray:
+    """Rotation vector (3,) in rad, at most pi long, of one rotation matrix (3, 3)."""
+    w, *axis = quaternion_from_rotation(rotation)
+    sine = np.linalg.norm(axis)
+    if sine < 1e-12:
+        return 2.0 * np.asarray(axis)
+    return 2.0 * np.arctan2(sine, w) / sine * np.asarray(axis)
+
+
 def yaw_of(rotation: np.ndarray) -> np.ndarray | float:
     """Heading (...,) in rad of the x axis of `rotation` (..., 3, 3), projected on the horizontal plane."""
     return np.arctan2(rotation[..., 1, 0], rotation[..., 0, 0])
@@ -125,6 +145,10 @@ class Pose:
     def inverse(self) -> Pose:
         """The transform the other way, `b_from_a`."""
         return Pose(self.rotation.T, -self.rotation.T @ self.position)
+
+    def moved(self, shift: np.ndarray, turn: np.ndarray) -> Pose:
+        """The pose shifted by (3,) m and turned on the spot by a rotation vector (3,) in rad, both in frame a."""
+        return Pose(rotation_exponential(turn) @ self.rotation, self.position + shift)
 
     @property
     def quaternion_wxyz(self) -> np.ndarray:

@@ -13,11 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from toolkit.contacts.category import Category
 from toolkit.contacts.stance import Contact, Stance
-from toolkit.geometry.pose import Pose
 from toolkit.learning.dataset import (
     SCHEMA,
     Manifest,
@@ -114,8 +112,8 @@ def variations(
 
 def _displaced(contact: Contact, config: EnrichConfig, rng: np.random.Generator) -> Contact:
     place, turn = config.foot if contact.limb.is_foot else config.palm
-    rotation = Rotation.from_rotvec(turn * rng.normal(size=3)).as_matrix() @ contact.pose.rotation
-    return replace(contact, pose=Pose(rotation, contact.pose.position + place * rng.normal(size=3)))
+    rotation_vector = turn * rng.normal(size=3)
+    return replace(contact, pose=contact.pose.moved(place * rng.normal(size=3), rotation_vector))
 
 
 def _job(source: Path, folder: Path, config: EnrichConfig) -> int:

@@ -15,7 +15,7 @@ from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.arm_map import ArmMap
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import FEET, PALMS, Limb
-from toolkit.geometry.pose import Pose, rotation_about_z
+from toolkit.geometry.pose import Pose, rotation_about_z, rotation_vector
 from toolkit.robot.geometry import arm_joints
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
@@ -24,7 +24,6 @@ from toolkit.wholebody.ik_config import IKConfig
 from toolkit.wholebody.knee import chain_to, knee_range
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.profile import Window
-from toolkit.wholebody.swing import rotation_exponential, rotation_vector
 
 OFFSET = Window(0.0, 0.6)  # of a palm's swing, over which it joins its path
 LEAVING, LANDING = Window(0.0, 0.2), Window(0.75, 1.0)  # of a foot's swing, near its contacts
@@ -306,7 +305,7 @@ class WholeBodyIK:
             self.offsets[palm] = segment, actual[:3, 3] - start.position, turn
         _, shift, turn = self.offsets[palm]
         left = 1.0 - OFFSET.step((time - segment.begin) / (segment.end - segment.begin))[0]
-        return Pose(rotation_exponential(left * turn) @ pose.rotation, pose.position + left * shift)
+        return pose.moved(left * shift, left * turn)
 
 
 def momentum_at(motion: CentroidalMotion, time: float) -> np.ndarray:

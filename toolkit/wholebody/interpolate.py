@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.geometry.pose import quaternion_from_rotation, rotation_from_quaternion
-from toolkit.wholebody.swing import rotation_exponential, rotation_vector
+from toolkit.geometry.pose import (
+    quaternion_from_rotation,
+    rotation_exponential,
+    rotation_from_quaternion,
+    rotation_vector,
+)
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 

@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from toolkit.geometry.pose import Pose
+from toolkit.geometry.pose import Pose, rotation_exponential, rotation_vector
 from toolkit.wholebody.profile import Window
 
 
@@ -139,23 +139,3 @@ def _about_y(angle: np.ndarray) -> np.ndarray:
     """(..., 3, 3) rotations about y by (...,) rad."""
     c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
     return np.stack([np.stack([c, zero, s], -1), np.stack([zero, one, zero], -1), np.stack([-s, zero, c], -1)], -2)
-
-
-def rotation_exponential(vector: np.ndarray) -> np.ndarray:
-    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad (Rodrigues)."""
-    vector = np.asarray(vector, float)
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
-    x, y, z = np.moveaxis(vector, -1, 0)
-    zero = np.zeros_like(x)
-    cross = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
-    # numpy's sinc is sin(pi x) / (pi x): exact through zero.
-    return np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (cross @ cross)
-
-
-def rotation_vector(rotation: np.ndarray) -> np.ndarray:
-    """Rotation vector (3,) in rad, at most pi long, of one rotation matrix (3, 3)."""
-    w, *axis = Pose(np.asarray(rotation, float), np.zeros(3)).quaternion_wxyz
-    sine = np.linalg.norm(axis)
-    if sine < 1e-12:
-        return 2.0 * np.asarray(axis)
-    return 2.0 * np.arctan2(sine, w) / sine * np.asarray(axis)
