@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from toolkit.contacts.arm_map import ArmMap, ArmMapConfig
-from toolkit.robot.geometry import arm_joints
+from toolkit.robot.chain import arm_joints
 from toolkit.robot.loader import find_robots, load_robot
 
 

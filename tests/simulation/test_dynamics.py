@@ -4,9 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from toolkit.geometry.limb import Limb
 from toolkit.robot.loader import find_robots, load_robot
-from toolkit.simulation.dynamics import RobotDynamics, carries
+from toolkit.simulation.dynamics import RobotDynamics
 
 
 @pytest.fixture(params=find_robots(), scope="module")
@@ -96,12 +95,3 @@ def test_momentum_and_its_rate(robot):
         np.testing.assert_allclose(dynamics.com_jacobian @ qdd + dynamics.com_drift, (c1 - c0) / (2 * step), atol=1e-6)
         rate = dynamics.momentum_jacobian @ qdd + dynamics.momentum_drift
         np.testing.assert_allclose(rate, (k1 - k0) / (2 * step), atol=1e-5)
-
-
-def test_legs_carry_feet_and_arms_do_not(robot):
-    left, right = (carries(robot, limb) for limb in (Limb.LEFT_FOOT, Limb.RIGHT_FOOT))
-    assert not (left & right).any()
-    assert left.sum() == right.sum() >= 5
-    for palm in (limb for limb in robot.limbs if not limb.is_foot):
-        arm = carries(robot, palm)
-        assert arm.any() and not (arm & (left | right)).any()

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
 from toolkit.geometry.limb import Limb
-from toolkit.robot.geometry import arm_joints
+from toolkit.robot.chain import arm_joints
 from toolkit.robot.model import RobotModel
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.robot.chain import arm_joints, joints_to
 from toolkit.robot.model import ArmGeometry, LegGeometry
 
 STRAIGHT_LEG_MARGIN = 0.015  # of the length from hip to ankle
@@ -34,7 +35,7 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
     Raises:
         RobotError: the chain from base to foot is not hip (yaw, roll, pitch in any order), knee, ankle (two).
     """
-    joints = _chain(model, model.site_bodyid[model.site(limb.label).id])
+    joints = joints_to(model, int(model.site_bodyid[model.site(limb.label).id]))
     roles = _leg_roles(model, data, joints, limb)
     base = data.xmat[1].reshape(3, 3)
     site = model.site(limb.label).id
@@ -143,48 +144,6 @@ def derive_limbs(
     legs = {limb: leg_geometry(model, data, limb) for limb in limbs if limb in FEET}
     arms = {limb: arm_geometry(model, data, limb) for limb in limbs if limb not in FEET}
     return legs, arms
-
-
-def _chain(model: mujoco.MjModel, body: int) -> list[int]:
-    """Actuated joints from the base to a body, in that order."""
-    joints: list[int] = []
-    while model.body_parentid[body] != 0:
-        first, count = model.body_jntadr[body], model.body_jntnum[body]
-        joints = [*range(first, first + count), *joints]
-        body = model.body_parentid[body]
-    return joints
-
-
-def arm_joints(model: mujoco.MjModel, limb: Limb) -> list[int]:
-    """Joints from the trunk to a palm.
-
-    The trunk is the first body above the palm that carries another limb, or that carries other joints (a head, an arm
-    without palm) once the chain has the four joints of an arm.
-    """
-    trunk = {0}
-    for other in (item for item in Limb if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, item.label) >= 0):
-        body = model.site_bodyid[model.site(other.label).id]
-        while other != limb and body:
-            trunk.add(int(body))
-            body = model.body_parentid[body]
-    moving = {int(body) for body in model.jnt_bodyid}
-    joints: list[int] = []
-    body = int(model.site_bodyid[model.site(limb.label).id])
-    while body not in trunk:
-        first, count = model.body_jntadr[body], model.body_jntnum[body]
-        joints = [*range(first, first + count), *joints]
-        parent = int(model.body_parentid[body])
-        siblings = [b for b in range(1, model.nbody) if model.body_parentid[b] == parent and b != body]
-        if len(joints) >= 4 and any(_carries(model, sibling, moving) for sibling in siblings):
-            break
-        body = parent
-    return joints
-
-
-def _carries(model: mujoco.MjModel, body: int, moving: set[int]) -> bool:
-    """Whether a body or one below it has a joint."""
-    children = [b for b in range(body + 1, model.nbody) if model.body_parentid[b] == body]
-    return body in moving or any(_carries(model, child, moving) for child in children)
 
 
 def _leg_roles(model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], limb: Limb) -> dict[str, int]:

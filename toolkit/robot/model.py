@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from toolkit.geometry.limb import Limb
+from toolkit.robot.chain import arm_joints, joints_to
 
 
 @dataclass(frozen=True)
@@ -127,3 +128,12 @@ class RobotModel:
         for limb, model in self.limbs.items():
             sizes[limb] = model.half_size
         return sizes
+
+    def joints_to(self, limb: Limb) -> np.ndarray:
+        """(k,) int; indices into `joint_names` of the joints from the base to a limb, in order."""
+        model = self.mujoco_model
+        return np.array(joints_to(model, model.body(self.limbs[limb].body).id), int) - 1  # joint 0 is the free one
+
+    def arm_joints(self, palm: Limb) -> np.ndarray:
+        """(k,) int; indices into `joint_names` of the joints from the trunk to a palm, in order."""
+        return np.array(arm_joints(self.mujoco_model, palm), int) - 1

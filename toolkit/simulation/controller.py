@@ -6,10 +6,9 @@ import numpy as np
 
 from toolkit.centroidal.problem import Margins
 from toolkit.geometry.limb import Limb
-from toolkit.robot.geometry import arm_joints
 from toolkit.robot.model import RobotModel
 from toolkit.simulation.config import ExecutionConfig, TaskGains
-from toolkit.simulation.dynamics import RobotDynamics, carries
+from toolkit.simulation.dynamics import RobotDynamics
 from toolkit.simulation.joint_box import JointBox
 from toolkit.simulation.limb_target import LimbTargets
 from toolkit.simulation.qp import FORCE_UNIT, ContactQP
@@ -73,17 +72,13 @@ class Controller:
             for urgent, shrink in ((False, nesting), (True, urgent_nesting))
         }
         self._urgent, self._calm = False, 1.0
-        legs, model = np.zeros(len(robot.joint_names), bool), robot.mujoco_model
+        legs = np.zeros(len(robot.joint_names), bool)
         for limb in self.limbs:
             if limb.is_foot:
-                legs |= carries(robot, limb)
+                legs[robot.joints_to(limb)] = True
         gains, nv = config.controller, self.dynamics.nv
         self._posture_weight = np.where(legs, gains.leg_posture, 1.0) * gains.posture.weight
-        self._arms = {
-            limb: np.array([robot.joint_names.index(model.joint(joint).name) for joint in arm_joints(model, limb)])
-            for limb in self.limbs
-            if not limb.is_foot
-        }
+        self._arms = {limb: robot.arm_joints(limb) for limb in self.limbs if not limb.is_foot}
         self._posture = self._posture_weight.copy()
         self._diagonal = np.full(nv + 18, gains.acceleration)
         self._diagonal[3:6] += gains.base.weight

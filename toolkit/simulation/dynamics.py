@@ -5,7 +5,6 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 
 
@@ -109,23 +108,3 @@ class RobotDynamics:
         np.dot(rotation, self.bias[3:6], out=self.momentum_drift)
         self.momentum_drift -= lever @ self.bias[:3]
         np.dot(self.momentum_jacobian, qvel, out=self.angular_momentum)
-
-
-def carries(robot: RobotModel, limb: Limb) -> np.ndarray:
-    """Which joints lie between the base and a limb.
-
-    Args:
-        robot: the robot.
-        limb: one that it has.
-
-    Returns:
-        (n,) bool.
-    """
-    model = robot.mujoco_model
-    body, between = int(model.site(robot.limbs[limb].site).bodyid[0]), np.zeros(model.nu, bool)
-    while body:
-        first, count = model.body_dofadr[body], model.body_dofnum[body]
-        if 0 < count < 6:
-            between[first - 6 : first - 6 + count] = True
-        body = int(model.body_parentid[body])
-    return between

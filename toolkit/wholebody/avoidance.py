@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 
 from toolkit.geometry.limb import PALMS, Limb
+from toolkit.robot.chain import joints_to
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.knee import chain_to
 from toolkit.world.scene import compose_scene
 from toolkit.world.world import World
 
@@ -156,7 +156,7 @@ class ArmAvoidance:
 
 def _arm_of_geoms(robot: RobotModel, model: mujoco.MjModel) -> np.ndarray:
     """(ngeom,) int; the palm whose arm a geom belongs to, -1 elsewhere. The trunk, below both arms, is no arm."""
-    chains = {limb: chain_to(model, robot.limbs[limb].body) for limb in robot.limbs}
+    chains = {limb: joints_to(model, model.body(robot.limbs[limb].body).id) for limb in robot.limbs}
     arm = np.full(model.nbody, -1)
     for palm in (limb for limb in PALMS if limb in chains):
         others = {joint for limb, chain in chains.items() if limb != palm for joint in chain}

@@ -12,7 +12,6 @@ from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.collision import CollisionConfig, first_collision
 from toolkit.wholebody.finding import Finding
-from toolkit.wholebody.knee import chain_to
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.torque import inverse_dynamics, velocities
 from toolkit.world.world import World
@@ -157,10 +156,9 @@ def _angle(limb: Limb, actual: np.ndarray, planned: np.ndarray) -> float:
 def _bearing(robot: RobotModel, motion: CentroidalMotion) -> np.ndarray:
     """(n,) bool; joints between the base and a limb that is in contact at any time."""
     bearing = np.zeros(len(robot.joint_names), bool)
-    for limb, item in robot.limbs.items():
+    for limb in robot.limbs:
         if motion.problem.active[:, limb].any():
-            names = [robot.mujoco_model.joint(joint).name for joint in chain_to(robot.mujoco_model, item.body)]
-            bearing[[robot.joint_names.index(name) for name in names]] = True
+            bearing[robot.joints_to(limb)] = True
     return bearing
 
 

@@ -16,12 +16,11 @@ from toolkit.contacts.arm_map import ArmMap
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose, rotation_about_z, rotation_vector
-from toolkit.robot.geometry import arm_joints
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
 from toolkit.wholebody.avoidance import ArmAvoidance
 from toolkit.wholebody.ik_config import IKConfig
-from toolkit.wholebody.knee import chain_to, knee_range
+from toolkit.wholebody.knee import knee_range
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.profile import Window
 
@@ -48,6 +47,7 @@ class WholeBodyIK:
         self.solver.dt = tick
         self.maps: dict[Limb, ArmMap] = {}
         self.reaching: dict[Limb, tuple] = {}
+        self.arm_joints = {palm: robot.arm_joints(palm) for palm in PALMS if palm in robot.limbs}
         self.home = dict(zip(robot.joint_names, robot.home[7:], strict=True))
         self._set_limits()
         self._add_tasks()
@@ -75,13 +75,12 @@ class WholeBodyIK:
             task = solver.add_frame_task(robot.limbs[foot].site, np.eye(4))
             task.configure(foot.label, "soft", config.foot_position, config.foot_orientation)
             self.feet[foot] = task
-        for palm in PALMS:
-            if palm in robot.limbs:
-                site, z = robot.limbs[palm].site, np.array([0.0, 0.0, 1.0])
-                position = solver.add_position_task(site, np.zeros(3))
-                normal = solver.add_axisalign_task(site, z, z)
-                twist = solver.add_orientation_task(site, np.eye(3))
-                self.palms[palm] = (position, normal, twist)
+        for palm in self.arm_joints:
+            site, z = robot.limbs[palm].site, np.array([0.0, 0.0, 1.0])
+            position = solver.add_position_task(site, np.zeros(3))
+            normal = solver.add_axisalign_task(site, z, z)
+            twist = solver.add_orientation_task(site, np.eye(3))
+            self.palms[palm] = (position, normal, twist)
         self.base = solver.add_orientation_task(robot.base, np.eye(3))
         self.base.configure("base", "soft", config.base)
         self.postures = []
@@ -94,24 +93,16 @@ class WholeBodyIK:
 
     def _groups(self) -> list[tuple[list[str], float]]:
         """Joint names with the weight of their posture: arms, trunk, legs."""
-        model, config = self.robot.mujoco_model, self.config
-        chains = {limb: chain_to(model, item.body) for limb, item in self.robot.limbs.items()}
-        legs = set(chains[Limb.LEFT_FOOT]) | set(chains[Limb.RIGHT_FOOT])
-        reaching = [set(chains[palm]) for palm in PALMS if palm in chains]
-        both = set.intersection(*reaching) if len(reaching) == 2 else set()
-        arms = set().union(*reaching) - both - legs
-        names = {limb: [model.joint(joint).name for joint in chains[limb] if joint in arms] for limb in self.palms}
-        self.map_joints = {
-            limb: [self.robot.joint_names.index(model.joint(joint).name) for joint in arm_joints(model, limb)]
-            for limb in self.palms
-        }
-        self.arm_joints = {limb: [self.robot.joint_names.index(name) for name in row] for limb, row in names.items()}
+        robot, config = self.robot, self.config
+        legs = {joint for foot in FEET for joint in robot.joints_to(foot).tolist()}
+        arms = {joint for palm in self.palms for joint in self.arm_joints[palm].tolist()}
+        reaching = {joint for palm in self.palms for joint in robot.joints_to(palm).tolist()}
         groups: dict[float, list[str]] = {}
-        for joint in range(1, model.njnt):
-            in_trunk = joint in both or not reaching
+        for joint, name in enumerate(robot.joint_names):
+            in_trunk = joint in reaching - arms or not reaching
             weight = config.legs if joint in legs else config.arms if joint in arms else config.rest
             weight = config.trunk if in_trunk and joint not in legs else weight
-            groups.setdefault(weight, []).append(model.joint(joint).name)
+            groups.setdefault(weight, []).append(name)
         return [(names, weight) for weight, names in groups.items()]
 
     def start(self, qpos: np.ndarray, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
@@ -180,7 +171,7 @@ class WholeBodyIK:
             if segment.path is not None and self.reaching.get(palm, (None,))[0] is not segment:
                 self.reaching[palm] = segment, self._arm_posture(palm, segment.end, angles, paths, motion)
             if palm in self.reaching:
-                posture[self.map_joints[palm]] = self.reaching[palm][1]
+                posture[self.arm_joints[palm]] = self.reaching[palm][1]
         return posture
 
     def _arm_posture(
@@ -195,7 +186,7 @@ class WholeBodyIK:
         if palm not in self.maps:
             self.maps[palm] = ArmMap.of(self.robot, palm)
         relative = turn.T @ (pose.position - motion.sample(time)[0]) - self.robot.arms[palm].shoulder_in_com
-        return self.maps[palm].posture(relative, turn.T @ pose.normal, angles[self.map_joints[palm]])
+        return self.maps[palm].posture(relative, turn.T @ pose.normal, angles[self.arm_joints[palm]])
 
     @property
     def joints(self) -> np.ndarray:

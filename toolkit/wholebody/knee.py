@@ -28,7 +28,7 @@ def knee_range(robot: RobotModel, foot: Limb, min_angle: float) -> tuple[int, fl
     data.qpos[:] = robot.home
     mujoco.mj_kinematics(model, data)
     site = data.site(robot.limbs[foot].site).xpos
-    chain = chain_to(model, robot.limbs[foot].body)
+    chain = robot.joints_to(foot) + 1  # in the model, whose joint 0 is the free one
     if len(chain) < 3:
         return None
     hip = data.xanchor[chain[0]]
@@ -42,20 +42,8 @@ def knee_range(robot: RobotModel, foot: Limb, min_angle: float) -> tuple[int, fl
     axis = data.xaxis[knee]
     flexion = np.arctan2(np.cross(thigh, shin) @ axis, thigh @ shin - (thigh @ axis) * (shin @ axis))
     straight = float(data.qpos[model.jnt_qposadr[knee]] - flexion)
-    joint = robot.joint_names.index(model.joint(knee).name)
+    joint = int(knee) - 1
     lower, upper = float(robot.lower[joint]), float(robot.upper[joint])
     if effect[index] < 0.0:  # flexing is positive: it brings the sole closer
         return joint, min(max(lower, straight + min_angle), upper), upper
     return joint, lower, max(min(upper, straight - min_angle), lower)
-
-
-def chain_to(model: mujoco.MjModel, body: str) -> list[int]:
-    """Indices of the hinge and slide joints of a model from its base to a body, in order."""
-    joints: list[int] = []
-    index = model.body(body).id
-    while index > 0:
-        first = model.body_jntadr[index]
-        own = [first + k for k in range(model.body_jntnum[index])]
-        joints = [joint for joint in own if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE] + joints
-        index = model.body_parentid[index]
-    return joints
