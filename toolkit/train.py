@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
@@ -83,6 +83,20 @@ def executor(workers: int, cluster: str | None) -> Iterator[Executor]:
         yield pool
 
 
+def add_executor_options(parser: argparse.ArgumentParser) -> None:
+    """Options for `executor`."""
+    parser.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
+    parser.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+
+
+@contextmanager
+def shards_at_work(args: argparse.Namespace, console: Console) -> Iterator[tuple[Executor, Callable[[int, int], None]]]:
+    """The executor that the options ask for, and a callback that shows how many shards of how many are done."""
+    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
+        task = progress.add_task("shards")
+        yield pool, lambda done, of: progress.update(task, completed=done, total=of)
+
+
 def run_collect(args: argparse.Namespace, console: Console) -> int:
     """`collect`."""
     robot = load_robot(args.robot, args.robots)
@@ -114,11 +128,8 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
 def run_differentiate(args: argparse.Namespace, console: Console) -> int:
     """`differentiate`."""
     robot = load_robot(args.robot, args.robots)
-    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
-        task = progress.add_task("shards")
-        changed = differentiate(
-            args.data, robot, pool, lambda done, total: progress.update(task, completed=done, total=total)
-        )
+    with shards_at_work(args, console) as (pool, progress):
+        changed = differentiate(args.data, robot, pool, progress)
     console.print(f"{changed} shards had transitions without derivatives\n{args.data}")
     return 0
 
@@ -133,11 +144,8 @@ def run_enrich(args: argparse.Namespace, console: Console) -> int:
         categories=tuple(args.categories),
         draws=args.draws,
     )
-    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
-        task = progress.add_task("shards")
-        added = enrich(
-            args.data, args.out, robot, config, pool, lambda done, of: progress.update(task, completed=done, total=of)
-        )
+    with shards_at_work(args, console) as (pool, progress):
+        added = enrich(args.data, args.out, robot, config, pool, progress)
     console.print(f"{added} transitions added\n{args.out}")
     return 0
 
@@ -257,14 +265,12 @@ def main(argv: list[str] | None = None) -> int:
     sub = add("collect", "label transitions with the centroidal optimiser; goes on where it was stopped")
     sub.add_argument("--out", type=Path, required=True, help="data set folder, new or begun")
     sub.add_argument("--samples", type=cli.positive(int), default=100_000, help="per category (default: %(default)s)")
-    sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
-    sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    add_executor_options(sub)
     sub.set_defaults(run=run_collect)
 
     sub = add("differentiate", "add derivatives to a data set of an earlier version; goes on where it was stopped")
     sub.add_argument("--data", type=Path, required=True, help="data set folder")
-    sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
-    sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    add_executor_options(sub)
     sub.set_defaults(run=run_differentiate)
 
     sub = add(
@@ -276,8 +282,7 @@ def main(argv: list[str] | None = None) -> int:
         "--draws", type=cli.positive(int), default=200, help="per category and shard (default: %(default)s)"
     )
     sub.add_argument("--categories", type=int, nargs="+", choices=range(10), metavar="0..9", default=list(range(10)))
-    sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
-    sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    add_executor_options(sub)
     sub.set_defaults(run=run_enrich)
 
     sub = add("fit", "train a classifier and a regressor per category")

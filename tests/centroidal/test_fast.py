@@ -245,7 +245,7 @@ def test_threads_give_the_same_answers(robot):
     problems = [
         transition_problem(robot, s.stance, s.com, s.com_velocity, s.transition) for s in samples(robot, 1, seed=7)
     ]
-    alone = fast.solve_many(problems)
+    alone = [fast.solve(problem) for problem in problems]
     with ThreadPoolExecutor(2) as pool:
         together = list(pool.map(fast.solve, problems))
     for one, other in zip(alone, together, strict=True):

@@ -7,7 +7,7 @@ The first solution on a machine compiles the kernels (numba), which are then kep
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from time import perf_counter
@@ -22,6 +22,7 @@ from toolkit.centroidal.residual import confirmed
 FIRST_KNOT_TOLERANCE = 1e-7
 """m; how far the given first knot may violate reach or height."""
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+MOTION = (interior_point.SOLVED, interior_point.UNDECIDED)  # the codes that come with a motion
 STATUS = {
     interior_point.SOLVED: "solved",
     interior_point.INFEASIBLE: "infeasible: proved by multipliers",
@@ -50,7 +51,7 @@ def solve(problem: CentroidalProblem, *, config: FastConfig | None = None) -> Ce
         The motion, checked by `toolkit.centroidal.residual`. Where `status` says infeasible, that has been proved.
     """
     start = perf_counter()
-    code, iterations, (com, linear, angular, force, cop, torque) = _run(problem, config or FastConfig())
+    code, iterations, (com, linear, angular, force, cop, torque), _ = _run(problem, config)
     motion = CentroidalMotion(
         problem=problem,
         feasible=False,
@@ -65,7 +66,7 @@ def solve(problem: CentroidalProblem, *, config: FastConfig | None = None) -> Ce
         seconds=perf_counter() - start,
         iterations=iterations,
     )
-    if code in (interior_point.SOLVED, interior_point.UNDECIDED):
+    if code in MOTION:
         motion = confirmed(motion)
         object.__setattr__(motion, "seconds", perf_counter() - start)
     return motion
@@ -78,8 +79,8 @@ def wrenches(problem: CentroidalProblem, *, config: FastConfig | None = None) ->
         com, linear and angular momentum, force, cop and yaw torque as in `CentroidalMotion`; None where the solver says
         infeasible.
     """
-    code, _, motion = _run(problem, config or FastConfig())
-    return motion if code in (interior_point.SOLVED, interior_point.UNDECIDED) else None
+    code, _, motion, _ = _run(problem, config)
+    return motion if code in MOTION else None
 
 
 @dataclass(frozen=True)
@@ -106,18 +107,17 @@ def sensitive_wrenches(
         config: the derivatives err by about the square root of `tolerance` in directions that hardly matter, by a tenth
             of that as a whole.
     """
+    code, _, motion, derivatives = _run(problem, config, differentiate=True)
+    return (motion, derivatives) if code in MOTION else None
+
+
+def _run(
+    problem: CentroidalProblem, config: FastConfig | None, *, differentiate: bool = False
+) -> tuple[int, int, Arrays, Sensitivity]:
+    """Status, iterations, the arrays of the motion, and its derivatives, zero where they are not asked for."""
     config = config or FastConfig()
-    solved = _kernel()(float(config.tolerance), int(config.max_iterations), True, *_arguments(problem))
-    if solved[0] not in (interior_point.SOLVED, interior_point.UNDECIDED):
-        return None
-    return solved[2:8], Sensitivity(*solved[8:])
-
-
-def _run(problem: CentroidalProblem, config: FastConfig) -> tuple[int, int, Arrays]:
-    """Status, iterations and the arrays of the motion."""
-    solved = _kernel()(float(config.tolerance), int(config.max_iterations), False, *_arguments(problem))
-    code, iterations, com, linear, angular, force, cop, torque = solved[:8]
-    return code, iterations, (com, linear, angular, force, cop, torque)
+    solved = _kernel()(float(config.tolerance), int(config.max_iterations), differentiate, *_arguments(problem))
+    return solved[0], solved[1], solved[2:8], Sensitivity(*solved[8:])
 
 
 def _arguments(problem: CentroidalProblem) -> tuple:
@@ -176,11 +176,6 @@ def _plain(array: np.ndarray | None, dtype: type = float) -> np.ndarray:
 def pack(problem: CentroidalProblem) -> tuple[setup.Data, float]:
     """The scaled arrays that the kernels work on, and how far the first knot is out of reach in m."""
     return setup.pack(*_arguments(problem))
-
-
-def solve_many(problems: Iterable[CentroidalProblem], *, config: FastConfig | None = None) -> list[CentroidalMotion]:
-    """Solve problems one after the other; call it in several threads or processes to use several cores."""
-    return [solve(problem, config=config) for problem in problems]
 
 
 @cache
