@@ -30,6 +30,7 @@ from toolkit.search.result import SearchResult, Solution
 from toolkit.simulation.check import Check, Result
 from toolkit.simulation.execution import Execution
 from toolkit.simulation.run import ExecutionConfig, execute
+from toolkit.simulation.verdict import failure_reason
 from toolkit.wholebody.plan import WholeBodyConfig, whole_body
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.world import World
@@ -226,7 +227,7 @@ def test_solution(
         rng=np.random.default_rng([config.seed, 1]),
         observer=lambda fraction, detail="": observer.progress("execution", fraction, detail),
     )
-    reason = failure(execution)
+    reason = failure_reason(execution.checks, execution.fall_reason)
     when = execution.failure_time if reason else None
     trial = Trial(solution, schedule, not reason, motion, trajectory, execution, reason, when)
     observer.finished("execution", trial.passed, time.perf_counter() - began, trial.reason)
@@ -258,20 +259,6 @@ def _optimised(
     sequence = moved_sequence(sequence, schedule, moved.problem.times, moved.problem.position)
     schedule = ContactSchedule.of(sequence, initial_rest=config.initial_rest, final_rest=config.final_rest)
     return replace(solution, sequence=sequence), schedule, moved
-
-
-def failure(execution: Execution) -> str:
-    """One line on the first check that did not pass, "" where all were measured and did."""
-    if not execution.checks:
-        return "nothing was checked"
-    if execution.fell:
-        return f"the robot fell: {execution.fall_reason}"
-    for check in execution.checks:
-        if check.result == Result.NOT_CHECKED:
-            return f"{check.name} was not checked"
-        if check.result == Result.FAIL:
-            return f"{check.name} is {check.value:.3g} {check.unit}".rstrip() + f", the limit is {check.limit:.3g}"
-    return ""
 
 
 def run(

@@ -10,10 +10,11 @@ import numpy as np
 
 from toolkit import cli
 from toolkit.errors import ToolkitError
-from toolkit.pipeline import PipelineConfig, PipelineResult, failure
+from toolkit.pipeline import PipelineConfig, PipelineResult
 from toolkit.report.console import make_console
 from toolkit.simulation.disturbance import Disturbance
 from toolkit.simulation.run import execute
+from toolkit.simulation.verdict import failure_reason
 from validation import goals, options
 from validation.cases import Case, kind_of, make_cases
 from validation.goals import Goal
@@ -97,7 +98,7 @@ def disturbed_run(
         )
     except ToolkitError as error:
         return {"survived": False, "held": False, "passed": False, "reason": " ".join(str(error).split())}
-    reason = failure(execution)
+    reason = failure_reason(execution.checks, execution.fall_reason)
     survived = execution.completed and not execution.fell and execution.goal_reached
     run: dict[str, Any] = {
         "survived": survived,

@@ -37,21 +37,6 @@ class Measured:
     missed_touchdowns: int
 
 
-_TEXT = {
-    "upright": "the robot fell",
-    "completed": "the plan was not carried out to its end",
-    "touchdowns": "{value:.0f} planned contacts were never made",
-    "goal_distance": "the mean of the feet ended {value:.3f} m from the goal, beyond its radius of {limit:.3f} m",
-    "unplanned_contacts": "{value:.0f} pairs of robot and world geoms touched outside soles and palms",
-    "friction": "{value:.0f} contacts had a friction that was not the world's",
-    "slip": "a patch slipped {value:.4f} m in one contact, more than {limit:.3f} m",
-    "com_rms_error": "the CoM was {value:.4f} m RMS off its plan, more than {limit:.3f} m",
-    "torque_ratio": "a joint used {value:.3f} of its torque limit",
-    "joint_range": "a joint was {value:.4f} rad outside its range",
-    "velocity_ratio": "a joint moved at {value:.3f} of its velocity limit",
-}
-
-
 def execution_checks(measured: Measured, config: ExecutionConfig) -> tuple[Check, ...]:
     """Hold what was measured against its limits.
 
@@ -78,17 +63,19 @@ def execution_checks(measured: Measured, config: ExecutionConfig) -> tuple[Check
 
 
 def failure_reason(checks: tuple[Check, ...], fall_reason: str = "") -> str:
-    """One line on the first check that did not pass; "" where all passed.
+    """One line on the first check that did not pass, "" where all were measured and did.
 
     Args:
         checks: as `execution_checks` gives them.
         fall_reason: how the robot fell, if it did.
     """
+    if not checks:
+        return "nothing was checked"
+    if fall_reason:
+        return f"the robot fell: {fall_reason}"
     for check in checks:
-        if check.result is Result.PASS:
-            continue
         if check.result is Result.NOT_CHECKED:
             return f"{check.name} was not checked"
-        text = _TEXT[check.name].format(value=check.value, limit=check.limit)
-        return f"{text}: {fall_reason}" if check.name == "upright" and fall_reason else text
+        if check.result is Result.FAIL:
+            return f"{check.name} is {check.value:.3g} {check.unit}".rstrip() + f", the limit is {check.limit:.3g}"
     return ""
