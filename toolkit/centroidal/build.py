@@ -11,15 +11,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from toolkit.centroidal.problem import CentroidalProblem, Margins, Weights
+from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalProblem, Margins, Weights
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import InputError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
-
-STANDARD_GRAVITY = 9.81
 
 
 @dataclass(frozen=True)

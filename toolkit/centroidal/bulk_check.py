@@ -11,12 +11,11 @@ import math
 import numpy as np
 from numba import njit
 
-from toolkit.centroidal.problem import CentroidalProblem
+from toolkit.centroidal.fast import Arrays
+from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalProblem
 
-Wrenches = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
-
-def residual_and_objective(problem: CentroidalProblem, motion: Wrenches) -> tuple[float, float]:
+def residual_and_objective(problem: CentroidalProblem, motion: Arrays) -> tuple[float, float]:
     """Largest residual and objective of a motion.
 
     Args:
@@ -122,7 +121,7 @@ def _evaluate(
     landing_rotation,
     weights,
 ):
-    n, weight = dt.shape[0], mass * 9.81
+    n, weight = dt.shape[0], mass * STANDARD_GRAVITY
     for array in (com, linear, angular, force.reshape(-1, 3), cop.reshape(-1, 2), torque):
         for value in array.flat:
             if not math.isfinite(value):
@@ -177,7 +176,7 @@ def _evaluate(
                 if half_size[i, a] > 0.0:
                     cost += weights[7] * (z[a] / (2.0 * half_size[i, a])) ** 2
         for a in range(3):
-            acceleration[a] = total[a] / mass - (9.81 if a == 2 else 0.0)
+            acceleration[a] = total[a] / mass - (STANDARD_GRAVITY if a == 2 else 0.0)
         for a in range(3):
             v = linear[t, a] / mass
             middle = com[t, a] + h / 2 * v + h * h / 8 * acceleration[a]

@@ -21,13 +21,13 @@ import casadi as ca
 
 from toolkit.centroidal.blocks import Parameters, Piece
 from toolkit.centroidal.leg_pieces import WRENCH, displacement, leg, torque
-from toolkit.centroidal.problem import GRAVITY
+from toolkit.centroidal.problem import GRAVITY, STANDARD_GRAVITY
 
 STATE = 12
 CONTACT = WRENCH + 2
 SLACKS = 2
 EVEN = 0.1  # part of a slack's price on its square: shared out evenly where the linear price is indifferent
-G = float(-GRAVITY[2])
+G = STANDARD_GRAVITY
 
 
 @dataclass(frozen=True)

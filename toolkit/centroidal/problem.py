@@ -29,7 +29,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-GRAVITY = np.array([0.0, 0.0, -9.81])
+STANDARD_GRAVITY = 9.81  # m/s^2
+GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 
 
 @dataclass(frozen=True)

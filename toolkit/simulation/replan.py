@@ -7,6 +7,7 @@ from time import process_time
 
 import numpy as np
 
+from toolkit.centroidal.problem import STANDARD_GRAVITY
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.simulation.dynamics import RobotDynamics
@@ -86,7 +87,7 @@ class Replanner:
         self._reference, self._nominal, self._config = reference, nominal, config
         self._problem = ReplanProblem(nominal, robot, surfaces, config)
         self._mass = nominal.mass
-        self._weight = self._mass * 9.81
+        self._weight = self._mass * STANDARD_GRAVITY
         self._due = 0.0
         self._plan: Replan | None = None
         self._made: dict[Limb, int] = {}

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.centroidal.problem import STANDARD_GRAVITY
 from toolkit.geometry.limb import FEET
 from toolkit.simulation.replan_contacts import ContactTable, Situation
 from toolkit.simulation.replan_kernel import GIVEN
 from toolkit.simulation.replan_nominal import Nominal
 
-G = 9.81
+G = STANDARD_GRAVITY
 
 
 @dataclass(frozen=True)

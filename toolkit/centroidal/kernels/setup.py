@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toolkit.centroidal.kernels import compiled, knots
+from toolkit.centroidal.problem import STANDARD_GRAVITY
 
 ROWS = 13
 """Linear constraints of a contact."""
@@ -123,7 +124,7 @@ def pack(
     for t in range(n):
         for i in range(4):
             total += active[t, i]
-    unit = math.sqrt(9.81)
+    unit = math.sqrt(STANDARD_GRAVITY)
     h, omega, w = np.empty(n), np.empty(n), np.empty(8)
     first, frames, wrench = np.zeros(n + 1, np.int64), np.empty((total, 3, 3)), np.zeros((total, 6, 6))
     mu, bound, lever = np.empty(total), np.empty(total), np.empty(3)
@@ -131,9 +132,9 @@ def pack(
     for i in range(8):
         w[i] = 2.0 * SCALE * weights[i]
         if i == 0 or i == 2:
-            w[i] *= mass * mass * 9.81
+            w[i] *= mass * mass * STANDARD_GRAVITY
         elif i == 1 or i == 3 or i == 5:
-            w[i] *= (mass * 9.81) ** 2
+            w[i] *= (mass * STANDARD_GRAVITY) ** 2
     j = 0
     for t in range(n):
         h[t], omega[t] = dt[t] * unit, dt[t] / 0.2
@@ -151,7 +152,7 @@ def pack(
                     wrench[j, a, b] = wrench[j, 3 + a, 3 + b] = frames[j, a, b]
                     wrench[j, 3 + a, b] = lever[c] * frames[j, e, b] - lever[e] * frames[j, c, b]
             mu[j] = max(friction[t, i] * friction_margin, SMALLEST)
-            bound[j] = min(max_normal_force[i] / (mass * 9.81), UNBOUNDED_FORCE)
+            bound[j] = min(max_normal_force[i] / (mass * STANDARD_GRAVITY), UNBOUNDED_FORCE)
             x, y = max(reduced_half_size[i, 0], SMALLEST), max(reduced_half_size[i, 1], SMALLEST)
             contact_rows(mu[j], x, y, bound[j], max(yaw_margin, SMALLEST), rows[j])
             offset[j, 0] = 1.0
@@ -229,7 +230,7 @@ def pack(
 def unpack(data, active, mass, com, u, x):
     """Knots and contact forces in SI units, as in `CentroidalMotion`: com, linear, angular, force, cop, yaw torque."""
     n = data.h.shape[0]
-    unit, weight = math.sqrt(9.81), mass * 9.81
+    unit, weight = math.sqrt(STANDARD_GRAVITY), mass * STANDARD_GRAVITY
     place, linear, angular = np.empty((n + 1, 3)), np.empty((n + 1, 3)), np.empty((n + 1, 3))
     for t in range(n + 1):
         r, v = x[t, :3], x[t, 3:6]
