@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from toolkit.geometry.limb import FEET, PALMS, Limb
-from toolkit.geometry.pose import Pose
+from toolkit.geometry.pose import Pose, mean_pose
 
 
 @dataclass(frozen=True)
@@ -65,9 +63,7 @@ class Stance:
     @property
     def mean_feet(self) -> Pose:
         """Upright frame at the mean of the feet with the circular mean of their headings (world_from_feet)."""
-        left, right = (self[limb].pose for limb in FEET)
-        heading = np.array([np.cos(left.yaw) + np.cos(right.yaw), np.sin(left.yaw) + np.sin(right.yaw)])
-        return Pose.from_yaw((left.position + right.position) / 2, float(np.arctan2(heading[1], heading[0])))
+        return mean_pose(*(self[limb].pose for limb in FEET))
 
     def replace(self, contact: Contact) -> Stance:
         """The stance with `contact` made, in place of the limb's old one if there is one."""

@@ -171,3 +171,9 @@ class Pose:
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = self.rotation, self.position
         return matrix
+
+
+def mean_pose(one: Pose, other: Pose) -> Pose:
+    """Upright pose in the middle of two, with the circular mean of their headings."""
+    heading = np.array([np.cos(one.yaw) + np.cos(other.yaw), np.sin(one.yaw) + np.sin(other.yaw)])
+    return Pose.from_yaw((one.position + other.position) / 2, float(np.arctan2(heading[1], heading[0])))

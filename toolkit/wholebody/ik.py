@@ -15,7 +15,7 @@ from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.arm_map import ArmMap
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import FEET, PALMS, Limb
-from toolkit.geometry.pose import Pose, rotation_about_z, rotation_vector
+from toolkit.geometry.pose import Pose, mean_pose, rotation_vector
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
 from toolkit.wholebody.avoidance import ArmAvoidance
@@ -179,10 +179,8 @@ class WholeBodyIK:
     ) -> np.ndarray:
         """(k,) rad; joints of an arm that make the contact at a time, with the trunk upright."""
         pose = paths.sample(palm, time).pose
-        feet = [paths.sample(foot, time).pose for foot in FEET]
-        assert pose is not None and all(foot is not None for foot in feet)
-        heading = np.sum([[np.cos(foot.yaw), np.sin(foot.yaw)] for foot in feet if foot is not None], axis=0)
-        turn = rotation_about_z(np.arctan2(heading[1], heading[0]))
+        assert pose is not None
+        turn = paths.mean_feet(time).rotation
         if palm not in self.maps:
             self.maps[palm] = ArmMap.of(self.robot, palm)
         relative = turn.T @ (pose.position - motion.sample(time)[0]) - self.robot.arms[palm].shoulder_in_com
@@ -208,7 +206,7 @@ class WholeBodyIK:
     def _set_targets(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> None:
         self.com.target_world = motion.sample(time)[0]
         self.momentum.L_world = momentum_at(motion, time)
-        heading, config = np.zeros(2), self.config
+        config, feet = self.config, []
         for foot, task in self.feet.items():
             pose = paths.sample(foot, time).pose
             assert pose is not None
@@ -217,8 +215,8 @@ class WholeBodyIK:
             position = config.foot_position * (config.air_position / config.foot_position) ** air
             orientation = config.foot_orientation * (config.air_orientation / config.foot_orientation) ** air
             task.configure(foot.label, "soft", position, orientation)
-            heading += np.array([np.cos(pose.yaw), np.sin(pose.yaw)])
-        self.base.R_world_frame = rotation_about_z(np.arctan2(heading[1], heading[0]))
+            feet.append(pose)
+        self.base.R_world_frame = mean_pose(*feet).rotation
         for palm, tasks in self.palms.items():
             self._set_palm(palm, tasks, time, paths)
 
@@ -309,10 +307,7 @@ def momentum_at(motion: CentroidalMotion, time: float) -> np.ndarray:
 
 def first_guess(robot: RobotModel, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
     """(7 + n,) qpos: the home posture above the feet's first contacts, shifted so that its CoM is as planned."""
-    left, right = (paths.sample(foot, 0.0).pose for foot in FEET)
-    assert left is not None and right is not None
-    heading = np.array([np.cos(left.yaw) + np.cos(right.yaw), np.sin(left.yaw) + np.sin(right.yaw)])
-    feet = Pose.from_yaw((left.position + right.position) / 2, float(np.arctan2(heading[1], heading[0])))
+    feet = paths.mean_feet(0.0)
     base = feet @ Pose.from_quaternion(robot.home[:3], robot.home[3:7])
     rise = motion.com[0, 2] - feet.position[2] - robot.com_height
     qpos = robot.home.copy()

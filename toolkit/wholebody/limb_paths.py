@@ -13,8 +13,8 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule, Phase
 from toolkit.contacts.stance import Contact, Stance
-from toolkit.geometry.limb import Limb
-from toolkit.geometry.pose import Pose
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.pose import Pose, mean_pose
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.profile import Window
 from toolkit.wholebody.swing import PathSample, SwingPath
@@ -91,6 +91,12 @@ class LimbPaths:
         if segment.pose is not None:
             return LimbSample(segment.pose, np.zeros(6), np.zeros(6), True)
         return LimbSample(None, np.full(6, np.nan), np.full(6, np.nan), False)
+
+    def mean_feet(self, time: float) -> Pose:
+        """Upright frame at the mean of the feet, on the ground or not, at a time in s."""
+        left, right = (self.sample(foot, time).pose for foot in FEET)
+        assert left is not None and right is not None
+        return mean_pose(left, right)
 
     def authority(self, limb: Limb, time: float) -> float:
         """How binding the limb's pose is, in [0, 1]: a palm blends from and to the arm's free posture."""
