@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_feasible, leg_posture
+from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.loader import find_robots, load_robot
 
@@ -82,6 +82,12 @@ def test_posture_turns_and_shifts_with_the_world(robot, limb):
         )
         for role in ("length", "hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle_pitch", "ankle_roll"):
             np.testing.assert_allclose(getattr(moved, role), getattr(still, role), atol=1e-9)
+
+
+def leg_feasible(leg, com, yaw, position, rotation):
+    """(n,) bool; whether legs reach their soles within every joint range."""
+    posture = leg_posture(leg, com, yaw, position, rotation)
+    return np.all([value >= 0.0 for value in leg_clearances(leg, posture).values()], axis=0)
 
 
 def test_home_posture_is_feasible_and_broken_ones_are_not(robot):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from toolkit.world.clearance import BoxCollider, boxes_collide, collision_triangles, height_map
+from toolkit.world.clearance import BoxCollider, collision_triangles, height_map
 from toolkit.world.source import RAY_GROUPS
 
 GEOMS = """
@@ -86,7 +86,7 @@ def test_boxes_agree_with_mujoco_distances(world):
     poses[:, :3, :3] = Rotation.random(400, rng=rng).as_matrix()
     poses[:, :3, 3] = rng.uniform([-2, -2, 0.0], [2, 2, 0.9], (400, 3))
     sizes = rng.uniform(0.02, 0.3, (400, 3))
-    hit = boxes_collide(world, poses, sizes)
+    hit = BoxCollider(world).collide(poses, sizes)
     assert 50 < hit.sum() < 350
     # The same question put to MuJoCo one box at a time, with the box compiled into the world.
     from tests.world.conftest import mjcf_of

@@ -116,12 +116,12 @@ def test_mesh_that_is_not_convex_collides_as_it_looks(make_world):
     assert top.geom == "ell" and area_of(top) == pytest.approx(3.0, rel=1e-6)
     assert len(top.pieces) == 2 and sorted(len(piece) for piece in top.pieces) == [4, 4]
     assert len([s for s in world.surfaces if s.serves_palm]) == 6
-    from toolkit.world.clearance import boxes_collide
+    from toolkit.world.clearance import BoxCollider
 
     poses = np.tile(np.eye(4), (2, 1, 1))
     poses[:, :3, 3] = [[0.5, 0.5, -0.1], [0.5, -0.5, -0.01]]
     # Inside the mesh's hull, but not inside the mesh; and inside the mesh.
-    assert boxes_collide(world, poses, np.full(3, 0.1)).tolist() == [False, True]
+    assert BoxCollider(world).collide(poses, np.full(3, 0.1)).tolist() == [False, True]
 
 
 def test_open_sheet_upside_down_is_turned(make_world):

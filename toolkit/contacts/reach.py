@@ -130,28 +130,3 @@ def leg_clearances(
         margin = margins.ankle if role.startswith("ankle") else margins.hip
         clearances[role.replace("_", " ")] = np.minimum(angle - lower, upper - angle) - margin
     return clearances
-
-
-def leg_feasible(
-    leg: LegGeometry,
-    com: np.ndarray,
-    yaw: np.ndarray,
-    position: np.ndarray,
-    rotation: np.ndarray,
-    margins: ReachMargins = ReachMargins(),
-) -> np.ndarray:
-    """Whether legs reach their soles within every joint range.
-
-    Args:
-        leg: geometry of the leg.
-        com: (n, 3) m; CoM in the world.
-        yaw: (n,) rad; heading of the base.
-        position: (n, 3) m; centre of the sole in the world.
-        rotation: (n, 3, 3); world_from_sole.
-        margins: taken off each limit.
-
-    Returns:
-        (n,) bool.
-    """
-    posture = leg_posture(leg, com, yaw, position, rotation)
-    return np.all([value >= 0.0 for value in leg_clearances(leg, posture, margins).values()], axis=0)

@@ -140,20 +140,6 @@ class BoxCollider:
         return result
 
 
-def boxes_collide(world: World, poses: np.ndarray, half_sizes: np.ndarray) -> np.ndarray:
-    """Whether oriented boxes penetrate the world; for repeated questions keep a `BoxCollider`.
-
-    Args:
-        world: the world.
-        poses: (n, 4, 4) float; world_from_box matrices, m.
-        half_sizes: (3,) or (n, 3) float, m.
-
-    Returns:
-        (n,) bool.
-    """
-    return BoxCollider(world).collide(poses, half_sizes)
-
-
 def free_boxes(world: mujoco.MjModel, batch: int) -> mujoco.MjSpec:
     """The colliding geoms of a world, all in the world body, followed by `batch` free boxes that see only them."""
     data = mujoco.MjData(world)

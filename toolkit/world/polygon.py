@@ -14,11 +14,6 @@ def region_of(surface: Surface) -> Polygon:
     return Polygon(surface.boundary[0], surface.boundary[1:])
 
 
-def outline_in_world(surface: Surface) -> tuple[np.ndarray, ...]:
-    """Rings (k, 3) of a surface in the world frame, m."""
-    return tuple(surface.pose @ np.column_stack([ring, np.zeros(len(ring))]) for ring in surface.boundary)
-
-
 def surface_height(surface: Surface, points: np.ndarray) -> np.ndarray:
     """Height of a surface over points of the ground plane.
 
