@@ -7,7 +7,7 @@ import numpy as np
 from tests.search.worlds import FLOOR, box, make_world
 from toolkit.contacts.projection import Projected
 from toolkit.geometry.limb import Limb
-from toolkit.prediction.kinematic import KinematicEvaluator
+from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
 from toolkit.search.ana_star import AnaStarConfig
 from toolkit.search.candidates import Candidates, mean_feet
 from toolkit.search.drift import Drift
@@ -136,12 +136,12 @@ def test_drift_knows_that_nothing_stands_slowly_on_steep_ground(robot):
         assert (slow > 0.5) == slides and quick < 0.1
 
 
-def test_a_second_evaluator_has_its_say_where_ground_is_slippery(robot):
+def test_a_second_evaluator_has_its_say_where_the_way_is_slippery(robot):
     class Timid(Counting):
         """Believes in no CoM between x = 0.3 m and 0.7 m."""
 
-        def __init__(self, robot, outside):
-            super().__init__(robot)
+        def __init__(self, robot, config, outside):
+            super().__init__(robot, config)
             self.outside = outside
 
         def evaluate(self, stance, com, com_velocity, transitions):
@@ -149,10 +149,11 @@ def test_a_second_evaluator_has_its_say_where_ground_is_slippery(robot):
             return replace(batch, feasible=batch.feasible & (np.abs(batch.com[:, 0] - 0.5) > 0.2))
 
     longer = PlannerConfig(search=AnaStarConfig(max_expansions=400))
-    steep = box([0.5, 1.2, 0.0], [0.4, 0.3, 0.1], (45, 0, 0), friction=0.5)
-    for geoms, asked in (((FLOOR, steep), True), ((FLOOR,), False)):
-        second = Counting(robot)
-        planner = ContactPlanner(robot, make_world(*geoms, goal=(1.0, 0, 0)), Timid(robot, second), longer)
+    aside = box([0.5, 1.2, 0.0], [0.4, 0.3, 0.1], (45, 0, 0), friction=0.5)
+    slope, bold = box([0, 0, 0], [3, 3, 0.05], (0, 20, 0), friction=0.3), KinematicConfig(friction=10.0)
+    for geoms, asked in (((slope,), True), ((FLOOR, aside), False), ((FLOOR,), False)):
+        second = Counting(robot, bold)
+        planner = ContactPlanner(robot, make_world(*geoms, goal=(1.0, 0, 0)), Timid(robot, bold, second), longer)
         result = planner.search(np.random.default_rng(0), 60.0)
         assert (second.asked > 1) == asked  # once to warm up
         assert not asked or result.solutions

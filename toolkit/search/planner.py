@@ -18,7 +18,7 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
-from toolkit.search.ana_star import AnaStar, AnaStarResult
+from toolkit.search.ana_star import AnaStar, AnaStarConfig, AnaStarResult
 from toolkit.search.arrival import Arrival
 from toolkit.search.contact_table import ContactTable
 from toolkit.search.exclusion import Exclusion
@@ -66,11 +66,8 @@ class ContactPlanner:
     ):
         self.robot, self.world, self.config = robot, world, config or PlannerConfig()
         self._evaluator, self._goal_evaluator = evaluator, goal_evaluator
-        projection, grid = self.config.projection, self.config.grid
-        self._projector = Projector(
-            robot, resting_surfaces(world.surfaces, self.config.rest_friction), world.mujoco_model, projection
-        )
-        self._terrain = TerrainDistance(robot, world, self._projector, grid)
+        self._projector = self._ground(self.config.rest_friction)
+        self._terrain = self._distances(self._projector)
         self._timings = self.config.timings or (world.timing,)
         walls = self.config.palms and bool(self._projector.table.palm.any())
         self._arms = {limb: ArmMap.of(robot, limb) for limb in robot.arms if walls}
@@ -138,14 +135,12 @@ class ContactPlanner:
         """
         start = self.start_stance()
         began = time.perf_counter()
-        distance, wide = self._distance(start)
+        distance, wide, slides = self._way(start)
         heuristic_seconds = time.perf_counter() - began
         moves, table = self._generator(wide)
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
         evaluator, outside = self._suited(start, com)
-        lazy, forced = getattr(evaluator, "costly", False), self._terrain.forced_acceleration()
-        slippery = forced > 0.0
-        slides = slippery and not lazy and not self._rests(start, wide)
+        lazy = getattr(evaluator, "costly", False)
         problem = ContactProblem(
             self.robot,
             moves,
@@ -162,21 +157,13 @@ class ContactPlanner:
             self.config.reach,
             exclusions,
             lazy=lazy,
-            second=getattr(evaluator, "outside", None) if slippery else None,
-            haste=self.config.haste if slides else None,
-            forced=forced,
+            second=getattr(evaluator, "outside", None) if slides else None,
+            haste=self.config.haste if slides and not lazy else None,
+            forced=self._terrain.forced_acceleration(),
         )
         judge = None if self._goal_evaluator is None else Arrival(problem, self._goal_evaluator, self.config.cost)
-        settings = self.config.search
-        if lazy and settings.max_expansions is not None:
-            settings = replace(settings, max_expansions=settings.max_expansions * _LAZY)
-        if slippery:  # what crosses it is rare and lies deep: less width than a way out of a cul-de-sac needs
-            settings = replace(settings, patience=settings.patience * _DEEP)
-        if slides and settings.max_expansions is not None:
-            settings = replace(settings, max_expansions=settings.max_expansions * _SLIDING)
-        if slides:  # whoever gets that far has paid for it: the cost so far only leads back
-            settings = replace(settings, layer=_LAYER, epsilon=_EPSILON, crowding=_CROWDING)
-        elif settings.initial_cost == np.inf:
+        settings = self._settings(slides, lazy)
+        if settings.initial_cost == np.inf and (lazy or not slides):
             way = float(distance(start.mean_feet.position[None], np.array([start.mean_feet.yaw]))[0])
             settings = replace(settings, initial_cost=self.config.acceptable_cost * max(way, 1.0))
         problem.deadline = time.perf_counter() + time_limit
@@ -237,35 +224,49 @@ class ContactPlanner:
         )
         return moves, table
 
-    def _rests(self, start: Stance, wide: bool) -> bool:
-        """Whether a way leads to the goal over ground alone that holds a resting foot."""
-        surfaces, world, config = resting_surfaces(self.world.surfaces, 1.0), self.world, self.config
-        projector = Projector(self.robot, surfaces, world.mujoco_model, config.projection)
-        if not projector.table.foot.any():
-            return False
-        terrain = TerrainDistance(self.robot, world, projector, config.grid)
-        return terrain.distance(start.mean_feet, self._model(wide).longest_step) is not None
+    def _settings(self, slides: bool, lazy: bool) -> AnaStarConfig:
+        """Settings of a search that has to cross ground on which no foot rests, or not."""
+        settings, limit = self.config.search, self.config.search.max_expansions
+        if lazy and limit is not None:
+            settings = replace(settings, max_expansions=limit * _LAZY)
+        if slides:  # what crosses such ground is rare and lies deep: less width than a way out of a cul-de-sac needs
+            settings = replace(settings, patience=settings.patience * _DEEP)
+        if slides and not lazy:  # whoever gets that far has paid for it: the cost so far only leads back
+            limit = None if limit is None else limit * _SLIDING
+            settings = replace(settings, max_expansions=limit, layer=_LAYER, epsilon=_EPSILON, crowding=_CROWDING)
+        return settings
 
-    def _distance(self, start: Stance) -> tuple[Distance, bool]:
-        """Distance to the goal, and whether wide steps are to be used.
+    def _ground(self, friction: float | None) -> Projector:
+        """Projector onto the ground that holds a resting foot with this part of its friction; None: onto all of it."""
+        surfaces = resting_surfaces(self.world.surfaces, friction)
+        return Projector(self.robot, surfaces, self.world.mujoco_model, self.config.projection)
+
+    def _distances(self, projector: Projector) -> TerrainDistance:
+        return TerrainDistance(self.robot, self.world, projector, self.config.grid)
+
+    def _way(self, start: Stance) -> tuple[Distance, bool, bool]:
+        """Distance to the goal, whether wide steps are to be used, and whether no way leads over resting ground alone.
 
         Raises:
             PlanningError: nothing leads to the goal.
         """
-        wide = self.config.wide_steps
+        wide, feet = self.config.wide_steps, start.mean_feet
         strides = {False: self._model(False).longest_step, True: self._model(True).longest_step}
-        if self.config.heuristic == "euclidean":
-            return EuclideanDistance(self.world.goal), wide != "off"
         choices = {"on": [True], "off": [False], "auto": [False, True]}[wide]
-        if wide == "auto" and self._terrain.forced_acceleration() > 0.0:
-            choices = [True]
+        slides = False
+        if self._terrain.forced_acceleration() > 0.0:
+            projector = self._ground(1.0)
+            resting = self._distances(projector) if projector.table.foot.any() else None
+            rests = [c for c in choices if resting is not None and resting.distance(feet, strides[c]) is not None]
+            slides, choices = not rests, rests or choices[-1:]
+        if self.config.heuristic == "euclidean":
+            return EuclideanDistance(self.world.goal), wide != "off", slides
         for choice in choices:
-            distance = self._terrain.distance(start.mean_feet, strides[choice])
+            distance = self._terrain.distance(feet, strides[choice])
             if distance is not None:
-                return distance, choice
+                return distance, choice, slides
         if self.config.rest_friction is not None:
-            every = Projector(self.robot, self.world.surfaces, self.world.mujoco_model, self.config.projection)
-            terrain = TerrainDistance(self.robot, self.world, every, self.config.grid)
-            if terrain.distance(start.mean_feet, strides[choices[-1]]) is not None:
+            terrain = self._distances(self._ground(None))
+            if terrain.distance(feet, strides[choices[-1]]) is not None:
                 raise PlanningError(terrain.too_steep(self.config.rest_friction))
-        raise PlanningError(self._terrain.obstacle(start.mean_feet, strides[choices[-1]]))
+        raise PlanningError(self._terrain.obstacle(feet, strides[choices[-1]]))
