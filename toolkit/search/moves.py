@@ -200,7 +200,7 @@ class MoveGenerator:
         return self._palms[key]
 
     def warm_up(self, standing: int) -> None:
-        """Run every compiled function once, so that compiling or loading them takes no time from a search."""
+        """Use once whatever is compiled, loaded or indexed at its first use, so that it takes no time from a search."""
         self.steps(Limb.LEFT_FOOT, standing)
         one = np.array([standing])
         self.swings(Limb.LEFT_FOOT, one, standing, standing, 1.0)
@@ -210,6 +210,8 @@ class MoveGenerator:
         if self.has_palm_surfaces and self._robot.arms:
             limb = next(iter(self._robot.arms))
             self._projector.project_palms(limb, place[0], np.array([[0.0, 1.0, 0.0]]), 0.0, 1e6)
+            for arm in self.arms.values():
+                arm.serves(np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]))
 
     def _make_palms(self, limb: Limb, left: int, right: int) -> Moves:
         table, config, arm = self._table, self._config, self._robot.arms[limb]
