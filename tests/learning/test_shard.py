@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from toolkit.contacts.category import Category
+from toolkit.learning.dataset import Samples
 from toolkit.learning.sensitivity import sensitivity_size
 from toolkit.learning.shard import PALMS_BEFORE, CollectConfig, Quota, categories_of, collect_shard
 from toolkit.learning.terrain import TerrainConfig, random_terrain
@@ -78,7 +79,7 @@ def test_a_quota_counts():
     size = feature_size(Category.MOVE_FOOT)
     assert not quota.full and quota.lack(Category.MOVE_FOOT) == 3
     known = np.ones((4, sensitivity_size(Category.MOVE_FOOT)))
-    quota.add(Category.MOVE_FOOT, np.ones((4, size)), np.ones(4, bool), np.ones((4, 7)), known)
+    quota.add(Category.MOVE_FOOT, Samples(np.ones((4, size)), np.ones(4, bool), np.ones((4, 7)), known))
     assert quota.full and quota.lack(Category.MOVE_FOOT) == 0
     assert len(quota.samples()[Category.MOVE_FOOT]) == 4  # what was labelled is kept
 

@@ -81,6 +81,12 @@ class Samples:
         return Samples(self.features[rows], self.feasible[rows], self.targets[rows], known)
 
 
+def no_samples(category: Category) -> Samples:
+    """No samples of a category, with the columns that they have."""
+    features, targets = np.zeros((0, feature_size(category)), np.float32), np.zeros((0, TARGETS), np.float32)
+    return Samples(features, np.zeros(0, bool), targets, np.zeros((0, sensitivity_size(category)), np.float32))
+
+
 def join(groups: list[Samples], category: Category) -> Samples:
     """Samples of a category one after the other; sensitivities that some lack are NaN there."""
     known = None

@@ -32,10 +32,9 @@ from toolkit.learning.dataset import (
 )
 from toolkit.learning.evaluate import at_default
 from toolkit.learning.jobs import run_jobs
-from toolkit.learning.label import label
-from toolkit.learning.sensitivity import canonical, decode, sensitivity_size
+from toolkit.learning.label import label, samples_of
+from toolkit.learning.sensitivity import decode
 from toolkit.learning.shard import robot_of
-from toolkit.prediction.features import TARGETS, encode
 from toolkit.robot.model import RobotModel
 
 
@@ -99,14 +98,7 @@ def variations(
         labels = label(robot, stance, com[None], velocity[None], [transition])
         if not labels.feasible[0] or labels.objective[0] > config.limit:
             continue
-        frame, features = encode(stance, com, velocity, [transition])
-        targets = np.concatenate([labels.objective, frame.point(labels.com[0]), frame.vector(labels.com_velocity[0])])
-        known = np.full(sensitivity_size(category), np.nan)
-        if labels.sensitivity[0] is not None:
-            known = canonical(frame, category, labels.sensitivity[0])
-        one = (array.astype(np.float32).reshape(1, -1) for array in (features, targets, known))
-        features, targets, known = one
-        parts.append(Samples(features, labels.feasible, targets.reshape(1, TARGETS), known))
+        parts.append(samples_of(stance, com[None], velocity[None], [transition], labels))
     return join(parts, category)
 
 

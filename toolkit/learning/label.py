@@ -10,9 +10,13 @@ from toolkit.centroidal import fast
 from toolkit.centroidal.build import ProblemConfig, transition_problem
 from toolkit.centroidal.bulk_check import residual_and_objective
 from toolkit.centroidal.residual import TOLERANCE
+from toolkit.contacts.category import category_of
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
+from toolkit.learning.dataset import Samples
+from toolkit.learning.sensitivity import canonical, sensitivity_size
 from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.prediction.features import TARGETS, encode
 from toolkit.prediction.reach import within_reach
 from toolkit.robot.model import RobotModel
 
@@ -68,3 +72,29 @@ def label(
             if (start[row] == com[row]).all():
                 sensitivity[row] = derivatives
     return Labels(feasible, objective, final_com, velocity, tuple(sensitivity))
+
+
+def samples_of(
+    stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition], labels: Labels
+) -> Samples:
+    """Labelled transitions of ONE category by the same limb, as a data set stores them.
+
+    Args:
+        stance: the parent's.
+        com: (n, 3) m, initial CoM of each transition, world.
+        com_velocity: (n, 3) m/s.
+        transitions: n out of the stance.
+        labels: of them.
+    """
+    n, category = len(transitions), category_of(stance, transitions[0])
+    frame, features = encode(stance, com, com_velocity, transitions)
+    good = labels.feasible
+    targets = np.zeros((n, TARGETS), np.float32)
+    targets[good, 0] = labels.objective[good]
+    targets[good, 1:4] = frame.point(labels.com[good])
+    targets[good, 4:7] = frame.vector(labels.com_velocity[good])
+    known = np.full((n, sensitivity_size(category)), np.nan, np.float32)
+    for row, found in enumerate(labels.sensitivity):
+        if found is not None:
+            known[row] = canonical(frame, category, found)
+    return Samples(features.astype(np.float32), good, targets, known)

@@ -23,12 +23,11 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import PALMS
-from toolkit.learning.dataset import Samples, join
-from toolkit.learning.label import label
-from toolkit.learning.sensitivity import canonical, sensitivity_size
+from toolkit.learning.dataset import Samples, join, no_samples
+from toolkit.learning.label import label, samples_of
 from toolkit.learning.terrain import SlopeConfig, TerrainConfig, random_slope, random_terrain
 from toolkit.prediction.evaluator import TransitionBatch
-from toolkit.prediction.features import LAYOUT, TARGETS, encode, feature_size
+from toolkit.prediction.features import LAYOUT
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.search.ana_star import AnaStarConfig
@@ -133,17 +132,12 @@ class Quota:
 
     wanted: int
     categories: list[Category]
-    features: dict[Category, list[np.ndarray]] = field(default_factory=dict)
-    feasible: dict[Category, list[np.ndarray]] = field(default_factory=dict)
-    targets: dict[Category, list[np.ndarray]] = field(default_factory=dict)
-    sensitivity: dict[Category, list[np.ndarray]] = field(default_factory=dict)
+    found: dict[Category, list[Samples]] = field(default_factory=dict)
     counts: dict[Category, int] = field(default_factory=dict)
 
     def __post_init__(self):
         for category in self.categories:
-            self.features[category], self.feasible[category] = [], []
-            self.targets[category], self.sensitivity[category] = [], []
-            self.counts[category] = 0
+            self.found[category], self.counts[category] = [no_samples(category)], 0
 
     def lack(self, category: Category) -> int:
         """Samples still wanted."""
@@ -154,34 +148,15 @@ class Quota:
         """Whether nothing is wanted any more."""
         return all(count >= self.wanted for count in self.counts.values())
 
-    def add(
-        self,
-        category: Category,
-        features: np.ndarray,
-        feasible: np.ndarray,
-        targets: np.ndarray,
-        sensitivity: np.ndarray,
-    ) -> None:
-        """Enter samples (n, d), (n,), (n, 7), (n, k); those of other categories are dropped."""
-        if category not in self.counts:
-            return
-        self.features[category].append(features.astype(np.float32))
-        self.feasible[category].append(feasible)
-        self.targets[category].append(targets.astype(np.float32))
-        self.sensitivity[category].append(sensitivity.astype(np.float32))
-        self.counts[category] += len(feasible)
+    def add(self, category: Category, samples: Samples) -> None:
+        """Enter samples; those of other categories are dropped."""
+        if category in self.counts:
+            self.found[category].append(samples)
+            self.counts[category] += len(samples)
 
     def samples(self) -> dict[Category, Samples]:
         """All samples by category, in the order of their coming."""
-        return {
-            category: Samples(
-                np.concatenate([np.zeros((0, feature_size(category)), np.float32), *self.features[category]]),
-                np.concatenate([np.zeros(0, bool), *self.feasible[category]]),
-                np.concatenate([np.zeros((0, TARGETS), np.float32), *self.targets[category]]),
-                np.concatenate([np.zeros((0, sensitivity_size(category)), np.float32), *self.sensitivity[category]]),
-            )
-            for category in self.categories
-        }
+        return {category: join(parts, category) for category, parts in self.found.items()}
 
 
 @dataclass
@@ -266,19 +241,10 @@ class _Recorder:
         limit = config.default_limit if self._kind == _DEFAULT else config.objective_limit
         limit = np.where(is_far, config.disturbed_limit, limit)
         kept = ~batch.feasible | (batch.objective <= limit)
-        frame, features = encode(stance, start, velocity, items)
-        targets = np.zeros((n, TARGETS))
-        good = np.flatnonzero(batch.feasible & kept)
-        targets[good, 0] = batch.objective[good]
-        targets[good, 1:4] = frame.point(batch.com[good])
-        targets[good, 4:7] = frame.vector(batch.com_velocity[good])
-        known = np.full((n, sensitivity_size(category)), np.nan)
-        for row, found in enumerate(batch.sensitivity):
-            if found is not None:
-                known[row] = canonical(frame, category, found)
-        self._quota.add(category, features[kept], batch.feasible[kept], targets[kept], known[kept])
+        self._quota.add(category, samples_of(stance, start, velocity, items, batch).select(kept))
         self._balance.count(category, self._kind, batch.feasible[kept])
-        on = good[~is_far[good]]  # what follows a large disturbance is nothing that a planner meets
+        # What follows a large disturbance is nothing that a planner meets.
+        on = np.flatnonzero(batch.feasible & kept & ~is_far)
         result.feasible[rows[on]], result.objective[rows[on]] = True, batch.objective[on]
         result.com[rows[on]], result.com_velocity[rows[on]] = batch.com[on], batch.com_velocity[on]
 
