@@ -7,6 +7,7 @@ The same quantities from the same formulas in one pass over the steps: about 10 
 from __future__ import annotations
 
 import math
+from dataclasses import astuple
 
 import numpy as np
 from numba import njit
@@ -26,7 +27,7 @@ def residual_and_objective(problem: CentroidalProblem, motion: Arrays) -> tuple[
     Returns:
         `residual.check(motion).largest`, inf where something is undefined, and `residual.objective(motion)`.
     """
-    p, w = problem, problem.weights
+    p = problem
     landing = p.landing_limb >= 0
     return _evaluate(
         *motion,
@@ -54,16 +55,7 @@ def residual_and_objective(problem: CentroidalProblem, motion: Arrays) -> tuple[
         p.landing_limb,
         p.landing_position if landing else _NOWHERE,
         p.landing_rotation if landing else _UPRIGHT,
-        (
-            w.linear_momentum,
-            w.linear_momentum_rate,
-            w.angular_momentum,
-            w.angular_momentum_rate,
-            w.force,
-            w.torque,
-            w.lateral_force,
-            w.cop,
-        ),
+        astuple(p.weights),
     )
 
 

@@ -8,7 +8,7 @@ The first solution on a machine compiles the kernels (numba), which are then kep
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cache
 from time import perf_counter
 
@@ -122,20 +122,7 @@ def _run(
 
 def _arguments(problem: CentroidalProblem) -> tuple:
     """What `kernels.setup.pack` takes, in the exact types that the kernels were compiled for."""
-    p, w = problem, problem.weights
-    weights = np.array(
-        [
-            w.linear_momentum,
-            w.linear_momentum_rate,
-            w.angular_momentum,
-            w.angular_momentum_rate,
-            w.force,
-            w.torque,
-            w.lateral_force,
-            w.cop,
-        ],
-        float,
-    )
+    p = problem
     landing = p.landing_limb >= 0
     return (
         float(p.mass),
@@ -158,7 +145,7 @@ def _arguments(problem: CentroidalProblem) -> tuple:
         _plain(p.final_center),
         _plain(p.final_half_size),
         bool(p.final_at_rest),
-        weights,
+        np.array(astuple(p.weights), float),
         float(p.margins.friction),
         float(p.margins.yaw),
         int(p.landing_limb),

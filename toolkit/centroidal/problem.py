@@ -35,7 +35,7 @@ GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 
 @dataclass(frozen=True)
 class Weights:
-    """Objective weights; the defaults are the paper's (Sec. VII)."""
+    """Objective weights; the defaults are the paper's (Sec. VII). Compiled code takes them in this order."""
 
     linear_momentum: float = 0.2
     linear_momentum_rate: float = 0.01
