@@ -59,8 +59,11 @@ def varied(case, index, step):
         change = step * np.eye(2)[index - 6]
         new = Timing(timing.shift + change[0], timing.swing + change[1])
         return stance, com, velocity, replace(transition, timing=new)
-    contacts = tuple(replace(contact, friction=contact.friction + step) for contact in stance.contacts)
-    return Stance(contacts), com, velocity, transition
+    *contacts, made = (
+        contact and replace(contact, friction=contact.friction + step)
+        for contact in (*stance.contacts, transition.contact)
+    )
+    return Stance(tuple(contacts)), com, velocity, replace(transition, contact=made)
 
 
 @pytest.mark.parametrize("category", list(Category))

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.centroidal.test_sensitivity import varied
 from tests.prediction.test_features import mirrored, moved, random_case
 from toolkit.centroidal.fast import Sensitivity
 from toolkit.centroidal.sampling import SamplingConfig, sample_transition
 from toolkit.contacts.category import Category
-from toolkit.contacts.stance import Stance
 from toolkit.errors import DatasetError
 from toolkit.geometry.pose import Pose, rotation_about_z
 from toolkit.learning.dataset import Manifest, Samples, join, read_manifest, read_shard, shard_path, write_shard
@@ -19,7 +19,6 @@ from toolkit.learning.label import label
 from toolkit.learning.sensitivity import canonical, decode, sensitivity_size
 from toolkit.prediction.features import TARGETS, encode, feature_size
 from toolkit.robot.loader import load_robot
-from toolkit.world.timing import Timing
 
 STEP = 1e-6
 
@@ -27,31 +26,6 @@ STEP = 1e-6
 @pytest.fixture(scope="module")
 def robot():
     return load_robot(None)
-
-
-def turned(contact, axis, step):
-    change = step * np.eye(6)[axis]
-    return replace(contact, pose=contact.pose.moved(change[:3], change[3:]))
-
-
-def varied(case, index, step):
-    stance, com, velocity, transition = case
-    row, axis = divmod(index, 6)
-    if index >= 36:
-        timing = np.array([transition.timing.shift, transition.timing.swing]) + step * np.eye(3)[index - 36, :2]
-        made = transition.contact
-        raised = step * (index == 38)
-        made = made and replace(made, friction=made.friction + raised)
-        contacts = tuple(replace(contact, friction=contact.friction + raised) for contact in stance.contacts)
-        return Stance(contacts), com, velocity, replace(transition, contact=made, timing=Timing(*timing))
-    if row == 5:
-        change = step * np.eye(6)[axis]
-        return stance, com + change[:3], velocity + change[3:], transition
-    if row == 4:
-        made = transition.contact
-        return stance, com, velocity, replace(transition, contact=made and turned(made, axis, step))
-    kept = tuple(turned(c, axis, step) if c.limb == row else c for c in stance.contacts)
-    return Stance(kept), com, velocity, transition
 
 
 @pytest.mark.parametrize("category", list(Category))
@@ -69,8 +43,8 @@ def test_what_changes_in_the_world_is_what_changes_in_the_features(category, mir
         return np.sin(features @ factors)
 
     # Derivatives in the world of a function of the features.
-    values = [[function(encode(*c[:3], [c[3]])[1])[0] for c in (varied(case, k, -STEP), varied(case, k, STEP))]
-              for k in range(39)]  # fmt: skip
+    pairs = [[varied(case, k, sign * STEP) or case for sign in (-1, 1)] for k in range(39)]
+    values = [[function(encode(*c[:3], [c[3]])[1])[0] for c in pair] for pair in pairs]
     world = np.diff(values)[:, 0] / (2 * STEP)
     frame, features = encode(*case[:3], [case[3]])
     seen = canonical(frame, category, Sensitivity(world[:30].reshape(5, 6), world[30:]))
