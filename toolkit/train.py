@@ -143,6 +143,7 @@ def run_enrich(args: argparse.Namespace, console: Console) -> int:
         seed=args.seed,
         categories=tuple(args.categories),
         draws=args.draws,
+        networks=str(args.networks.resolve()) if args.networks else None,
     )
     with shards_at_work(args, console) as (pool, progress):
         added = enrich(args.data, args.out, robot, config, pool, progress)
@@ -280,6 +281,12 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument("--out", type=Path, required=True, help="data set folder for the variations, new or begun")
     sub.add_argument(
         "--draws", type=cli.positive(int), default=200, help="per category and shard (default: %(default)s)"
+    )
+    sub.add_argument(
+        "--networks",
+        type=Path,
+        help="folder of networks: put transitions together from parts of several instead and label what these "
+        "networks call feasible and costly",
     )
     sub.add_argument("--categories", type=int, nargs="+", choices=range(10), metavar="0..9", default=list(range(10)))
     add_executor_options(sub)

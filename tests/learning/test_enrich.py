@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from tests.learning.test_sensitivity import labelled
+from tests.prediction.networks import write_random_networks
 from toolkit.contacts.category import Category
-from toolkit.errors import DatasetError
+from toolkit.errors import DatasetError, NetworkError
 from toolkit.learning.dataset import Manifest, read_datasets, read_shard, shard_path, write_shard
 from toolkit.learning.differentiate import sensitivities
-from toolkit.learning.enrich import EnrichConfig, enrich, variations
+from toolkit.learning.enrich import EnrichConfig, combinations, enrich, variations
 from toolkit.learning.evaluate import AT_DEFAULT
 from toolkit.robot.loader import load_robot
 
@@ -81,3 +82,49 @@ def test_a_data_set_is_enriched_shard_by_shard(tmp_path, robot, stored, config):
     assert len(both) == 2 * len(stored) + added
     second = both.features[len(stored) + counts[0] :][: len(stored)]
     assert np.array_equal(second, stored.features) or np.array_equal(both.features[-len(stored) :], stored.features)
+
+
+class SpeedIsCostly:
+    """Calls a transition feasible where the CoM moves to the left, and costly where it is fast."""
+
+    def feasible(self, features):
+        return features[:, -5] > 0.0
+
+    def predict(self, features):
+        return 1e3 * np.linalg.norm(features[:, -6:-3], axis=1, keepdims=True) ** 4
+
+
+def test_a_network_chooses_among_what_is_put_together(robot, stored, config):
+    shard = {CATEGORY: stored}
+    found, even = (
+        combinations(robot, CATEGORY, shard, SpeedIsCostly(), replace(config, power=power), np.random.default_rng(0))
+        for power in (0.7, 0.0)
+    )
+    assert 3 < len(found) <= config.draws
+    assert found.feasible.all() and (found.targets[:, 0] <= config.limit).all()
+    assert (found.features[:, -5] > 0.0).all()
+    speed, even_speed = (np.linalg.norm(one.features[:, -6:-3], axis=1) for one in (found, even))
+    assert np.median(speed) > 1.2 * np.median(even_speed)
+    limited = replace(config, limit=2.0)
+    assert (
+        combinations(robot, CATEGORY, shard, SpeedIsCostly(), limited, np.random.default_rng(0)).targets < 2.0
+    ).all()
+    nothing = combinations(robot, Category.MOVE_FOOT, shard, SpeedIsCostly(), config, np.random.default_rng(0))
+    assert len(nothing) == 0
+
+
+def test_a_data_set_is_enriched_by_what_networks_choose(tmp_path, robot, stored, config):
+    source, rich, networks = tmp_path / "source", tmp_path / "rich", tmp_path / "networks"
+    source.mkdir()
+    Manifest("transition-data-2", robot.name, robot.fingerprint, 0, {}, {}).write(source)
+    write_shard(source, 0, {CATEGORY: stored})
+    chosen = replace(config, networks=str(networks))
+    with ThreadPoolExecutor(1) as pool:
+        with pytest.raises(NetworkError, match="no such network"):
+            enrich(source, rich, robot, chosen, pool)
+        write_random_networks(networks, robot.fingerprint)
+        added = enrich(source, rich, robot, chosen, pool)
+        assert enrich(source, rich, robot, chosen, pool) == 0
+        with pytest.raises(DatasetError, match="begun with other settings"):
+            enrich(source, rich, robot, config, pool)
+    assert 0 < added == len(read_shard(shard_path(rich, 0))[CATEGORY])

@@ -3,11 +3,14 @@
 What nearly fails costs a hundred times more than what a planner mostly meets. So it decides how far off predictions are
 on average, and it is rare. A data set is enriched by transitions near those that it holds, the costly ones most often:
 the new contact is another's, contacts and state are displaced a little. They serve to learn from, never to test on.
+
+Networks that were trained already find more: of many transitions put together from parts of stored ones
+(`learning.recombine`) those are labelled which they call feasible and costly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from toolkit.contacts.category import Category
+from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.learning.dataset import (
     SCHEMA,
@@ -22,6 +26,7 @@ from toolkit.learning.dataset import (
     Samples,
     begin,
     join,
+    no_samples,
     plain_settings,
     read_manifest,
     read_shard,
@@ -33,9 +38,13 @@ from toolkit.learning.dataset import (
 from toolkit.learning.evaluate import at_default
 from toolkit.learning.jobs import run_jobs
 from toolkit.learning.label import label, samples_of
+from toolkit.learning.recombine import RecombineConfig, recombined
 from toolkit.learning.sensitivity import decode
 from toolkit.learning.shard import robot_of
+from toolkit.prediction.network import TransitionNetwork, load_network, network_path
 from toolkit.robot.model import RobotModel
+
+_CANDIDATES = 12  # transitions put together for each that is labelled
 
 
 @dataclass(frozen=True)
@@ -54,6 +63,8 @@ class EnrichConfig:
         com: m, and
         velocity: m/s; the same of the state.
         limit: transitions with a larger objective are left out.
+        networks: folder of networks that choose among transitions put together from parts; None: variations. Then only
+            `seed`, `categories`, `draws`, `power` and `limit` of the above count.
     """
 
     robot: str
@@ -68,6 +79,7 @@ class EnrichConfig:
     com: float = 0.02
     velocity: float = 0.08
     limit: float = 5e3
+    networks: str | None = None
 
 
 def variations(
@@ -95,11 +107,51 @@ def variations(
         stance = Stance(tuple(_displaced(contact, config, rng) for contact in stance.contacts))
         com = com + config.com * rng.normal(size=3)
         velocity = velocity + config.velocity * rng.normal(size=3)
-        labels = label(robot, stance, com[None], velocity[None], [transition])
-        if not labels.feasible[0] or labels.objective[0] > config.limit:
-            continue
-        parts.append(samples_of(stance, com[None], velocity[None], [transition], labels))
+        parts.append(_labelled(robot, stance, com, velocity, transition, config.limit))
     return join(parts, category)
+
+
+def combinations(
+    robot: RobotModel,
+    category: Category,
+    shard: Mapping[Category, Samples],
+    network: TransitionNetwork,
+    config: EnrichConfig,
+    rng: np.random.Generator,
+) -> Samples:
+    """Feasible transitions put together from parts, `config.draws` at most; the costlier, the rather.
+
+    Args:
+        robot: the robot.
+        category: of the result.
+        shard: labelled transitions by category.
+        network: what it calls feasible is labelled, in proportion to the objective that it predicts.
+        config: how.
+        rng: randomness.
+    """
+    features = recombined(shard, category, _CANDIDATES * config.draws, RecombineConfig(), rng)
+    features = features[network.feasible(features)]
+    objective = network.predict(features)[:, 0].astype(float)
+    features, objective = features[objective <= config.limit], objective[objective <= config.limit]
+    weight = np.maximum(objective, 1.0) ** config.power
+    count = min(config.draws, len(features))
+    rows = rng.choice(len(features), count, replace=False, p=weight / weight.sum()) if count else ()
+    parts = [_labelled(robot, *decode(features[row], category), config.limit) for row in rows]
+    return join([no_samples(category), *parts], category)
+
+
+def _labelled(
+    robot: RobotModel,
+    stance: Stance,
+    com: np.ndarray,
+    velocity: np.ndarray,
+    transition: ContactTransition,
+    limit: float,
+) -> Samples:
+    """One sample; none where the transition is infeasible or its objective above the limit."""
+    labels = label(robot, stance, com[None], velocity[None], [transition])
+    found = samples_of(stance, com[None], velocity[None], [transition], labels)
+    return found.select(labels.feasible & (labels.objective <= limit))
 
 
 def _displaced(contact: Contact, config: EnrichConfig, rng: np.random.Generator) -> Contact:
@@ -114,9 +166,14 @@ def _job(source: Path, folder: Path, config: EnrichConfig) -> int:
     robot, shard = robot_of(config.robot, config.robots), read_shard(source)
     found = {}
     for category in (Category(number) for number in config.categories):
-        if category in shard:
-            rng = np.random.default_rng([config.seed, index, int(category)])
+        if category not in shard:
+            continue
+        rng = np.random.default_rng([config.seed, index, int(category)])
+        if config.networks is None:
             found[category] = variations(robot, category, shard[category], config, rng)
+        else:
+            network = load_network(network_path(Path(config.networks), category), category, robot.fingerprint)
+            found[category] = combinations(robot, category, shard, network, config, rng)
     write_shard(folder, index, found)
     return sum(len(group) for group in found.values())
 
@@ -144,9 +201,12 @@ def enrich(
 
     Raises:
         DatasetError: another robot's data, no shards, a broken one, or a folder with something else in it.
+        NetworkError: a network that should choose is missing or another robot's.
     """
     paths, varied = shards_of(source, robot.fingerprint), read_manifest(source)
-    settings = plain_settings(config, "robots") | {"varied_seed": varied.seed}
+    settings = plain_settings(config, "robots", "networks") | {"varied_seed": varied.seed}
+    if config.networks is not None:
+        settings["recombined"] = plain_settings(RecombineConfig())
     begin(folder, Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, varied.versions))
     missing = [path for path in paths if not shard_path(folder, shard_index(path)).is_file()]
     done, added = len(paths) - len(missing), 0
