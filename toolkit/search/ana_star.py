@@ -253,11 +253,11 @@ class AnaStar(Generic[State]):
         cost += edge.cost
         if not cost < self._best:
             return None
+        seconds = time.perf_counter() - began
         self._best = cost
         self._crowding = self._config.crowding
         bound = cost / max(self._lower_bound(), _TINY) if cost > 0 else 1.0
         self._prune()
-        seconds = time.perf_counter() - began
         return Path((*states, edge.state), (*payloads, edge.payload), cost, bound, seconds, expansions)
 
     def _trail(self, node: int) -> tuple[list[State], list[Any], float]:

@@ -38,7 +38,7 @@ _UNTRAINED = (
     "timing or friction outside what the networks were trained for; the optimiser judged there instead, which is slower"
 )
 _DEEP = 10  # patience of a search over slippery ground, in multiples of the patience elsewhere
-_LAYER, _EPSILON, _CROWDING = 1.5, 0.15, 0.6  # of a search that has to slide: see `AnaStarConfig`
+_LAYER, _EPSILON, _CROWDING = 1.5, 0.3, 0.2  # of a search that has to slide: see `AnaStarConfig`
 _SLIDING = 3  # times the expansions, of such a search: most of them see that they have come too fast
 _LAZY = 20  # expansions with one transition judged in each that count as one with all judged
 
