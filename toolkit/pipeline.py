@@ -295,7 +295,7 @@ def run(
         for solution in reversed(search.solutions):  # newest, cheapest first
             if tested == config.candidates or _meets(solution, exclusions):
                 continue
-            with_palms = any(not item.limb.is_foot for item in solution.sequence.transitions)
+            with_palms = _uses_palms(solution.sequence)
             if with_palms and tested >= max(1, config.candidates // 2):
                 continue  # the other half is for the feet alone
             tested += 1
@@ -312,6 +312,11 @@ def run(
         palms = palms and not failed_with_palms
         search = _search(planner, config, observer, attempt, exclusions, palms)
     return PipelineResult(robot, world, chosen, best, tested, best.reason if best else search.reason)
+
+
+def _uses_palms(sequence: ContactSequence) -> bool:
+    """Whether palms are in contact after those of the start could have been let go."""
+    return any(stance.palms for stance in sequence.stances[len(sequence.start.palms) :])
 
 
 def _search(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.search import screen
 from toolkit.search.contact_table import ContactTable
 from toolkit.search.exclusion import Exclusion, excluded
@@ -64,7 +64,7 @@ class CandidateGenerator:
     Args:
         moves: screened moves of single limbs.
         table: their contacts.
-        palms: that may be used.
+        palms: that may be used; others that are in contact have to be broken first.
         timings: to choose from.
         swing_speed: m/s; a foot may not have to fly faster on average.
         exclusions: transitions that later stages rejected.
@@ -89,8 +89,12 @@ class CandidateGenerator:
         """Candidates out of contact numbers (4,) whose limb `last` moved last; None where there are none."""
         limbs: list[np.ndarray] = []
         numbers: list[np.ndarray] = []
+        held = [palm for palm in PALMS if contacts[palm] >= 0 and palm not in self._palms]
+        for palm in held:  # of the start, and not to be used
+            limbs.append(np.array([int(palm)]))
+            numbers.append(np.array([-1]))
         for foot in FEET:
-            if foot == last:
+            if foot == last or held:
                 continue
             old, standing = int(contacts[foot]), int(contacts[foot.mirrored])
             moves = self._moves.steps(foot, standing)
@@ -101,7 +105,7 @@ class CandidateGenerator:
                 limbs.append(np.full(int((codes == 0).sum()), foot))
                 numbers.append(moves.numbers[codes == 0])
         for palm in self._palms:
-            if palm == last:
+            if palm == last or held:
                 continue
             moves = self._moves.palms(palm, int(contacts[0]), int(contacts[1]))
             self._rejected += moves.rejected

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.contacts.arm_map import ArmMap
-from toolkit.contacts.projection import Projector
+from toolkit.contacts.projection import Projected, Projector
 from toolkit.contacts.reach import ReachMargins
 from toolkit.contacts.transition_model import TransitionModel
 from toolkit.geometry.limb import Limb
@@ -214,12 +214,22 @@ class MoveGenerator:
                 arm.serves(np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]))
 
     def _make_palms(self, limb: Limb, left: int, right: int) -> Moves:
-        table, config, arm = self._table, self._config, self._robot.arms[limb]
-        centre = (table.position[left] + table.position[right]) / 2
-        yaw = float(screen.mean_yaw(table.yaw[left], table.yaw[right]))
-        turn = rotation_about_z(yaw)
-        shoulder = centre + [0.0, 0.0, self._robot.com_height] + turn @ arm.shoulder_in_com
-        rays = self._model.rays_of(limb) @ turn.T
+        turn = rotation_about_z(self._stand(left, right)[1])
+        palms, codes = self.aimed(limb, left, right, self._model.rays_of(limb) @ turn.T)
+        numbers = self._table.add(limb, palms.select(codes == 0))
+        return Moves(np.unique(numbers), _count(codes))
+
+    def shoulder(self, limb: Limb, left: int, right: int) -> np.ndarray:
+        """(3,) m; shoulder of a palm's arm, standing straight with the feet at `left` and `right`."""
+        centre, yaw = self._stand(left, right)
+        offset = rotation_about_z(yaw) @ self._robot.arms[limb].shoulder_in_com
+        return centre + [0.0, 0.0, self._robot.com_height] + offset
+
+    def aimed(self, limb: Limb, left: int, right: int, rays: np.ndarray) -> tuple[Projected, np.ndarray]:
+        """Palms along rays (n, 3) from the shoulder, with the feet at `left` and `right`, and their codes (n,)."""
+        config, arm = self._config, self._robot.arms[limb]
+        centre, yaw = self._stand(left, right)
+        shoulder, turn = self.shoulder(limb, left, right), rotation_about_z(yaw)
         palms = self._projector.project_palms(limb, shoulder, rays, yaw, arm.max_reach)
         codes = screen.screen_palms(
             palms.surface,
@@ -237,8 +247,14 @@ class MoveGenerator:
         open_palms = np.flatnonzero(codes == 0)
         served = self.arms[limb].serves(relative[open_palms], normals[open_palms])
         codes[open_palms[~served]] = screen.POSTURE
-        numbers = table.add(limb, palms.select(codes == 0))
-        return Moves(np.unique(numbers), _count(codes))
+        return palms, codes
+
+    def _stand(self, left: int, right: int) -> tuple[np.ndarray, float]:
+        """(3,) m; mean of two feet, and its heading in rad."""
+        table = self._table
+        return (table.position[left] + table.position[right]) / 2, float(
+            screen.mean_yaw(table.yaw[left], table.yaw[right])
+        )
 
 
 def _count(codes: np.ndarray) -> np.ndarray:

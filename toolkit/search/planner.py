@@ -30,9 +30,10 @@ from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.problem import ContactProblem
 from toolkit.search.result import SearchResult
 from toolkit.search.start import place_feet
+from toolkit.search.start_palms import with_palms
 from toolkit.search.state import CONTACTS, is_pending, unpack
 from toolkit.search.terrain_distance import TerrainDistance, resting_surfaces
-from toolkit.world.world import World
+from toolkit.world.world import PALM_SITES, World
 
 _UNTRAINED = (
     "timing or friction outside what the networks were trained for; the optimiser judged there instead, which is slower"
@@ -82,11 +83,17 @@ class ContactPlanner:
         moves.warm_up(int(table.add(Limb.RIGHT_FOOT, sole)[0]))
 
     def start_stance(self) -> Stance:
-        """Both feet on the ground below the start, at their distance in the home posture.
+        """Both feet on the ground below the start, at their distance in the home posture, and palms at their sites.
 
         Raises:
-            PlanningError: they find no room, or the robot cannot stand there.
+            PlanningError: they find no room, the robot cannot stand there, or an arm cannot hold its palm.
         """
+        names = [PALM_SITES[limb] for limb in self.world.start_palms]
+        if names and not self.config.palms:
+            raise PlanningError(
+                f"{self.world.path}: palms are switched off, but the world asks for palms in contact at the "
+                f"start; leave out --no-palms, or remove the site{'s' * (len(names) > 1)} {' and '.join(names)}"
+            )
         moves, table = self._generator(wide=False)
         reasons: dict[str, int] = {}
         for stance in place_feet(self.robot, self.world, self._projector):
@@ -102,7 +109,7 @@ class ContactPlanner:
                 )[0]
             )
             if code == 0:
-                return stance
+                return with_palms(self.robot, self.world, stance, moves, table)
             reasons[screen.REASONS[code]] = reasons.get(screen.REASONS[code], 0) + 1
         most = max(reasons, key=lambda reason: reasons[reason])
         raise PlanningError(

@@ -61,7 +61,7 @@ class ContactProblem:
         goal: where to.
         longest: m; most that the mean of the feet moves in one transition.
         timings: to choose from.
-        palms: whether palms may be used.
+        palms: whether palms may be used; those of the start are let go first where not.
         config: costs.
         reach: what legs and arms may reach.
         exclusions: transitions that later stages rejected.

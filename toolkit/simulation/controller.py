@@ -191,8 +191,8 @@ class Controller:
         self._diagonal[3:6] = gains.acceleration + gains.base.weight * self._calm
         np.multiply(self._posture_weight, self._calm, out=self._posture)
         for limb, joints in self._arms.items():
-            if self.tracker.in_contact[limb]:
-                self._posture[joints] *= gains.arm_posture
+            if self.tracker.in_contact[limb] and self.tracker.current[limb] is not None:
+                self._posture[joints] *= gains.arm_posture  # a palm of the start is where it was planned to be
         np.add(self._posture, gains.acceleration, out=self._diagonal[6 : dynamics.nv])
 
     def _pursue_limb(self, limb: Limb, rows: int) -> int:

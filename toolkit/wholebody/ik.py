@@ -117,6 +117,11 @@ class WholeBodyIK:
             (7 + n,) qpos at time 0.
         """
         guess = qpos.copy()
+        for palm in self.palms:
+            segment = paths.segment(palm, 0.0)
+            if segment.pose is not None:  # in contact from the start
+                self.reaching[palm] = segment, self._arm_posture(palm, 0.0, guess[7:], paths, motion)
+                guess[7 + self.arm_joints[palm]] = self.reaching[palm][1]
         guess[7:] = np.clip(guess[7:], self.lower, self.upper)
         self.wrapper.state.q = self.order.q_from_qpos(guess)
         self.wrapper.update_kinematics()
@@ -124,8 +129,9 @@ class WholeBodyIK:
         self._set_targets(0.0, paths, motion)
         self.momentum.configure("momentum", "soft", 0.0)
         # At rest, an eased posture task of weight w weighs as much as a plain one of weight w * ease.
-        for task, home, weight in self.postures:
-            task.set_joints(home)
+        posture = dict(zip(self.robot.joint_names, self._posture(0.0, guess[7:], paths, motion), strict=True))
+        for task, names, weight in self.postures:
+            task.set_joints({name: posture[name] for name in names})
             task.configure("posture", "soft", weight * self._ease)
         for _ in range(self.config.settle):
             if np.abs(self._solve(0.0)).max() < 1e-7:

@@ -8,15 +8,16 @@ import mujoco
 import numpy as np
 
 from toolkit.errors import WorldError
+from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.world.extraction import SurfaceConfig, extract_surfaces
 from toolkit.world.faces import square_around
-from toolkit.world.polygon import surface_height
+from toolkit.world.polygon import nearest_point, surface_height
 from toolkit.world.solids import solids_of
 from toolkit.world.source import read_source
 from toolkit.world.surface import Surface
 from toolkit.world.timing import Timing
-from toolkit.world.world import Goal, World
+from toolkit.world.world import PALM_SITE_REACH, PALM_SITES, Goal, World
 
 _DEFAULT = SurfaceConfig()
 _ABOVE_START, _BELOW_START = 0.15, 0.3  # m; where the ground is looked for, relative to the start
@@ -41,15 +42,17 @@ def load_world(path: Path | str, *, mjcf: str | None = None, config: SurfaceConf
     source = read_source(path, mjcf)
     model = source.model
     start, goal, timing = _start(path, model), _goal(path, model), _timing(path, model)
+    palms = _start_palms(model)
     square = square_around(np.stack([start.position, goal.position]), config.plane_margin)
     surfaces = extract_surfaces(source, solids_of(model, square=square), square, config)
     if not any(surface.serves_foot for surface in surfaces):
         raise WorldError(
             f"{path}: no usable surface for feet; add a static colliding geom with a free flat top of at least "
-            f"{config.foot_area:g} m^2, tilted less than {np.degrees(config.foot_angle):g} degrees"
+            f"{config.foot_area:g} m^2, tilted less than {np.degrees(config.foot_angle):g} degrees{_also_feet(palms)}"
         )
-    _check_ground(path, start, surfaces)
-    return World(path.stem, path, model, surfaces, start, goal, timing, square=square, mjcf=mjcf)
+    _check_ground(path, start, surfaces, palms)
+    _check_walls(path, palms, surfaces, config)
+    return World(path.stem, path, model, surfaces, start, goal, timing, square=square, mjcf=mjcf, start_palms=palms)
 
 
 def _site(path: Path, model: mujoco.MjModel, name: str, example: str) -> int:
@@ -98,7 +101,39 @@ def _timing(path: Path, model: mujoco.MjModel) -> Timing:
     return Timing(float(values[0]), float(values[1]))
 
 
-def _check_ground(path: Path, start: Pose, surfaces: tuple[Surface, ...]) -> None:
+def _start_palms(model: mujoco.MjModel) -> dict[Limb, np.ndarray]:
+    """Where palms start in contact, by their sites."""
+    sites = {limb: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name) for limb, name in PALM_SITES.items()}
+    return {limb: _site_pose(model, site).position for limb, site in sites.items() if site >= 0}
+
+
+def _also_feet(palms: dict[Limb, np.ndarray]) -> str:
+    """A reminder for whoever wants to start on palms."""
+    return "; a robot that starts with its palms in contact needs ground for both feet too" if palms else ""
+
+
+def _check_walls(
+    path: Path, palms: dict[Limb, np.ndarray], surfaces: tuple[Surface, ...], config: SurfaceConfig
+) -> None:
+    """Raise where a palm that starts in contact has no surface near its site."""
+    walls = [surface for surface in surfaces if surface.serves_palm]
+    for limb, point in palms.items():
+        name, at = PALM_SITES[limb], f"({point[0]:.3g}, {point[1]:.3g}, {point[2]:.3g})"
+        if not walls:
+            low, high = np.degrees([config.palm_angle_min, config.palm_angle_max])
+            raise WorldError(
+                f"{path}: site '{name}' asks for a palm on a wall, but the world has none: no surface whose normal is "
+                f"{low:g} to {high:g} degrees from up; add a wall beside the start, or remove the site"
+            )
+        distance = min(float(np.linalg.norm(nearest_point(wall, point) - point)) for wall in walls)
+        if distance > PALM_SITE_REACH:
+            raise WorldError(
+                f"{path}: site '{name}' at {at} is {distance:.2f} m from the nearest surface for palms; move it within "
+                f"{PALM_SITE_REACH:g} m of one, or remove it"
+            )
+
+
+def _check_ground(path: Path, start: Pose, surfaces: tuple[Surface, ...], palms: dict[Limb, np.ndarray]) -> None:
     """Raise where no surface for feet lies under the start or close beside it."""
     angles = np.arange(8) * np.pi / 4
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -112,4 +147,5 @@ def _check_ground(path: Path, start: Pose, surfaces: tuple[Surface, ...]) -> Non
     raise WorldError(
         f"{path}: site 'start' is in the air: no surface for feet within {_BELOW_START:g} m below "
         f"({start.position[0]:.3g}, {start.position[1]:.3g}, {z:.3g}); move it onto the ground"
+        f"{_also_feet(palms)}"
     )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
+from shapely.geometry import Point, Polygon
+from shapely.ops import nearest_points
 
 from toolkit.world.surface import Surface
 
@@ -29,3 +30,10 @@ def surface_height(surface: Surface, points: np.ndarray) -> np.ndarray:
     local = surface.pose.inverse() @ np.column_stack([points, height])
     inside = shapely.intersects_xy(region_of(surface), local[:, 0], local[:, 1])
     return np.where(inside, height, np.nan)
+
+
+def nearest_point(surface: Surface, point: np.ndarray) -> np.ndarray:
+    """(3,) m; the point of a surface nearest to a point (3,) m of the world."""
+    x, y, _ = surface.pose.inverse() @ point
+    nearest = nearest_points(region_of(surface), Point(x, y))[0]
+    return surface.pose @ np.array([nearest.x, nearest.y, 0.0])

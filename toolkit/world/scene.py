@@ -8,7 +8,7 @@ import numpy as np
 from toolkit.errors import RobotError, WorldError
 from toolkit.robot.model import RobotModel
 from toolkit.world.source import read_source
-from toolkit.world.world import World
+from toolkit.world.world import PALM_SITES, World
 
 WORLD_PREFIX = "world/"  # of everything in the scene that comes from the world
 
@@ -42,6 +42,9 @@ def compose_scene(robot: RobotModel, world: World) -> mujoco.MjModel:
         spec.delete(key)
     for element in [*scenery.keys, *scenery.sensors, *scenery.pairs, *scenery.excludes]:
         scenery.delete(element)
+    for site in scenery.sites:
+        if site.name in PALM_SITES.values():
+            scenery.delete(site)  # only sites of the robot are named after limbs
     priority = max([0, *(geom.priority for geom in spec.geoms)]) + 1
     fresh = mujoco.MjSpec().worldbody.add_geom()
     for geom in scenery.geoms:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
+from toolkit.geometry.limb import PALMS, Limb
 from toolkit.geometry.pose import Pose
 from toolkit.world.surface import Surface
 from toolkit.world.timing import Timing
+
+PALM_SITES = {limb: f"start_{limb.label}" for limb in PALMS}
+"""Names of the sites at which palms start."""
+PALM_SITE_REACH = 0.3
+"""m; farthest that the surface of a palm that starts in contact may be from its site."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +42,8 @@ class World:
         timing: shift and swing time of a transition.
         square: (xmin, ymin, xmax, ymax), m; infinite planes are cut to it wherever they are drawn or listed.
         mjcf: text of the scene where it exists in memory only; None where `path` holds it.
+        start_palms: palm -> (3,) m; palms that start in contact, each on the surface nearest to its point; empty: the
+            robot starts on its feet alone.
     """
 
     name: str
@@ -46,3 +55,4 @@ class World:
     timing: Timing
     square: tuple[float, float, float, float] = (-10.0, -10.0, 10.0, 10.0)
     mjcf: str | None = field(default=None, repr=False)
+    start_palms: Mapping[Limb, np.ndarray] = field(default_factory=dict)
