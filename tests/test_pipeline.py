@@ -8,10 +8,15 @@ from toolkit import pipeline
 from toolkit.geometry.limb import Limb
 
 
-def solution(name, *limbs):
+def solution(name, *limbs, start=()):
+    """A solution whose transitions make contacts with limbs, or break them where a palm is in contact."""
+    palms = [set(start)]
+    for limb in limbs:
+        palms.append(palms[-1] if limb.is_foot else palms[-1] ^ {limb})
+    stances = [SimpleNamespace(palms=tuple(each), contacts=()) for each in palms]
+    transitions = [SimpleNamespace(limb=limb, contact=None) for limb in limbs]
     return SimpleNamespace(
-        name=name,
-        sequence=SimpleNamespace(transitions=[SimpleNamespace(limb=limb) for limb in limbs], stances=[]),
+        name=name, sequence=SimpleNamespace(transitions=transitions, stances=stances, start=stances[0])
     )
 
 
@@ -57,6 +62,13 @@ def test_where_palms_fail_the_feet_are_searched_alone(monkeypatch):
     result, tested = run(planner, {"feet"}, monkeypatch)
     assert tested == ["palms 4", "palms 3", "palms 2", "feet"]  # palms get half of the six
     assert planner.calls == [True, False] and result.passed
+
+
+def test_feet_that_first_let_go_of_the_wall_are_tested_as_feet_alone(monkeypatch):
+    palms = [solution(f"palms {number}", FOOT, FOOT, start=[PALM]) for number in range(5)]
+    planner = Planner(palms, [solution("feet", PALM, FOOT, start=[PALM])])
+    result, tested = run(planner, {"feet"}, monkeypatch)
+    assert tested == ["palms 4", "palms 3", "palms 2", "feet"] and result.passed
 
 
 @pytest.mark.parametrize("count", [1, 4])

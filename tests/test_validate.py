@@ -51,6 +51,23 @@ BAD_WORLDS = {
     "NaN": (world_text(goal=('pos="0.5 0 0"', 'pos="nan 0 0"')), 2, ""),
     "a goal nothing leads to": (world_text(goal=('pos="0.5 0 0" size', 'pos="9 0 0" size')), 1, "goal"),
     "a ceiling too low": (world_text('<geom type="box" size="3 3 0.1" pos="0 0 1.2" friction="0.6"/>'), 1, ""),
+    "palms without a wall": (
+        world_text(
+            '<site name="start_left_palm" pos="0.2 0.6 1.2"/>', floor=('type="box" size="2', 'type="plane" size="2')
+        ),
+        2,
+        "add a wall beside",
+    ),
+    "palms with nothing but the floor's edges": (
+        world_text('<site name="start_left_palm" pos="0.2 0.6 1.2"/>'),
+        2,
+        "add a wall there",
+    ),
+    "a wall out of reach": (
+        world_text('<geom type="box" size="1 0.1 1" pos="0 2 1"/><site name="start_left_palm" pos="0.2 1.9 1.2"/>'),
+        2,
+        "out of reach",
+    ),
     "timing of zero": (world_text(timing=('data="0.3 0.5"', 'data="0 0.5"')), 2, "transition_timing"),
 }
 
@@ -91,6 +108,17 @@ def test_a_missing_world_and_an_unknown_robot_get_one_clear_line(tmp_path):
     assert "left_fot" in result.stderr
     assert "left_foot" in result.stderr
     assert not (tmp_path / "run").exists()
+
+
+def test_palms_at_the_start_and_no_palms_contradict_each_other(tmp_path):
+    world, out = tmp_path / "wall.xml", tmp_path / "run"
+    wall = '<geom type="box" size="1 0.1 1" pos="0 0.7 1"/><site name="start_left_palm" pos="0.2 0.6 1.2"/>'
+    world.write_text(world_text(wall))
+    result = validate(world, out, "--no-palms")
+    assert result.returncode == 2
+    assert len(result.stderr.splitlines()) == 1
+    assert "leave out --no-palms" in result.stderr and "start_left_palm" in result.stderr
+    assert not out.exists()
 
 
 def replayed(folder: Path) -> tuple[np.ndarray, np.ndarray, mujoco.MjModel]:

@@ -13,10 +13,10 @@ def box(centre, half, euler=(0, 0, 0), friction=0.7):
     return f'<geom type="box" pos="{centre}" size="{half}" euler="{euler}" friction="{friction}"/>'
 
 
-def make_world(*geoms, start=(0, 0, 0), goal=(1.5, 0, 0), radius=0.2, timing="1 1"):
-    """A world of geoms (MJCF)."""
+def make_world(*geoms, start=(0, 0, 0), goal=(1.5, 0, 0), radius=0.2, timing="1 1", heading=0.0):
+    """A world of geoms (MJCF); the heading is in degrees."""
     mjcf = f"""<mujoco><custom><numeric name="transition_timing" data="{timing}"/></custom><worldbody>
-      <site name="start" pos="{start[0]} {start[1]} {start[2]}"/>
+      <site name="start" pos="{start[0]} {start[1]} {start[2]}" euler="0 0 {heading}"/>
       <site name="goal" type="cylinder" pos="{goal[0]} {goal[1]} {goal[2]}" size="{radius} 0.01"/>
       {"".join(geoms)}</worldbody></mujoco>"""
     return load_world(Path("made.xml"), mjcf=mjcf)

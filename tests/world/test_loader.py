@@ -8,6 +8,7 @@ import pytest
 
 from tests.world.conftest import mjcf_of
 from toolkit.errors import WorldError
+from toolkit.geometry.limb import Limb
 from toolkit.world.loader import load_world
 from toolkit.world.timing import Timing
 
@@ -28,6 +29,21 @@ def test_reads_start_goal_and_timing(make_world):
     assert world.goal.radius == 0.2
     assert world.timing == Timing(0.05, 0.35)
     assert world.name == "made"
+
+
+WALL = '<geom name="wall" type="box" size="1 0.1 1" pos="0 0.7 1"/>'
+LEFT_PALM = '<site name="start_left_palm" pos="{}"/>'
+
+
+def test_reads_palms_of_the_start(make_world):
+    assert make_world(FLOOR + WALL).start_palms == {}
+    both = WALL + WALL.replace("0 0.7", "0 -0.7").replace('"wall"', '"other"')
+    body = '<body pos="0 -0.5 1" euler="0 0 90"><site name="start_right_palm" pos="0 0.2 0.1"/></body>'
+    world = make_world(FLOOR + both + LEFT_PALM.format("0.1 0.6 1.2") + body)
+    assert list(world.start_palms) == [Limb.LEFT_PALM, Limb.RIGHT_PALM]
+    np.testing.assert_allclose(world.start_palms[Limb.LEFT_PALM], [0.1, 0.6, 1.2])
+    np.testing.assert_allclose(world.start_palms[Limb.RIGHT_PALM], [-0.2, -0.5, 1.1], atol=1e-12)
+    make_world(FLOOR + WALL + LEFT_PALM.format("0.1 0.31 1.2"))  # 0.29 m off the wall
 
 
 def test_timing_of_the_paper_where_none_is_given(make_world):
@@ -77,6 +93,26 @@ CASES = {
     "no_geom": (mjcf_of(), "no usable surface for feet; add a static colliding geom"),
     "only_a_wall": (mjcf_of('<geom type="plane" size="0 0 1" euler="90 0 0"/>'), "no usable surface for feet"),
     "does_not_collide": (mjcf_of(FLOOR.replace("/>", ' contype="0" conaffinity="0"/>')), "no usable surface for feet"),
+    "palm_without_a_wall": (
+        mjcf_of(FLOOR + LEFT_PALM.format("0 0.6 1")),
+        "site 'start_left_palm' asks for a palm on a wall, but the world has none: .* 60 to 120 degrees .*; add a wall",
+    ),
+    "palm_far_from_the_wall": (
+        mjcf_of(FLOOR + WALL + LEFT_PALM.format("0 0.2 1")),
+        r"site 'start_left_palm' at \(0, 0\.2, 1\) is 0\.40 m from the nearest surface for palms; move it within 0",
+    ),
+    "palm_above_the_wall": (
+        mjcf_of(FLOOR + WALL + LEFT_PALM.format("0 0.6 2.5")),
+        r"is 0\.50 m from the nearest surface for palms",
+    ),
+    "palms_alone": (
+        mjcf_of(FLOOR + WALL + LEFT_PALM.format("0 0.6 1"), start="0 0 1"),
+        "'start' is in the air: .*; a robot that starts with its palms in contact needs ground for both feet too",
+    ),
+    "palms_and_no_ground": (
+        mjcf_of(WALL.replace("1 0.1 1", "1 0.01 1") + LEFT_PALM.format("0 0.6 1")),
+        "no usable surface for feet; .*; a robot that starts with its palms in contact needs ground for both feet too",
+    ),
     "zero_friction": (mjcf_of(FLOOR.replace("/>", ' friction="0"/>')), "geom 'floor' has friction 0; give"),
     "negative_friction": (mjcf_of(FLOOR.replace("/>", ' friction="-0.5"/>')), "geom 'floor' has friction -0.5; give"),
     "unnamed_frictionless": (

@@ -34,6 +34,13 @@ def test_robot_keeps_its_names_and_order(scene, stool):
     assert scene.geom("world/floor").id >= 0 and scene.site("world/goal").id >= 0
 
 
+def test_only_sites_of_the_robot_are_named_after_limbs(stool, make_world):
+    wall = '<geom type="box" size="1 0.1 1" pos="0 0.7 1"/><site name="start_left_palm" pos="0 0.6 1"/>'
+    scene = compose_scene(stool, make_world(FLOORS + wall, assets=ASSETS))
+    limbs = [scene.site(i).name for i in range(scene.nsite) if scene.site(i).name.endswith(("foot", "palm"))]
+    assert sorted(limbs) == ["left_foot", "right_foot"]
+
+
 def test_options_are_those_of_every_run(scene):
     assert scene.opt.timestep == 0.002
     assert scene.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC

@@ -13,7 +13,7 @@ from toolkit.contacts.projection import Projected, Projector
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.contacts.transition_model import TransitionModel, steps_38, steps_60, wide_steps
-from toolkit.errors import PlanningError
+from toolkit.errors import InputError, PlanningError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
@@ -86,11 +86,12 @@ class ContactPlanner:
         """Both feet on the ground below the start, at their distance in the home posture, and palms at their sites.
 
         Raises:
-            PlanningError: they find no room, the robot cannot stand there, or an arm cannot hold its palm.
+            PlanningError: they find no room, or the robot cannot stand there.
+            InputError: the world asks for a palm that no arm can hold there, or that the settings forbid.
         """
         names = [PALM_SITES[limb] for limb in self.world.start_palms]
         if names and not self.config.palms:
-            raise PlanningError(
+            raise InputError(
                 f"{self.world.path}: palms are switched off, but the world asks for palms in contact at the "
                 f"start; leave out --no-palms, or remove the site{'s' * (len(names) > 1)} {' and '.join(names)}"
             )

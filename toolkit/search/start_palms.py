@@ -6,7 +6,7 @@ import numpy as np
 
 from toolkit.contacts.projection import shifts
 from toolkit.contacts.stance import Contact, Stance
-from toolkit.errors import PlanningError
+from toolkit.errors import WorldError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
@@ -29,34 +29,43 @@ def with_palms(robot: RobotModel, world: World, feet: Stance, moves: MoveGenerat
         table: of `moves`.
 
     Raises:
-        PlanningError: the robot has no such arm, or it cannot hold its palm there.
+        WorldError: the robot has no such arm, or it cannot hold its palm there.
     """
     left, right = (table.add_contact(feet[foot]) for foot in FEET)
     stance = feet
     for limb, site in world.start_palms.items():
         if limb not in robot.arms:
-            raise PlanningError(
+            raise WorldError(
                 f"{world.path}: site '{PALM_SITES[limb]}' asks for a palm that robot {robot.name} does not have; "
                 "remove the site, or take a robot with such an arm"
             )
-        stance = stance.replace(_placed(world, limb, site, moves, table, left, right))
+        reach = robot.arms[limb].max_reach
+        stance = stance.replace(_placed(world, limb, site, reach, moves, table, left, right))
     return stance
 
 
 def _placed(
-    world: World, limb: Limb, site: np.ndarray, moves: MoveGenerator, table: ContactTable, left: int, right: int
+    world: World,
+    limb: Limb,
+    site: np.ndarray,
+    reach: float,
+    moves: MoveGenerator,
+    table: ContactTable,
+    left: int,
+    right: int,
 ) -> Contact:
-    """The palm's contact nearest to its site (3,) m."""
+    """The palm's contact nearest to its site (3,) m, with the feet at `left` and `right`; the arm reaches `reach` m."""
     shoulder = moves.shoulder(limb, left, right)
     rays = _points(world, site) - shoulder
-    rays /= np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-9)
-    palms, codes = moves.aimed(limb, left, right, rays)
+    distance = np.maximum(np.linalg.norm(rays, axis=1), 1e-9)
+    palms, codes = moves.aimed(limb, left, right, rays / distance[:, None])
+    codes[(codes == screen.NO_WALL) & (distance > reach)] = screen.FAR
     far = np.linalg.norm(palms.position - site, axis=1)  # what is hit before the point may be elsewhere
     codes[(codes == 0) & (far > PALM_SITE_REACH + _SEARCH)] = screen.NO_WALL
     if not (codes == 0).any():
         code = screen.POSTURE if (codes == screen.POSTURE).any() else codes[0]  # how far any came, or the nearest point
         at, above = (f"({x:.3g}, {y:.3g}, {z:.3g})" for x, y, z in (site, shoulder))
-        raise PlanningError(
+        raise WorldError(
             f"{world.path}: the {limb.label.replace('_', ' ')} cannot start at site '{PALM_SITES[limb]}' {at}, from "
             f"the shoulder at {above}: {screen.REASONS[code]}; move the site along the wall, move the start nearer to "
             "the wall or away from it, or remove the site"

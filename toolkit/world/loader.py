@@ -129,7 +129,7 @@ def _check_walls(
         if distance > PALM_SITE_REACH:
             raise WorldError(
                 f"{path}: site '{name}' at {at} is {distance:.2f} m from the nearest surface for palms; move it within "
-                f"{PALM_SITE_REACH:g} m of one, or remove it"
+                f"{PALM_SITE_REACH:g} m of one, add a wall there, or remove the site"
             )
 
 
