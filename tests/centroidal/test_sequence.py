@@ -8,6 +8,7 @@ import pytest
 from tests.centroidal.walks import foot, walk
 from toolkit.centroidal.body import body_residuals
 from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_problem
+from toolkit.centroidal.pieces import pieces
 from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.program import Landing, Program, Regularisers
 from toolkit.centroidal.residual import check, cop_margin, objective
@@ -250,3 +251,40 @@ def test_landing_points_move_where_that_helps(walker):
     assert moved.objective < fixed.objective * (1 + 1e-3)
     nowhere = optimise(walker, schedule, com, np.zeros(3), room=0 * room)
     np.testing.assert_allclose(nowhere.com, fixed.com, atol=2e-3)
+
+
+def test_an_active_upper_bound_on_a_length_brings_its_whole_curvature():
+    piece = pieces(moving=False).distance
+    rng = np.random.default_rng(10)
+    v, p = rng.normal(size=piece.size), rng.normal(size=piece.parameters)
+    multiplier = np.array([0.0, -2.0])
+
+    def gradient(at):
+        return np.array(piece.second(at, p, 1.0, multiplier)[0]).ravel()
+
+    hessian = np.zeros((piece.size, piece.size))
+    rows, columns = (np.array(part) for part in piece.hessian_pattern)
+    hessian[rows, columns] = np.array(piece.second(v, p, 1.0, multiplier)[1]).ravel()
+    step = 1e-6 * np.eye(piece.size)
+    numerical = np.stack([(gradient(v + change) - gradient(v - change)) / 2e-6 for change in step])
+    np.testing.assert_allclose(hessian, numerical, atol=1e-7)
+    assert np.abs(hessian).max() > 0.1
+
+
+def test_a_lightly_loaded_contact_is_as_curved_along_its_load_as_its_objective():
+    piece = pieces(moving=False).contact
+    rng = np.random.default_rng(11)
+    p = rng.uniform(0.1, 0.5, piece.parameters)
+    v = np.concatenate([[0.001, 0.002, 0.02, 0.004, -0.003, 0.0], np.zeros(3)])
+    none = np.zeros(piece.rows)
+
+    def slope(load):
+        at = v.copy()
+        at[2] = load
+        return float(piece.second(at, p, 1.0, none)[0][2])
+
+    rows, columns = (np.array(part) for part in piece.hessian_pattern)
+    at = int(np.flatnonzero((rows == 2) & (columns == 2))[0])
+    known = float(np.array(piece.second(v, p, 1.0, none)[1]).ravel()[at])
+    exact = (slope(0.02 + 1e-6) - slope(0.02 - 1e-6)) / 2e-6
+    assert 0.9 * exact < known < 1.5 * exact

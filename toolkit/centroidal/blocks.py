@@ -4,9 +4,9 @@ A `Piece` is one small CasADi function with its derivatives; a `Block` applies i
 index arrays. `Assembly` gathers, maps and scatters, so that building a program of any size takes a handful of graph
 nodes, and hands the solvers ready-made derivatives instead of letting them differentiate the whole program.
 
-The Hessian is Gauss-Newton in the objective: sum_i rho_i(v)^2 + linear(v) has the Hessian 2 Jrho^T Jrho. Rows add
-curvature only where a piece knows a convex part of it, so the Hessian is positive semidefinite whatever the point and
-the multipliers: the solvers need no regularisation (Fatrop's search for one has no end on bad points).
+The Hessian is Gauss-Newton in the objective: sum_i rho_i(v)^2 + linear(v) has the Hessian 2 Jrho^T Jrho. Objective and
+rows add more curvature only where a piece knows a convex part of it, so the Hessian is positive semidefinite whatever
+the point and the multipliers: the solvers need no regularisation (Fatrop's search for one has no end on bad points).
 """
 
 from __future__ import annotations
@@ -27,13 +27,24 @@ class Piece:
         rho: (nr,) terms whose squares add to the objective, or None.
         linear: scalar added to the objective, linear in v, or None.
         rows: (ng,) constraint rows, or None.
+        bend: positive semidefinite (nv, nv) part of the objective's Hessian beyond Gauss-Newton; None to leave it out.
         curvature: maps the rows' multipliers (not positive where a row's lower bound is active) to a positive
             semidefinite (nv, nv) part of the Hessian; None to leave the rows' curvature out.
         jacobian: (ng, nv) of the rows where the caller knows a shorter expression.
     """
 
     def __init__(
-        self, name: str, v: ca.SX, p: ca.SX, *, rho=None, linear=None, rows=None, curvature=None, jacobian=None
+        self,
+        name: str,
+        v: ca.SX,
+        p: ca.SX,
+        *,
+        rho=None,
+        linear=None,
+        rows=None,
+        bend=None,
+        curvature=None,
+        jacobian=None,
     ):
         self.name = name
         rho = ca.SX(0, 1) if rho is None else rho
@@ -44,6 +55,8 @@ class Piece:
         jacobian = ca.jacobian(rows, v) if jacobian is None else jacobian
         d_rho = ca.jacobian(rho, v)
         hessian = 2 * weight * (d_rho.T @ d_rho)
+        if bend is not None:
+            hessian = hessian + weight * bend
         if curvature is not None:
             hessian = hessian + curvature(multiplier)
         hessian = ca.triu2symm(ca.triu(hessian + ca.SX(hessian.sparsity().T, 0)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import casadi as ca
 
@@ -29,6 +30,21 @@ class Posture:
 def displacement(rotation: ca.SX, offset: ca.SX) -> ca.SX:
     """(3,) displacement in the world of a contact that moves by `offset` (2 or none) along its own axes."""
     return rotation[:, :2] @ offset if offset.numel() else ca.SX.zeros(3)
+
+
+def stretched(multiplier: ca.SX, reach: ca.SX, length: ca.SX, v: ca.SX) -> ca.SX:
+    """Curvature of an upper bound on a length, which is convex: the Hessian of |reach| wherever the bound is active.
+
+    Without it, the solvers' steps along a bow that a leg's length allows would swing ever farther around the solution.
+
+    Args:
+        multiplier: of the row `upper - length`, not positive where it is active.
+        reach: (3,) linear in `v`.
+        length: of `reach`.
+        v: (nv,) variables.
+    """
+    across = ca.jacobian(reach, v) - (reach / length) @ ca.jacobian(length, v)
+    return ca.fmax(-multiplier, 0) / length * (across.T @ across)
 
 
 def _posture(com: ca.SX, p: Parameters, offset: ca.SX) -> tuple[Posture, ca.SX]:
@@ -84,7 +100,9 @@ def leg(moving: bool) -> Piece:
     ):
         kept = margin * (1 - slack)
         rows += [scale * (value - limits[0] - kept), scale * (limits[1] - value - kept)]
-    return Piece("leg", ca.vertcat(com, slack, offset), p.vector, rows=ca.vertcat(*rows))
+    v = ca.vertcat(com, slack, offset)
+    curvature = partial(stretched, reach=posture.hip - posture.ankle, length=posture.length, v=v)
+    return Piece("leg", v, p.vector, rows=ca.vertcat(*rows), curvature=lambda m: 5 * curvature(m[1]))
 
 
 def torque(moving: bool) -> Piece:

@@ -20,7 +20,7 @@ from functools import lru_cache
 import casadi as ca
 
 from toolkit.centroidal.blocks import Parameters, Piece
-from toolkit.centroidal.leg_pieces import WRENCH, displacement, leg, torque
+from toolkit.centroidal.leg_pieces import WRENCH, displacement, leg, stretched, torque
 from toolkit.centroidal.problem import GRAVITY, STANDARD_GRAVITY
 
 STATE = 12
@@ -163,18 +163,26 @@ def _contact() -> Piece:
         return (20 * ca.fmax(-multiplier[0], 0) / held) * (tilt.T @ tilt)
 
     pressed = fz + 0.01  # an unloaded contact has no CoP: keeps the objective smooth there
-    cop_x, cop_y = -ty / pressed, tx / pressed
+    cop = ca.vertcat(-ty, tx) / pressed
+    off_centre = weights[3] * cop / (2 * half)
+    leverage = cop[1] * fx - cop[0] * fy
+    spin = weights[2] * (tz + leverage)
     rho = ca.vertcat(
         weights[0] * wrench[:3],
         weights[1] * wrench[:2],
-        weights[2] * (tz - cop_x * fy + cop_y * fx),
-        weights[3] * ca.vertcat(cop_x, cop_y) / (2 * half),
+        spin,
+        off_centre,
         weights[4] * ca.vertcat(-ty, tx) / (2 * half),
         weights[5] * (fz - load),
         ca.sqrt(EVEN * price) * slack,
     )
     linear = price * (slack[0] + slack[1])
-    return Piece("contact", v, p.vector, rho=rho, linear=linear, rows=10 * ca.vertcat(*rows), curvature=curvature)
+    # The square of a ratio t / f bends three times as much along f as Gauss-Newton knows: where a contact is lightly
+    # loaded, steps would swing ever farther around the solution.
+    bend = ca.SX(CONTACT + 1, CONTACT + 1)
+    bend[2, 2] = 4 * (ca.sumsqr(off_centre) + ca.fmax(spin * weights[2] * leverage, 0)) / pressed**2
+    rows = 10 * ca.vertcat(*rows)
+    return Piece("contact", v, p.vector, rho=rho, linear=linear, rows=rows, bend=bend, curvature=curvature)
 
 
 def _distance(moving: bool) -> Piece:
@@ -189,10 +197,11 @@ def _distance(moving: bool) -> Piece:
     root, tip, lower, upper, margin = p(3), p(3), p(), p(), p()
     if moving:
         tip += ca.reshape(p(12), 4, 3).T @ offset
-    length = ca.sqrt(ca.sumsqr(com + delay * velocity + root - tip) + 1e-12)
+    v, reach = ca.vertcat(com, velocity, slack, offset), com + delay * velocity + root - tip
+    length = ca.sqrt(ca.sumsqr(reach) + 1e-12)
     kept = margin * (1 - slack)
     rows = ca.vertcat(5 * (length - lower - kept), 5 * (upper - length - kept))
-    return Piece("distance", ca.vertcat(com, velocity, slack, offset), p.vector, rows=rows)
+    return Piece("distance", v, p.vector, rows=rows, curvature=lambda m: 5 * stretched(m[1], reach, length, v))
 
 
 def _height(moving: bool) -> Piece:
