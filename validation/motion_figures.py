@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion
+from toolkit.geometry.limb import FEET
 
 LOADED = 1e-3  # of the weight; a contact that bears less has no centre of pressure to speak of
 
@@ -24,6 +25,7 @@ class MotionFigures:
         torque: N m; |moment about the normal| of a contact.
         lateral_force: norm of a contact's force along its surface, over the weight.
         cop_distance: m; from a contact's centre of pressure to the edge of its patch.
+        foot_cop_distance: m; the same of the feet alone: in a palm's patch no point is as far from the edge.
     """
 
     duration: float
@@ -35,6 +37,7 @@ class MotionFigures:
     torque: float
     lateral_force: float
     cop_distance: float
+    foot_cop_distance: float
 
 
 def motion_figures(motion: CentroidalMotion) -> MotionFigures:
@@ -56,6 +59,7 @@ def motion_figures(motion: CentroidalMotion) -> MotionFigures:
     normal = np.einsum("tlji,tlj->tli", p.rotation, motion.force)[..., 2] / weight
     lateral = np.sqrt(np.maximum(norm**2 - normal**2, 0.0))
     contacts = np.maximum(p.active.sum(1), 1)
+    pressed = p.active & (normal > LOADED)
     edge = (p.half_size - np.abs(motion.cop)).min(-1)
     return MotionFigures(
         duration=duration,
@@ -66,7 +70,8 @@ def motion_figures(motion: CentroidalMotion) -> MotionFigures:
         force=over_time(np.sqrt((norm**2).sum(1) / contacts)),
         torque=over_contacts(np.abs(motion.yaw_torque), p.active),
         lateral_force=over_contacts(lateral, p.active),
-        cop_distance=over_contacts(edge, p.active & (normal > LOADED)),
+        cop_distance=over_contacts(edge, pressed),
+        foot_cop_distance=over_contacts(edge, pressed & (np.arange(4) < len(FEET))),
     )
 
 

@@ -133,3 +133,12 @@ def test_a_run_that_breaks_one_condition_does_not_hold(name, value):
     assert not holds(GOOD | {name: value})
     if name not in ("arrived", "replays"):
         assert not held_within(GOOD | {name: value})
+
+
+def test_centres_of_pressure_of_the_feet_alone_leave_palms_out():
+    motion = standing()
+    active, force, half = motion.problem.active.copy(), motion.force.copy(), motion.problem.half_size.copy()
+    active[:, 2], force[:, 2], half[2] = True, [0.0, 0.0, WEIGHT / 10], 0.01
+    held = motion_figures(replace(motion, force=force, problem=replace(motion.problem, active=active, half_size=half)))
+    assert held.foot_cop_distance == pytest.approx(motion_figures(motion).cop_distance)
+    assert held.cop_distance < held.foot_cop_distance
