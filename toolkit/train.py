@@ -173,6 +173,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
         raise InputError(f"--device {args.device}: torch cannot compute there ({reason}); use --device cpu") from None
     config = FitConfig(
         epochs=args.epochs,
+        batch=args.batch,
         learning_rate=args.learning_rate,
         sensitivity_weight=args.sensitivity_weight,
         device=args.device,
@@ -296,6 +297,7 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument("--data", type=Path, required=True, nargs="+", help="data set folder, or several")
     sub.add_argument("--out", type=Path, help="folder for the networks (default: the robot's networks/)")
     sub.add_argument("--epochs", type=cli.positive(int), default=120, help="at most (default: %(default)s)")
+    sub.add_argument("--batch", type=cli.positive(int), default=512, help="samples per step (default: %(default)s)")
     sub.add_argument("--limit", type=cli.positive(int), help="transitions per category at most")
     sub.add_argument("--resume", action="store_true", help="keep what was trained with the same settings before a stop")
     sub.add_argument("--learning-rate", type=cli.positive(float), default=4e-3, help="peak (default: %(default)s)")
