@@ -47,6 +47,7 @@ class AnaStarConfig:
         patience: see `crowding`.
         refusal: added to h for the order of expansion where the judge refused a goal.
         max_expansions: ends the search; None for no limit.
+        first_only: the first solution ends the search.
         max_states: ends the search, to bound memory.
         report_interval: s between calls of the observer, solutions apart.
     """
@@ -58,6 +59,7 @@ class AnaStarConfig:
     patience: int = 200
     refusal: float = 3.0
     max_expansions: int | None = None
+    first_only: bool = False
     max_states: int = 700_000
     report_interval: float = 0.1
 
@@ -68,7 +70,7 @@ class AnaStarResult(Generic[State]):
 
     Attributes:
         paths: every solution, in the order of their finding; costs fall strictly.
-        stopped_by: "exhausted" (nothing left that could improve), "time", "expansions" or "memory".
+        stopped_by: "exhausted" (nothing left that could improve), "time", "expansions", "memory" or "solution".
         lower_bound: no path can cost less (with h admissible).
         seconds, expansions, states: spent and known.
         expanded: states in order of expansion.
@@ -142,6 +144,8 @@ class AnaStar(Generic[State]):
             now = time.perf_counter() - began
             if now >= time_limit:
                 stopped_by = "time"
+            elif config.first_only and paths:
+                stopped_by = "solution"
             elif config.max_expansions is not None and len(expanded) >= config.max_expansions:
                 stopped_by = "expansions"
             elif len(self._state) >= config.max_states:

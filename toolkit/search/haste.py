@@ -31,8 +31,8 @@ class HasteConfig:
         turn: per rad between the feet's headings, likewise.
     """
 
-    capture: float = 0.75
-    early: float = 0.6
+    capture: float = 1.0
+    early: float = 0.7
     turn: float = 0.5
 
 

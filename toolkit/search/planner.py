@@ -18,7 +18,7 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
-from toolkit.search.ana_star import AnaStar, AnaStarConfig, AnaStarResult
+from toolkit.search.ana_star import AnaStarConfig, AnaStarResult
 from toolkit.search.arrival import Arrival
 from toolkit.search.contact_table import ContactTable
 from toolkit.search.exclusion import Exclusion
@@ -28,6 +28,7 @@ from toolkit.search.moves import MoveGenerator
 from toolkit.search.outcome import reason_of, solution_of
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.problem import ContactProblem
+from toolkit.search.restart import search_in_turn
 from toolkit.search.result import SearchResult
 from toolkit.search.start import place_feet
 from toolkit.search.start_palms import with_palms
@@ -39,7 +40,9 @@ _UNTRAINED = (
     "timing or friction outside what the networks were trained for; the optimiser judged there instead, which is slower"
 )
 _DEEP = 10  # patience of a search over slippery ground, in multiples of the patience elsewhere
-_LAYER, _EPSILON, _CROWDING = 1.5, 0.3, 0.2  # of a search that has to slide: see `AnaStarConfig`
+_LAYER, _EPSILON, _CROWDING = 1.5, 0.15, 0.6  # of a search that has to slide: see `AnaStarConfig`
+_HASTY_EPSILON, _HASTY_CROWDING = 0.3, 0.2  # of the one before it, which is to find a first sequence soon
+_HASTY_SHARE, _HASTY_EXPANSIONS = 5, 600  # which has a fifth of the other's expansions, or so many
 _SLIDING = 3  # times the expansions, of such a search: most of them see that they have come too fast
 _LAZY = 20  # expansions with one transition judged in each that count as one with all judged
 
@@ -175,7 +178,12 @@ class ContactPlanner:
             way = float(distance(start.mean_feet.position[None], np.array([start.mean_feet.yaw]))[0])
             settings = replace(settings, initial_cost=self.config.acceptable_cost * max(way, 1.0))
         problem.deadline = time.perf_counter() + time_limit
-        result = AnaStar(problem, rng, settings, judge).run(time_limit, observer)
+        configs = [settings]
+        if slides and not lazy:
+            limit = _HASTY_EXPANSIONS if settings.max_expansions is None else settings.max_expansions // _HASTY_SHARE
+            hasty = replace(settings, epsilon=_HASTY_EPSILON, crowding=_HASTY_CROWDING, max_expansions=limit)
+            configs.insert(0, replace(hasty, first_only=True))
+        result = search_in_turn(problem, rng, configs, judge, time_limit, observer)
         judged = [state for state in result.expanded if not is_pending(state)]
         expanded = problem.feet(unpack(judged)[:, CONTACTS]) if judged else (np.zeros((0, 3)), [])
         return SearchResult(

@@ -34,10 +34,10 @@ class Solution:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """All solutions of one search, oldest (costliest) first, and how it went.
+    """All solutions of one search, oldest first, and how it went.
 
     Attributes:
-        solutions: in the order in which they were found.
+        solutions: in the order in which they were found; costs fall, but where the search began anew (`restart`).
         seconds: wall-clock of the search; heuristic_seconds: of building the heuristic (not in `seconds`).
         expansions: states expanded.
         exhausted: every reachable state was looked at.

@@ -1,0 +1,61 @@
+"""Searches in turn: the first sequence of the hasty one, then all that the patient one finds."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.search.test_ana_star import Graph
+from toolkit.search.ana_star import AnaStar, AnaStarConfig
+from toolkit.search.restart import search_in_turn
+
+HASTY, PATIENT = AnaStarConfig(epsilon=0.5, first_only=True), AnaStarConfig(epsilon=0.0)
+
+
+def test_the_first_solution_ends_a_search_that_wants_no_more():
+    for seed in range(10):
+        graph = Graph(np.random.default_rng(seed), goals=4)
+        result = AnaStar(graph, np.random.default_rng(seed), HASTY).run()
+        assert len(result.paths) == (graph.least < math.inf)
+        assert result.stopped_by in (("solution", "exhausted") if result.paths else ("exhausted",))
+
+
+def test_both_searches_count_and_the_second_one_starts_again():
+    found = 0
+    for seed in range(20):
+        graph = Graph(np.random.default_rng(seed), goals=4)
+        told = []
+        result = search_in_turn(
+            graph,
+            np.random.default_rng(seed),
+            (HASTY, PATIENT),
+            None,
+            math.inf,
+            lambda progress, to=told: to.append(progress),
+        )
+        assert result.expansions == graph.expansions == len(result.expanded)
+        if graph.least == math.inf:
+            assert not result.paths
+            continue
+        hasty = AnaStar(graph, np.random.default_rng(seed), HASTY).run()
+        alone = AnaStar(graph, np.random.default_rng(0), PATIENT).run()
+        assert result.paths[0].states == hasty.paths[0].states
+        if hasty.stopped_by == "solution":
+            found += 1
+            assert [path.states for path in result.paths[1:]] == [path.states for path in alone.paths]
+            assert [p.expansions - hasty.expansions for p in result.paths[1:]] == [p.expansions for p in alone.paths]
+        assert min(path.cost for path in result.paths) == pytest.approx(graph.least)
+        expansions, costs = [p.expansions for p in told], [p.cost for p in told]
+        assert expansions == sorted(expansions) and costs == sorted(costs, reverse=True)  # as if they were one
+        seconds = [path.seconds for path in result.paths]
+        assert seconds == sorted(seconds) and seconds[-1] <= result.seconds
+    assert found > 5
+
+
+def test_no_later_search_where_all_states_were_seen_or_no_time_is_left():
+    graph = Graph(np.random.default_rng(1), goals=1)
+    lone = AnaStar(graph, np.random.default_rng(1), PATIENT).run()
+    again = search_in_turn(graph, np.random.default_rng(1), (PATIENT, PATIENT), None, math.inf)
+    assert (lone.stopped_by, again.expansions) == ("exhausted", lone.expansions)
+    none = search_in_turn(graph, np.random.default_rng(1), (HASTY, PATIENT), None, 0.0)
+    assert (none.stopped_by, none.expansions) == ("time", 0)

@@ -1,0 +1,73 @@
+"""Searches of one graph in turn: a hasty one for a first sequence, then a patient one from the start again.
+
+What gets to a goal soonest is seldom what holds: the hasty search would go on around its own first sequence, so the
+patient one does not build on it.
+
+Reference:
+    Richter, Thayer, Ruml: The joy of forgetting: faster anytime search via restarting, ICAPS 2010.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from toolkit.search.ana_star import AnaStar, AnaStarConfig, AnaStarResult
+from toolkit.search.graph import Judge, Path, Progress, SearchProblem, State
+
+
+def search_in_turn(
+    problem: SearchProblem[State],
+    rng: np.random.Generator,
+    configs: Sequence[AnaStarConfig],
+    judge: Judge[State] | None,
+    time_limit: float,
+    observer: Callable[[Progress[State]], None] | None = None,
+) -> AnaStarResult[State]:
+    """Run one search after the other, each from the start; no later one where one ran out of states or time.
+
+    Args:
+        problem: the graph.
+        rng: for the random expansions of all.
+        configs: of each search.
+        judge: see `AnaStar`.
+        time_limit: s, for all together.
+        observer: told of the progress of all as if they were one; its cost is the best of all so far.
+
+    Returns:
+        All paths in the order of their finding; costs fall strictly within each search.
+    """
+    paths: list[Path[State]] = []
+    expanded: list[State] = []
+    seconds, bound = 0.0, 0.0
+    result: AnaStarResult[State] | None = None
+    for config in configs:
+        began, before, best = seconds, len(expanded), min(paths, key=lambda path: path.cost, default=None)
+
+        def observed(
+            progress: Progress[State], began: float = began, before: int = before, best: Path[State] | None = best
+        ) -> None:
+            if best is not None and best.cost < progress.cost:
+                progress = replace(progress, cost=best.cost, bound=best.bound)
+            assert observer is not None
+            observer(replace(progress, seconds=began + progress.seconds, expansions=before + progress.expansions))
+
+        search = AnaStar(problem, rng, config, judge)
+        result = search.run(time_limit - began, None if observer is None else observed)
+        for path in result.paths:
+            paths.append(replace(path, seconds=began + path.seconds, expansions=before + path.expansions))
+        expanded += result.expanded
+        seconds, bound = began + result.seconds, max(bound, result.lower_bound)
+        if result.stopped_by in ("exhausted", "time"):
+            break
+    assert result is not None
+    return replace(
+        result,
+        paths=tuple(paths),
+        lower_bound=bound,
+        seconds=seconds,
+        expansions=len(expanded),
+        expanded=tuple(expanded),
+    )
