@@ -55,8 +55,12 @@ def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
 def rotation_about_z(angle: np.ndarray | float) -> np.ndarray:
     """Rotation matrices (..., 3, 3) about z by `angle` (...,) in rad."""
     angle = np.asarray(angle, float)
-    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
-    return np.stack([np.stack([c, -s, zero], -1), np.stack([s, c, zero], -1), np.stack([zero, zero, one], -1)], -2)
+    rotation = np.zeros((*angle.shape, 3, 3))
+    rotation[..., 0, 0] = rotation[..., 1, 1] = np.cos(angle)
+    rotation[..., 1, 0] = np.sin(angle)
+    rotation[..., 0, 1] = -rotation[..., 1, 0]
+    rotation[..., 2, 2] = 1.0
+    return rotation
 
 
 def rotation_exponential(vector: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ from toolkit.search.state import (
     CONTACTS,
     LAST,
     OLD,
+    SIZE,
     TIMING,
     VELOCITY,
     is_pending,
@@ -116,6 +117,8 @@ class ContactProblem:
         for contact in start.contacts:
             numbers[0, contact.limb] = table.add_contact(contact)
         self._start = pack(numbers, np.array([-1]), com[None], np.zeros((1, 3)))[0]
+        self._asked: Sequence[bytes] | None = None
+        self._answer = (np.zeros((0, SIZE), np.int32), np.zeros((0, 3)), np.zeros(0))
         self.deadline = np.inf
         self._pace: dict[int, float] = {}  # s per transition of the last query, by the evaluator's id
 
@@ -151,7 +154,14 @@ class ContactProblem:
 
     def heuristic(self, states: Sequence[bytes]) -> np.ndarray:
         """See `SearchProblem`; Eq. 5 of the paper, with at least one transition where the goal is not reached."""
-        return self._to_go(*self.feet(unpack_all(states)[:, CONTACTS]))
+        return self._to_go(*self._seen(states)[1:])
+
+    def _seen(self, states: Sequence[bytes]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows of states, and `feet` of them; kept for the next question about the same ones."""
+        if states is not self._asked:
+            rows = unpack_all(states)
+            self._asked, self._answer = states, (rows, *self.feet(rows[:, CONTACTS]))
+        return self._answer
 
     def _to_go(self, centre: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         distance = self._distance(centre, yaw)
@@ -161,7 +171,7 @@ class ContactProblem:
     def is_goal(self, states: Sequence[bytes]) -> np.ndarray:
         """See `SearchProblem`."""
         judged = np.array([not is_pending(state) for state in states])
-        return judged & self._at_goal(self.feet(unpack_all(states)[:, CONTACTS])[0])
+        return judged & self._at_goal(self._seen(states)[1])
 
     def _at_goal(self, centre: np.ndarray) -> np.ndarray:
         radius = self._goal.radius
@@ -170,8 +180,8 @@ class ContactProblem:
 
     def crowd(self, states: Sequence[bytes]) -> list[tuple]:
         """See `SearchProblem`: states with the mean of the feet in the same square of 0.1 m, and about as fast."""
-        rows = unpack_all(states)
-        place = np.floor(self.feet(rows[:, CONTACTS])[0][:, :2] / _CROWD)
+        rows, centre, _ = self._seen(states)
+        place = np.floor(centre[:, :2] / _CROWD)
         speed = np.floor(np.hypot(*rows[:, VELOCITY][:, :2].T) / (1000.0 * _PACE))
         kind = [is_pending(state) for state in states]
         return list(map(tuple, np.column_stack([place, speed, kind]).astype(int).tolist()))
