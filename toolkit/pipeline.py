@@ -116,7 +116,7 @@ class PipelineConfig:
 
     seed: int = 0
     time_limit: float = 30.0
-    candidates: int = 10
+    candidates: int = 16
     until: str = "execution"
     initial_rest: float = 0.4
     final_rest: float = 1.0

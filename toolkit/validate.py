@@ -35,7 +35,9 @@ def arguments() -> argparse.ArgumentParser:
     cli.add_disturbance_options(parser)
     cli.add_execution_options(parser)
     parser.add_argument("--out", type=Path, help="output folder (default: runs/<world>-<robot>-<time>)")
-    parser.add_argument("--candidates", type=cli.positive(int), default=10, help="sequences to test (default: 10)")
+    parser.add_argument(
+        "--candidates", type=cli.positive(int), default=16, help="sequences to test at most (default: 16)"
+    )
     parser.add_argument("--pictures", action="store_true", help="also render a strip of pictures and plots")
     parser.add_argument("--video", action="store_true", help="also render a video")
     parser.add_argument("--no-recording", action="store_true", help="leave the rerun recording out")
