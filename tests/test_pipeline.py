@@ -23,13 +23,21 @@ def solution(name, *limbs, start=()):
 class Planner:
     """Finds what it is given: with palms, and for the feet alone."""
 
+    hasty = 0
+
     def __init__(self, with_palms, without):
         self.found, self.calls = {True: with_palms, False: without}, []
 
     def search(self, rng, time_limit, observer=None, exclusions=(), palms=True):
         self.calls.append(palms)
         return SimpleNamespace(
-            solutions=self.found[palms], reason="", warning="", seconds=0.0, heuristic_seconds=0.0, expansions=1
+            solutions=self.found[palms],
+            reason="",
+            warning="",
+            seconds=0.0,
+            heuristic_seconds=0.0,
+            expansions=1,
+            hasty=self.hasty,
         )
 
 
@@ -54,6 +62,13 @@ def test_the_newest_sequence_comes_first_and_ends_the_run_where_it_passes(monkey
     result, tested = run(planner, {"new", "old"}, monkeypatch)
     assert tested == ["new"] and planner.calls == [True]
     assert result.passed and result.tested == 1
+
+
+def test_what_was_only_to_come_soon_is_not_tested(monkeypatch):
+    planner = Planner([solution("soon", FOOT), solution("old", FOOT), solution("new", FOOT)], [])
+    planner.hasty = 1
+    result, tested = run(planner, {"soon"}, monkeypatch)
+    assert tested == ["new", "old"] and not result.passed
 
 
 def test_where_palms_fail_the_feet_are_searched_alone(monkeypatch):

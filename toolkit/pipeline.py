@@ -292,7 +292,7 @@ def run(
     palms = True
     while search.solutions:
         before, failed_with_palms = tested, False
-        for solution in reversed(search.solutions):  # newest, cheapest first
+        for solution in reversed(search.solutions[search.hasty :]):  # newest, cheapest first
             if tested == config.candidates or _meets(solution, exclusions):
                 continue
             with_palms = _uses_palms(solution.sequence)

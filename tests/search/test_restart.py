@@ -9,7 +9,7 @@ from tests.search.test_ana_star import Graph
 from toolkit.search.ana_star import AnaStar, AnaStarConfig
 from toolkit.search.restart import search_in_turn
 
-HASTY, PATIENT = AnaStarConfig(epsilon=0.5, first_only=True), AnaStarConfig(epsilon=0.0)
+HASTY, PATIENT = AnaStarConfig(epsilon=0.5, first_only=True), AnaStarConfig(epsilon=0.3)
 
 
 def test_the_first_solution_ends_a_search_that_wants_no_more():
@@ -25,7 +25,7 @@ def test_both_searches_count_and_the_second_one_starts_again():
     for seed in range(20):
         graph = Graph(np.random.default_rng(seed), goals=4)
         told = []
-        result = search_in_turn(
+        result, early = search_in_turn(
             graph,
             np.random.default_rng(seed),
             (HASTY, PATIENT),
@@ -37,11 +37,12 @@ def test_both_searches_count_and_the_second_one_starts_again():
         if graph.least == math.inf:
             assert not result.paths
             continue
-        hasty = AnaStar(graph, np.random.default_rng(seed), HASTY).run()
-        alone = AnaStar(graph, np.random.default_rng(0), PATIENT).run()
+        hasty = AnaStar(graph, np.random.default_rng(seed).spawn(1)[0], HASTY).run()
+        alone = AnaStar(graph, np.random.default_rng(seed), PATIENT).run()
         assert result.paths[0].states == hasty.paths[0].states
         if hasty.stopped_by == "solution":
             found += 1
+            assert early == 1
             assert [path.states for path in result.paths[1:]] == [path.states for path in alone.paths]
             assert [p.expansions - hasty.expansions for p in result.paths[1:]] == [p.expansions for p in alone.paths]
         assert min(path.cost for path in result.paths) == pytest.approx(graph.least)
@@ -54,8 +55,8 @@ def test_both_searches_count_and_the_second_one_starts_again():
 
 def test_no_later_search_where_all_states_were_seen_or_no_time_is_left():
     graph = Graph(np.random.default_rng(1), goals=1)
-    lone = AnaStar(graph, np.random.default_rng(1), PATIENT).run()
-    again = search_in_turn(graph, np.random.default_rng(1), (PATIENT, PATIENT), None, math.inf)
+    lone = AnaStar(graph, np.random.default_rng(1).spawn(1)[0], PATIENT).run()
+    again, _ = search_in_turn(graph, np.random.default_rng(1), (PATIENT, PATIENT), None, math.inf)
     assert (lone.stopped_by, again.expansions) == ("exhausted", lone.expansions)
-    none = search_in_turn(graph, np.random.default_rng(1), (HASTY, PATIENT), None, 0.0)
+    none, _ = search_in_turn(graph, np.random.default_rng(1), (HASTY, PATIENT), None, 0.0)
     assert (none.stopped_by, none.expansions) == ("time", 0)

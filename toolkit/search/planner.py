@@ -183,11 +183,12 @@ class ContactPlanner:
             limit = _HASTY_EXPANSIONS if settings.max_expansions is None else settings.max_expansions // _HASTY_SHARE
             hasty = replace(settings, epsilon=_HASTY_EPSILON, crowding=_HASTY_CROWDING, max_expansions=limit)
             configs.insert(0, replace(hasty, first_only=True))
-        result = search_in_turn(problem, rng, configs, judge, time_limit, observer)
+        result, early = search_in_turn(problem, rng, configs, judge, time_limit, observer)
         judged = [state for state in result.expanded if not is_pending(state)]
         expanded = problem.feet(unpack(judged)[:, CONTACTS]) if judged else (np.zeros((0, 3)), [])
         return SearchResult(
             solutions=tuple(solution_of(problem, path) for path in result.paths),
+            hasty=early if early < len(result.paths) else 0,
             seconds=result.seconds,
             heuristic_seconds=heuristic_seconds,
             expansions=result.expansions,

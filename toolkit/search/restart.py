@@ -25,25 +25,29 @@ def search_in_turn(
     judge: Judge[State] | None,
     time_limit: float,
     observer: Callable[[Progress[State]], None] | None = None,
-) -> AnaStarResult[State]:
+) -> tuple[AnaStarResult[State], int]:
     """Run one search after the other, each from the start; no later one where one ran out of states or time.
 
     Args:
         problem: the graph.
-        rng: for the random expansions of all.
+        rng: for the random expansions of the last search; those before it have streams of their own, so that they do
+            not change what it finds.
         configs: of each search.
         judge: see `AnaStar`.
         time_limit: s, for all together.
         observer: told of the progress of all as if they were one; its cost is the best of all so far.
 
     Returns:
-        All paths in the order of their finding; costs fall strictly within each search.
+        All paths in the order of their finding, whose costs fall strictly within each search; and how many of them are
+        of searches before the last one.
     """
     paths: list[Path[State]] = []
     expanded: list[State] = []
     seconds, bound = 0.0, 0.0
     result: AnaStarResult[State] | None = None
-    for config in configs:
+    generators, early = [*rng.spawn(len(configs) - 1), rng], 0
+    for config, generator in zip(configs, generators, strict=True):
+        early = len(paths)
         began, before, best = seconds, len(expanded), min(paths, key=lambda path: path.cost, default=None)
 
         def observed(
@@ -54,7 +58,7 @@ def search_in_turn(
             assert observer is not None
             observer(replace(progress, seconds=began + progress.seconds, expansions=before + progress.expansions))
 
-        search = AnaStar(problem, rng, config, judge)
+        search = AnaStar(problem, generator, config, judge)
         result = search.run(time_limit - began, None if observer is None else observed)
         for path in result.paths:
             paths.append(replace(path, seconds=began + path.seconds, expansions=before + path.expansions))
@@ -63,7 +67,7 @@ def search_in_turn(
         if result.stopped_by in ("exhausted", "time"):
             break
     assert result is not None
-    return replace(
+    whole = replace(
         result,
         paths=tuple(paths),
         lower_bound=bound,
@@ -71,3 +75,4 @@ def search_in_turn(
         expansions=len(expanded),
         expanded=tuple(expanded),
     )
+    return whole, early

@@ -44,6 +44,7 @@ class SearchResult:
         expanded: (k, 3) float; x, y, yaw of the mean feet of expanded states, in order (for display).
         reason: one line where there is no solution, else "".
         warning: one line where the judgements need a grain of salt, else "".
+        hasty: so many of the first solutions were only to come soon; better ones follow.
     """
 
     solutions: tuple[Solution, ...]
@@ -54,3 +55,4 @@ class SearchResult:
     expanded: np.ndarray = field(repr=False)
     reason: str
     warning: str = ""
+    hasty: int = 0
