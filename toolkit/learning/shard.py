@@ -11,6 +11,7 @@ quick steps, from states that already run (`slope_samples`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -193,7 +194,7 @@ class _Recorder:
         self._kind = kind
 
     def evaluate(
-        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
     ) -> TransitionBatch:
         """See `TransitionEvaluator`."""
         n = len(transitions)
@@ -261,7 +262,7 @@ class _Recorder:
         speed = rng.uniform(*config.run_speed, (count, 1))
         return com, speed * ahead + (rng.normal(size=(count, 3)) * config.velocity_spread) @ feet.rotation.T
 
-    def _pass_on(self, stance: Stance, transitions: list[ContactTransition], result: TransitionBatch) -> None:
+    def _pass_on(self, stance: Stance, transitions: Sequence[ContactTransition], result: TransitionBatch) -> None:
         """Keep a few of the feasible transitions, most of those into stances from which samples are lacking."""
         rows = np.flatnonzero(result.feasible)
         if len(rows) <= self._config.children:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -32,7 +33,7 @@ class TransitionEvaluator(Protocol):
     """Judges all candidate transitions of one parent state together."""
 
     def evaluate(
-        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
     ) -> TransitionBatch:
         """Judge transitions from a stance with CoM (3,) m and CoM velocity (3,) m/s in the world frame."""
         ...

@@ -18,7 +18,8 @@ import numpy as np
 
 from toolkit.contacts.category import Category, category_of
 from toolkit.contacts.sequence import ContactTransition
-from toolkit.contacts.stance import Contact, Stance
+from toolkit.contacts.stance import Stance
+from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
 
@@ -84,15 +85,14 @@ class Canonical:
         """Points (..., 3) from canonical form into the world."""
         return self.vector_back(points) + self.world_from_parent.position
 
-    def contacts(self, contacts: Sequence[Contact]) -> np.ndarray:
-        """Contacts as rows (n, 9): position, x axis, z axis, canonical.
+    def contacts(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        """Contacts at (n, 3) with frames (n, 3, 3) as rows (n, 9): position, x axis, z axis, canonical.
 
         A mirrored contact frame keeps its x and z axes mirrored; y follows from them.
         """
-        rotations = np.array([contact.pose.rotation for contact in contacts])
-        rows = np.empty((len(contacts), 3, 3))
-        rows[:, 0] = np.array([contact.pose.position for contact in contacts]) - self.world_from_parent.position
-        rows[:, 1], rows[:, 2] = rotations[:, :, 0], rotations[:, :, 2]
+        rows = np.empty((len(position), 3, 3))
+        rows[:, 0] = position - self.world_from_parent.position
+        rows[:, 1], rows[:, 2] = rotation[:, :, 0], rotation[:, :, 2]
         return self.vector(rows).reshape(-1, CONTACT)
 
 
@@ -111,7 +111,7 @@ def parent_frame(stance: Stance) -> Pose:
 
 
 def encode(
-    stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+    stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
 ) -> tuple[Canonical, np.ndarray]:
     """Features of transitions of ONE category by the same limb out of one parent state.
 
@@ -127,32 +127,29 @@ def encode(
     Raises:
         ValueError: the transitions are of several categories or limbs.
     """
-    limb = transitions[0].limb
-    category = category_of(stance, transitions[0])
-    makes = LAYOUT[category][1]
-    if any(item.limb != limb or (item.contact is not None) != makes for item in transitions):
+    new = TransitionRows.of(transitions)
+    first = new[0]
+    category = category_of(stance, first)
+    limbs, makes = LAYOUT[category]
+    if (new.limb != first.limb).any() or (new.makes != makes).any():
         raise ValueError("transitions of one call must share their limb and category")
-    frame = Canonical(parent_frame(stance), not limb.is_left)
-    order = [limb_in.mirrored if frame.mirrored else limb_in for limb_in in LAYOUT[category][0]]
-    contacts = [stance[item] for item in order]
-    before, n = len(contacts), len(transitions)
+    frame = Canonical(parent_frame(stance), not first.limb.is_left)
+    contacts = [stance[limb.mirrored if frame.mirrored else limb] for limb in limbs]
+    before = frame.contacts(
+        np.array([contact.pose.position for contact in contacts]),
+        np.array([contact.pose.rotation for contact in contacts]),
+    )
     friction: float | np.ndarray = min(contact.friction for contact in contacts)
+    features = np.empty((len(new), feature_size(category)))
+    column = before.size
+    features[:, :column] = before.ravel()
     if makes:
-        new = [item.contact for item in transitions if item.contact is not None]
-        contacts += new
-        friction = np.minimum(friction, [contact.friction for contact in new])
-    rows = frame.contacts(contacts)
-    features = np.empty((n, feature_size(category)))
-    column = CONTACT * before
-    features[:, :column] = rows[:before].ravel()
-    if makes:
-        features[:, column : column + CONTACT] = rows[before:]
+        features[:, column : column + CONTACT] = frame.contacts(new.position, new.rotation)
         column += CONTACT
+        friction = np.minimum(friction, new.friction)
     features[:, column : column + 3] = frame.point(np.asarray(com, float))
     features[:, column + 3 : column + 6] = frame.vector(np.asarray(com_velocity, float))
-    features[:, column + 6] = [item.timing.shift for item in transitions]
-    features[:, column + 7] = [item.timing.swing for item in transitions]
-    features[:, column + 8] = friction
+    features[:, column + 6], features[:, column + 7], features[:, column + 8] = new.shift, new.swing, friction
     return frame, features
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,7 +63,7 @@ class KinematicEvaluator:
         self._home_width = float(left - right)
 
     def evaluate(
-        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
     ) -> TransitionBatch:
         """Judge transitions; see `TransitionEvaluator`."""
         config, n = self._config, len(transitions)
@@ -107,7 +108,9 @@ class KinematicEvaluator:
         return com
 
     @staticmethod
-    def _feet(stance: Stance, transitions: list[ContactTransition], limb) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _feet(
+        stance: Stance, transitions: Sequence[ContactTransition], limb
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions, rotations and friction of one foot after each transition."""
         contacts: list[Contact] = [
             item.contact if item.limb == limb and item.contact is not None else stance[limb] for item in transitions

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,8 +11,8 @@ import numpy as np
 from toolkit.contacts.category import Category, category_of
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
+from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.errors import NetworkError
-from toolkit.geometry.limb import Limb
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.prediction.features import TIMING_AND_FRICTION, encode
 from toolkit.prediction.network import TransitionNetwork, load_network, network_path
@@ -50,26 +51,25 @@ class NetworkEvaluator:
     outside_count: int = field(default=0, init=False)
 
     def evaluate(
-        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
     ) -> TransitionBatch:
         """Judge transitions; see `TransitionEvaluator`.
 
         Raises:
             NetworkError: the state or a contact is not finite, or there is no network for a category.
         """
-        n = len(transitions)
+        all_rows, n = TransitionRows.of(transitions), len(transitions)
         feasible, objective = np.zeros(n, bool), np.zeros(n)
         end_com, end_velocity = np.zeros((n, 3)), np.zeros((n, 3))
-        groups: dict[tuple[Limb, bool], list[int]] = {}
-        for index, transition in enumerate(transitions):
-            groups.setdefault((transition.limb, transition.contact is None), []).append(index)
-        for indices in groups.values():
-            rows = np.array(indices)
-            category = category_of(stance, transitions[indices[0]])
+        group = 2 * all_rows.limb + all_rows.makes
+        for code in np.unique(group):
+            rows = np.flatnonzero(group == code)
+            same = all_rows.select(rows)
+            category = category_of(stance, same[0])
             network = self.networks.get(category)
             if network is None:
                 raise NetworkError(f"no network for category {int(category)} ({category.name.lower()}) is loaded")
-            frame, features = encode(stance, com, com_velocity, [transitions[i] for i in indices])
+            frame, features = encode(stance, com, com_velocity, same)
             if not np.isfinite(features).all():
                 raise NetworkError(f"a query of category {int(category)} holds NaN or infinite values")
             inside = self._inside(network, features)
@@ -77,7 +77,7 @@ class NetworkEvaluator:
             if len(rows_out):
                 self.outside_count += len(rows_out)
                 if self.outside is not None:
-                    batch = self.outside.evaluate(stance, com, com_velocity, [transitions[i] for i in rows_out])
+                    batch = self.outside.evaluate(stance, com, com_velocity, all_rows.select(rows_out))
                     feasible[rows_out], objective[rows_out] = batch.feasible, batch.objective
                     end_com[rows_out], end_velocity[rows_out] = batch.com, batch.com_velocity
                     rows, features = rows[inside], features[inside]

@@ -43,7 +43,7 @@ class OptimiserEvaluator:
         self._final_at_rest = final_at_rest
 
     def evaluate(
-        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
     ) -> TransitionBatch:
         """Judge transitions; see `TransitionEvaluator`.
 

@@ -81,6 +81,10 @@ class ContactTable:
             self._objects[number] = found
         return found
 
+    def rows(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions (n, 3) m, rotations (n, 3, 3) and frictions (n,) of contacts (n,); of -1 those of any contact."""
+        return self.position[numbers], self.rotation[numbers], self._friction[self.surface[numbers]]
+
     def slide(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where whoever stands on contacts (n,) alone slides.
 

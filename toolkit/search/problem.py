@@ -13,6 +13,7 @@ import numpy as np
 
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
+from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.geometry.limb import PALMS, Limb
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
@@ -112,7 +113,8 @@ class ContactProblem:
         self._drift = Drift(robot, table, timings)
         per_metre = 1.0 + config.step / longest
         self._haste = None if haste is None else Haste(table, robot.com_height, forced, per_metre, haste)
-        self._durations = np.array([item.shift + item.swing for item in timings])
+        self._shifts, self._swings = np.array([(item.shift, item.swing) for item in timings]).T
+        self._durations = self._shifts + self._swings
         numbers = np.full((1, 4), -1)
         for contact in start.contacts:
             numbers[0, contact.limb] = table.add_contact(contact)
@@ -147,6 +149,20 @@ class ContactProblem:
     def _transition(self, limb: int, number: int, timing: int) -> ContactTransition:
         contact = self._table.contact(number) if number >= 0 else None
         return ContactTransition(_LIMBS[limb], contact, self._timings[timing])
+
+    def _transitions(self, candidates: Candidates) -> TransitionRows:
+        limb, number, timing = candidates.limb, candidates.number, candidates.timing
+        position, rotation, friction = self._table.rows(number)
+        return TransitionRows(
+            limb,
+            number >= 0,
+            position,
+            rotation,
+            friction,
+            self._shifts[timing],
+            self._swings[timing],
+            lambda row: self._transition(int(limb[row]), int(number[row]), int(timing[row])),
+        )
 
     def feet(self, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean of the feet (n, 3) m and its heading (n,) rad of contact numbers (n, 4)."""
@@ -216,12 +232,7 @@ class ContactProblem:
         """Edges that the evaluator and the reach of the limbs allow; None where there is no time left to ask."""
         pending = len(row) > OLD
         contacts, com, velocity = _before(row)[CONTACTS], row[COM] / 1000.0, row[VELOCITY] / 1000.0
-        transitions = [
-            self._transition(*item)
-            for item in zip(
-                candidates.limb.tolist(), candidates.number.tolist(), candidates.timing.tolist(), strict=True
-            )
-        ]
+        transitions = self._transitions(candidates)
         began = time.perf_counter()
         if began + self._pace.get(id(evaluator), 0.0) * len(transitions) > self.deadline:
             return None

@@ -70,7 +70,7 @@ class QuasiStaticEvaluator:
         self._programs: dict[bytes, np.ndarray | None] = {}
 
     def evaluate(
-        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
+        self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
     ) -> TransitionBatch:
         """Judge transitions; see `TransitionEvaluator`. The objective is 0."""
         n = len(transitions)

@@ -95,10 +95,13 @@ class ReachCheck:
         shift, total = self._shift[candidates.timing], self._total[candidates.timing]
         yaw = np.full(n, mean_feet(table, contacts[None])[1][0])
         left, right = np.full(n, contacts[0]), np.full(n, contacts[1])
-        broken = np.full(n, 0)
+        broken, rows = np.zeros(n, int), np.arange(n)
         for lag in self._config.lift_off:
-            lift = _cubic(com, velocity, end, end_velocity, lag * shift / total, total)
-            broken = np.where(broken >= 0, self._violated(lift, yaw, left, right), -1)
+            if len(rows):
+                part, time = lag * shift[rows] / total[rows], total[rows]
+                lift = _cubic(com, velocity, end[rows], end_velocity[rows], part, time)
+                broken[rows] = self._violated(lift, yaw[rows], left[rows], right[rows])
+                rows = rows[broken[rows] >= 0]
         _enter(codes, broken)
         for palm in self._palms:
             held = np.flatnonzero(after[:, palm] >= 0)
