@@ -29,9 +29,10 @@ def growth_jobs(settings: TrialSettings, args: argparse.Namespace) -> list[Job]:
     settings = replace(settings, planning=planning)
     jobs = []
     for length in args.lengths:
+        rows = max(round(length / TILE), 1)
         for index in range(args.growth_trials):
-            case = Case(KIND, args.seed_offset + index, (("rows", max(round(length / TILE), 1)),))
-            jobs.append(Job(f"growth-{case.name}", growth_trial, (settings, case)))
+            case = Case(KIND, args.seed_offset + index, (("rows", rows),))
+            jobs.append(Job(f"growth-{case.name}", growth_trial, (settings, case, rows * TILE)))
     return jobs
 
 
@@ -45,13 +46,14 @@ def exponent(lengths: Sequence[float], figures: Sequence[float]) -> float | None
 
 
 def summarise(records: Sequence[Record]) -> dict[str, Any]:
-    """One row per length and the fitted exponents."""
+    """One row per length of the rubble, and the exponents fitted to it: the flat ground before and behind is free."""
     rows = []
     for length in sorted({record["length"] for record in records if "length" in record}):
         same = [record for record in records if record.get("length") == length]
         rows.append(
             {
                 "length": length,
+                "way": median(values(same, "way")),
                 "trials": len(same),
                 "found": sum(record["found"] for record in same),
                 "first_seconds": median(values(same, "first_seconds")),
@@ -76,6 +78,7 @@ def summarise(records: Sequence[Record]) -> dict[str, Any]:
 def table(summary: dict[str, Any], time_limit: float) -> str:
     """The rows in Markdown and the exponents below."""
     header = (
+        "rubble [m]",
         "way [m]",
         "trials",
         "found",
@@ -91,6 +94,7 @@ def table(summary: dict[str, Any], time_limit: float) -> str:
     rows = [
         (
             f"{row['length']:.1f}",
+            number(row["way"], ".1f"),
             str(row["trials"]),
             str(row["found"]),
             *(
@@ -108,7 +112,7 @@ def table(summary: dict[str, Any], time_limit: float) -> str:
     ]
     fits = summary["exponents"]
     text = ", ".join(f"{name.replace('_', ' ')} {number(value, '.2f')}" for name, value in fits.items())
-    return f"{markdown_table(header, rows)}\n\nFitted exponents over the length: {text}."
+    return f"{markdown_table(header, rows)}\n\nFitted exponents over the length of the rubble: {text}."
 
 
 def goals_of(summary: dict[str, Any], time_limit: float) -> list[Goal]:

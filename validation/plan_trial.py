@@ -194,11 +194,18 @@ def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: b
     }
 
 
-def growth_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
-    """A search for its whole time limit, without a limit on expansions: how time and memory grow with the world."""
+def growth_trial(settings: TrialSettings, case: Case, length: float) -> dict[str, Any]:
+    """A search for its whole time limit, without a limit on expansions: how time and memory grow with the world.
+
+    Args:
+        settings: of the planner.
+        case: the world.
+        length: m; of its rubble.
+    """
     world = case.world()
     record = {"kind": case.kind, "seed": case.seed, "found": False, "passed": False, "stage": "planning"}
-    record["length"] = float(np.hypot(*(world.goal.position - world.start.position)[:2]))
+    record["length"] = length
+    record["way"] = float(np.hypot(*(world.goal.position - world.start.position)[:2]))
     limit = settings.planning.time_limit
     warm_up(WarmUp(settings.robot, settings.robots, settings.planner))
     try:

@@ -1,4 +1,6 @@
+import gc
 import math
+import weakref
 
 import networkx as nx
 import numpy as np
@@ -181,3 +183,17 @@ def test_delays_change_the_order_and_nothing_else(epsilon):
         assert [path.cost for path in plain.paths[-1:]] == pytest.approx([path.cost for path in delayed.paths[-1:]])
         orders.add(plain.expanded == delayed.expanded)
     assert False in orders
+
+
+def test_a_finished_search_leaves_nothing_behind():
+    """Its memory goes with it, without a garbage collection: a world's maps hang on the problem."""
+    graph = Graph(np.random.default_rng(3))
+    search = AnaStar(graph, np.random.default_rng(0))
+    search.run()
+    gone = weakref.ref(graph), weakref.ref(search)
+    gc.disable()
+    try:
+        del graph, search
+        assert [reference() for reference in gone] == [None, None]
+    finally:
+        gc.enable()

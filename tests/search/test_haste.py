@@ -72,11 +72,11 @@ def test_layers_share_the_random_draws():
     g, h = [0.0] * 1001, [0.5] * 1000 + [9.5]
     lonely = 0
     for seed in range(20):
-        nodes = OpenList(lambda node: float(node), g, h, 1.0)
+        nodes = OpenList(g, h, 1.0)
         for node in range(1001):
-            nodes.add(node)
+            nodes.add(node, float(node))
         rng = np.random.default_rng(seed)
-        taken = [nodes.take_random(rng) for _ in range(6)]
+        taken = [nodes.take_random(rng, float) for _ in range(6)]
         assert len(set(taken)) == 6
         assert sorted(node for node in taken if node < 1000) == [node for node in taken if node < 1000]  # best first
         lonely += 1000 in taken
@@ -85,10 +85,10 @@ def test_layers_share_the_random_draws():
 
 def test_open_list_keeps_what_it_is_told_to_keep():
     h = [0.5, 1.5, 2.5, 3.5]
-    nodes = OpenList(lambda node: -float(node), [0.0] * 4, h, 1.0)
+    nodes = OpenList([0.0] * 4, h, 1.0)
     for node in range(4):
-        nodes.add(node)
-    nodes.reset([0, 2])
+        nodes.add(node, -float(node))
+    nodes.reset([0, 2], lambda node: -float(node))
     rng = np.random.default_rng(0)
-    assert {nodes.take_random(rng), nodes.take_best()} == {0, 2}
+    assert {nodes.take_random(rng, float), nodes.take_best(float)} == {0, 2}
     assert len(nodes) == 0

@@ -113,7 +113,14 @@ def test_the_exponent_of_a_power_law_is_found():
     assert growth.exponent([4, 4], [1.0, 2.0]) is None
     assert growth.exponent([4, 8], [1.0, 0.0]) is None
     rows = [
-        {"length": x, "found": True, "first_processor_seconds": x**2, "first_memory_gain": x, "first_expansions": x}
+        {
+            "length": x,
+            "way": x + 1.8,
+            "found": True,
+            "first_processor_seconds": x**2,
+            "first_memory_gain": x,
+            "first_expansions": x,
+        }
         for x in (4.0, 8.0)
     ]
     results = {goal.name: goal.result for goal in growth.goals_of(growth.summarise(rows), 30.0)}

@@ -116,7 +116,7 @@ class AnaStar(Generic[State]):
         self._delay: list[float] = []
         self._crowd: list[Hashable] = []
         self._expanded_in: dict[Hashable, int] = {}
-        self._open = OpenList(self._priority, self._g, self._h, self._config.layer)
+        self._open = OpenList(self._g, self._h, self._config.layer)
         self._crowding = self._config.crowding
         self._forbidden: set[tuple[State, State]] = set()
 
@@ -155,7 +155,7 @@ class AnaStar(Generic[State]):
             node = self._next()
             goals = self._expand(node)
             if goals is None:
-                self._open.add(node)
+                self._open.add(node, self._priority(node))
                 stopped_by = "time"
                 break
             expanded.append(self._state[node])
@@ -220,7 +220,7 @@ class AnaStar(Generic[State]):
             self._delay[node] = edge.delay
         else:
             return
-        self._open.add(node)
+        self._open.add(node, self._priority(node))
 
     def _priority(self, node: int) -> float:
         """Falls as e(s) rises."""
@@ -236,8 +236,8 @@ class AnaStar(Generic[State]):
     def _next(self) -> int:
         """Close and return the node to expand."""
         if self._config.epsilon > 0 and self._rng.random() < self._config.epsilon:
-            return self._open.take_random(self._rng)
-        return self._open.take_best()
+            return self._open.take_random(self._rng, self._priority)
+        return self._open.take_best(self._priority)
 
     def _reach(self, node: int, edge: Edge[State], began: float, expansions: int) -> Path[State] | None:
         """Take an edge to a goal if it improves on the best solution and the judge agrees."""
@@ -295,4 +295,4 @@ class AnaStar(Generic[State]):
 
     def _prune(self) -> None:
         """Close what cannot improve on the new G and sort the rest by the new e."""
-        self._open.reset([node for node in self._open if self._g[node] + self._h[node] < self._best])
+        self._open.reset([n for n in self._open if self._g[n] + self._h[n] < self._best], self._priority)

@@ -9,16 +9,19 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 
 _Entry = tuple[float, int, int, float]  # priority, order, node, g
+Priority = Callable[[int], float]
 
 
 class OpenList:
-    """Open nodes, sorted by a priority that may rise while they wait.
+    """Open nodes, sorted by a priority that may rise while they wait; the least is the best.
 
     Random draws are uniform, or, with layers, take the best node of a random layer: of those nodes whose h lies in the
     same interval. So every depth of the search gets its share, however many nodes are open at the others.
 
+    Whoever takes a node brings the function that gives its priority now: held here, it would tie the search and the
+    list into a circle, which keeps all their memory until the garbage collector comes round.
+
     Args:
-        priority: of a node; the least is the best.
         g: of every node, kept up to date by the search: a node that has a lower one since it was added was added again.
         h: of every node.
         layer: width of the intervals of h; inf: uniform draws.
@@ -28,8 +31,8 @@ class OpenList:
         AAAI 2014.
     """
 
-    def __init__(self, priority: Callable[[int], float], g: Sequence[float], h: Sequence[float], layer: float):
-        self._priority, self._g, self._h, self._layer = priority, g, h, layer
+    def __init__(self, g: Sequence[float], h: Sequence[float], layer: float):
+        self._g, self._h, self._layer = g, h, layer
         self._nodes: list[int] = []  # in no order, for random draws
         self._place: dict[int, int] = {}  # of each node in _nodes
         self._heap: list[_Entry] = []
@@ -42,23 +45,23 @@ class OpenList:
     def __iter__(self) -> Iterator[int]:
         return iter(self._nodes)
 
-    def add(self, node: int) -> None:
+    def add(self, node: int, priority: float) -> None:
         """Open a node, or sort it in again."""
         if node not in self._place:
             self._place[node] = len(self._nodes)
             self._nodes.append(node)
-        entry = self._entry(node)
+        entry = self._entry(node, priority)
         heapq.heappush(self._heap, entry)
         if self._layer < math.inf:
             heapq.heappush(self._layers.setdefault(self._layer_of(node), []), entry)
 
-    def take_best(self) -> int:
+    def take_best(self, priority: Priority) -> int:
         """Close the best node."""
-        node = self._take(self._heap)
+        node = self._take(self._heap, priority)
         assert node is not None  # every open node has a fresh entry
         return node
 
-    def take_random(self, rng: np.random.Generator) -> int:
+    def take_random(self, rng: np.random.Generator, priority: Priority) -> int:
         """Close a random node; see the class."""
         if self._layer == math.inf:
             node = self._nodes[int(rng.integers(len(self._nodes)))]
@@ -67,39 +70,39 @@ class OpenList:
         while True:
             layers = list(self._layers)
             layer = layers[int(rng.integers(len(layers)))]
-            node = self._take(self._layers[layer])
+            node = self._take(self._layers[layer], priority)
             if node is not None:
                 return node
             del self._layers[layer]
 
-    def reset(self, nodes: Iterable[int]) -> None:
+    def reset(self, nodes: Iterable[int], priority: Priority) -> None:
         """Keep these nodes alone and sort them anew."""
         self._nodes = list(nodes)
         self._place = {node: place for place, node in enumerate(self._nodes)}
         self._heap, self._layers = [], {}
         for node in sorted(self._nodes):
-            entry = self._entry(node)
+            entry = self._entry(node, priority(node))
             self._heap.append(entry)
             if self._layer < math.inf:
                 self._layers.setdefault(self._layer_of(node), []).append(entry)
         for heap in (self._heap, *self._layers.values()):
             heapq.heapify(heap)
 
-    def _entry(self, node: int) -> _Entry:
+    def _entry(self, node: int, priority: float) -> _Entry:
         self._pushes += 1
         # Equal priorities: the newest first, which keeps the search going in depth.
-        return self._priority(node), -self._pushes, node, self._g[node]
+        return priority, -self._pushes, node, self._g[node]
 
     def _layer_of(self, node: int) -> int:
         return int(self._h[node] / self._layer)
 
-    def _take(self, heap: list[_Entry]) -> int | None:
+    def _take(self, heap: list[_Entry], current: Priority) -> int | None:
         """Close the best node of a heap; None where none is open."""
         while heap:  # entries of closed nodes and of older paths are stale
             priority, order, node, g = heapq.heappop(heap)
             if node not in self._place or g != self._g[node]:
                 continue
-            now = self._priority(node)
+            now = current(node)
             if now > priority:  # it has become worse since: back with it
                 heapq.heappush(heap, (now, order, node, g))
                 continue
