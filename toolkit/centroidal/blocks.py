@@ -6,7 +6,7 @@ nodes, and hands the solvers ready-made derivatives instead of letting them diff
 
 The Hessian is Gauss-Newton in the objective: sum_i rho_i(v)^2 + linear(v) has the Hessian 2 Jrho^T Jrho. Objective and
 rows add more curvature only where a piece knows a convex part of it, so the Hessian is positive semidefinite whatever
-the point and the multipliers: the solvers need no regularisation (Fatrop's search for one has no end on bad points).
+the point and the multipliers: the solver needs no regularisation.
 """
 
 from __future__ import annotations
@@ -60,7 +60,6 @@ class Piece:
         if curvature is not None:
             hessian = hessian + curvature(multiplier)
         hessian = ca.triu2symm(ca.triu(hessian + ca.SX(hessian.sparsity().T, 0)))
-        lagrangian = ca.gradient(weight * cost + ca.dot(multiplier, rows), v)  # by reverse mode
         self.size, self.parameters, self.rows = v.numel(), p.numel(), rows.numel()
         self.jacobian_pattern = _pattern(jacobian)
         self.hessian_pattern = _pattern(hessian)
@@ -72,7 +71,7 @@ class Piece:
         self.value = function("value", [v, p], [rows])
         self.gradient = function("gradient", [v, p], [cost, ca.densify(gradient)])
         self.first = function("first", [v, p], [rows, jacobian.nz[:]])
-        self.second = function("second", [v, p, weight, multiplier], [ca.densify(lagrangian), hessian.nz[:]])
+        self.second = function("second", [v, p, weight, multiplier], [hessian.nz[:]])
 
 
 class Parameters:
@@ -134,12 +133,8 @@ class Assembly:
         """All parameters in the order that the functions take them."""
         return np.concatenate([block.parameters.ravel() for block in self.blocks])
 
-    def functions(self, upper_hessian: bool) -> dict[str, ca.Function]:
-        """Functions by the names that CasADi's solvers use.
-
-        Args:
-            upper_hessian: the upper triangle of the Hessian alone (Ipopt), else gradient and whole Hessian (Fatrop).
-        """
+    def functions(self) -> dict[str, ca.Function]:
+        """Functions by the names by which CasADi hands them to Ipopt."""
         x = ca.MX.sym("x", self.size)
         p = ca.MX.sym("p", sum(block.parameters.size for block in self.blocks))
         weight, multiplier = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
@@ -170,34 +165,24 @@ class Assembly:
         to_x = self._scatter([block.variables for block in self.blocks], self.size)
         to_g = self._scatter([block.rows for block in self.blocks], self.rows)
         jac_pattern, to_jac = self._jacobian()
-        hess_pattern, to_hess = self._hessian(upper_hessian)
+        hess_pattern, to_hess = self._hessian()
         cost, value = mapped("cost"), mapped("value")
         gradient, first = mapped("gradient"), mapped("first")
         second = mapped("second", ca.MX(weight), lam)
         f, g = total(cost), to_g @ stacked(value, 0)
         grad_f = to_x @ stacked(gradient, 1)
         jac = ca.MX(jac_pattern, to_jac @ stacked(first, 1))
-        grad_l = to_x @ stacked(second, 0)
-        hess = ca.MX(hess_pattern, to_hess @ stacked(second, 1))
-        inputs, dual = [x, p], [x, p, weight, multiplier]
-        names, dual_names = ["x", "p"], ["x", "p", "lam_f", "lam_g"]
-        gradient_outputs, hessian_outputs = ([grad_f], [grad_l, hess])
-        gradient_names, hessian_names = (["grad_f_x"], ["grad_gamma_x", "hess_gamma_x_x"])
-        if upper_hessian:
-            gradient_outputs, gradient_names = [total(gradient), grad_f], ["f", "grad_f_x"]
-            hessian_outputs, hessian_names = [hess], ["triu_hess_gamma_x_x"]
-        zeros = ca.MX(p.sparsity(), 0)
+        hess = ca.MX(hess_pattern, to_hess @ stacked(second, 0))
+        inputs, names = [x, p], ["x", "p"]
+        dual, dual_names = [x, p, weight, multiplier], ["x", "p", "lam_f", "lam_g"]
         make = ca.Function
         return {
             "nlp": make("nlp", inputs, [f, g], names, ["f", "g"]),
             "nlp_f": make("nlp_f", inputs, [f], names, ["f"]),
             "nlp_g": make("nlp_g", inputs, [g], names, ["g"]),
-            "nlp_grad_f": make("nlp_grad_f", inputs, gradient_outputs, names, gradient_names),
+            "nlp_grad_f": make("nlp_grad_f", inputs, [total(gradient), grad_f], names, ["f", "grad_f_x"]),
             "nlp_jac_g": make("nlp_jac_g", inputs, [to_g @ stacked(first, 0), jac], names, ["g", "jac_g_x"]),
-            "nlp_hess_l": make("nlp_hess_l", dual, hessian_outputs, dual_names, hessian_names),
-            "nlp_grad": make(
-                "nlp_grad", dual, [f, g, grad_l, zeros], dual_names, ["f", "g", "grad_gamma_x", "grad_gamma_p"]
-            ),
+            "nlp_hess_l": make("nlp_hess_l", dual, [hess], dual_names, ["triu_hess_gamma_x_x"]),
         }
 
     @staticmethod
@@ -215,15 +200,15 @@ class Assembly:
             column.append(block.variables[:, c].ravel())
         return _gathered(np.concatenate(row), np.concatenate(column), self.rows, self.size)
 
-    def _hessian(self, upper: bool) -> tuple[ca.Sparsity, ca.MX]:
-        """Pattern of the Hessian (or its upper triangle), and the matrix from stacked entries to its nonzeros."""
+    def _hessian(self) -> tuple[ca.Sparsity, ca.MX]:
+        """Pattern of the Hessian's upper triangle, and the matrix from stacked entries to its nonzeros."""
         row, column = [], []
         for block in self.blocks:
             r, c = block.piece.hessian_pattern
             row.append(block.variables[:, r].ravel())
             column.append(block.variables[:, c].ravel())
         row, column = np.concatenate(row), np.concatenate(column)
-        return _gathered(row, column, self.size, self.size, row <= column if upper else None)
+        return _gathered(row, column, self.size, self.size, row <= column)
 
 
 def _gathered(

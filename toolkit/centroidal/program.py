@@ -1,4 +1,4 @@
-"""The whole-sequence problem as an optimal-control program in the layout of Fatrop: stages of states and controls.
+"""The whole-sequence problem as an optimal-control program: stages of states and controls.
 
 Stage t holds the state at knot t, the wrench and two slacks of each contact of step t, the excess and the body's slack
 of the step; the last one a state and the body's slack. Rows of stage t are the dynamics to knot t + 1, then its
