@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from safetensors import SafetensorError, safe_open
 
 from toolkit.contacts.category import Category
 from toolkit.errors import NetworkError
-from toolkit.prediction.features import COM, TARGETS, feature_size
+from toolkit.prediction.features import COM, TARGETS, TIMING_AND_FRICTION, feature_size
 
 SCHEMA = "transition-network-3"
 HIDDEN = 256
@@ -86,6 +87,18 @@ class TransitionNetwork:
     lower: np.ndarray
     upper: np.ndarray
     metadata: dict[str, str]
+
+    @cached_property
+    def _trained(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest timing and friction of the training, with 1 % to spare."""
+        lower, upper = self.lower[TIMING_AND_FRICTION], self.upper[TIMING_AND_FRICTION]
+        slack = 0.01 * (upper - lower) + 1e-6
+        return lower - slack, upper + slack
+
+    def knows(self, features: np.ndarray) -> np.ndarray:
+        """(n,) bool: whether the timing and friction of features (n, d) lie within the training range."""
+        values, (least, most) = features[:, TIMING_AND_FRICTION], self._trained
+        return ((values >= least) & (values <= most)).all(1)
 
     def feasible(self, features: np.ndarray) -> np.ndarray:
         """(n,) bool for features (n, d)."""

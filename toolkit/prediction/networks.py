@@ -14,7 +14,7 @@ from toolkit.contacts.stance import Stance
 from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.errors import NetworkError
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
-from toolkit.prediction.features import TIMING_AND_FRICTION, encode
+from toolkit.prediction.features import encode
 from toolkit.prediction.network import TransitionNetwork, load_network, network_path
 from toolkit.robot.model import RobotModel
 
@@ -62,9 +62,9 @@ class NetworkEvaluator:
         feasible, objective = np.zeros(n, bool), np.zeros(n)
         end_com, end_velocity = np.zeros((n, 3)), np.zeros((n, 3))
         group = 2 * all_rows.limb + all_rows.makes
-        for code in np.unique(group):
+        for code in dict.fromkeys(group.tolist()):
             rows = np.flatnonzero(group == code)
-            same = all_rows.select(rows)
+            same = all_rows if len(rows) == n else all_rows.select(rows)
             category = category_of(stance, same[0])
             network = self.networks.get(category)
             if network is None:
@@ -72,7 +72,7 @@ class NetworkEvaluator:
             frame, features = encode(stance, com, com_velocity, same)
             if not np.isfinite(features).all():
                 raise NetworkError(f"a query of category {int(category)} holds NaN or infinite values")
-            inside = self._inside(network, features)
+            inside = network.knows(features)
             rows_out = rows[~inside]
             if len(rows_out):
                 self.outside_count += len(rows_out)
@@ -92,11 +92,3 @@ class NetworkEvaluator:
                 end_com[kept] = frame.point_back(outputs[:, 1:4])
                 end_velocity[kept] = frame.vector_back(outputs[:, 4:7])
         return TransitionBatch(feasible, objective, end_com, end_velocity)
-
-    @staticmethod
-    def _inside(network: TransitionNetwork, features: np.ndarray) -> np.ndarray:
-        """(n,) bool: timing and friction within the training range, with 1 % to spare."""
-        lower, upper = network.lower[TIMING_AND_FRICTION], network.upper[TIMING_AND_FRICTION]
-        slack = 0.01 * (upper - lower) + 1e-6
-        values = features[:, TIMING_AND_FRICTION]
-        return np.all((values >= lower - slack) & (values <= upper + slack), axis=1)

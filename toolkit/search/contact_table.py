@@ -52,15 +52,15 @@ class ContactTable:
         data, size = rounded.tobytes(), rounded.itemsize * 6
         while len(self._number) + n > len(self.yaw):
             self._grow()
-        numbers = np.empty(n, np.int64)
-        for row in range(n):
-            key = data[row * size : (row + 1) * size]
-            number = self._number.get(key)
-            if number is None:
-                number = self._number[key] = len(self._number)
-                self.position[number], self.rotation[number] = patches.position[row], patches.rotation[row]
-                self.yaw[number], self.surface[number], self.limb[number] = yaw[row], patches.surface[row], limb
-            numbers[row] = number
+        known = self._number
+        first = len(known)
+        keys = [data[start : start + size] for start in range(0, n * size, size)]
+        numbers = np.array([known.setdefault(key, len(known)) for key in keys], np.int64)
+        rows = np.flatnonzero(numbers >= first)[::-1]  # of two within the same rounding the first one is kept
+        if len(rows):
+            new = numbers[rows]
+            self.position[new], self.rotation[new] = patches.position[rows], patches.rotation[rows]
+            self.yaw[new], self.surface[new], self.limb[new] = yaw[rows], patches.surface[rows], limb
         return numbers
 
     def add_contact(self, contact: Contact) -> int:
