@@ -31,6 +31,9 @@ OPEN = 1e3  # bound of rows that are left free
 # What plans keep but where nothing else is feasible: a slide or a tilt cannot be undone without it.
 LEAST = Margins(friction=0.96, cop=(0.01, 0.01), yaw=0.95)
 SCALE = 1e-2  # of the objective inside the program
+# A foot whose rest takes more of its friction than the wanted margin leaves is wanted to keep what resting takes and
+# `RESERVE`, at most `FULL`: else the motion would lean and run to spare friction, and be the less safe for it.
+RESERVE, FULL = 0.1, 0.9
 
 
 @dataclass(frozen=True)
@@ -183,6 +186,8 @@ class Program:
                 [indices(self.layout.wrench[step, limb], CONTACT), self.layout.slack[step, :1]], 1
             )
             fixed = np.tile(np.concatenate([p.half_size[limb], wanted, least]), (len(step), 1))
+            if Limb(limb).is_foot:
+                fixed[:, 2] = _wanted_friction(p, step, limb)
             wanted_force = np.full(len(step), force)
             self._add(
                 self._pieces.contact, step, variables, p.friction[step, limb], fixed, weights, wanted_force, price[step]
@@ -363,6 +368,13 @@ class Program:
         normal = layout.wrench[step, limb] + 2
         self.variable_bounds[normal, 0] = 0.0
         self.variable_bounds[normal, 1] = p.max_normal_force[limb] / (p.mass * G)
+
+
+def _wanted_friction(problem: CentroidalProblem, step: np.ndarray, foot: int) -> np.ndarray:
+    """(n,) part of its friction that a foot's contact is wanted to use at most; see `RESERVE`."""
+    wanted, normal_z = problem.margins.friction, np.clip(problem.rotation[step, foot, 2, 2], 1e-6, 1.0)
+    rest = np.sqrt(1.0 - normal_z**2) / normal_z / np.maximum(problem.friction[step, foot], 1e-9)
+    return np.where(rest < 1.0, np.clip(rest + RESERVE, wanted, max(FULL, wanted)), wanted)
 
 
 def _home_height(problem: CentroidalProblem) -> np.ndarray:

@@ -32,6 +32,7 @@ from toolkit.prediction.features import LAYOUT
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.cost import CostConfig
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.world.loader import load_world
 from toolkit.world.timing import Timing
@@ -364,7 +365,10 @@ def _walk(robot: RobotModel, text: str, recorder: _Recorder, expansions: int, rn
     world = replace(load_world("training.xml", mjcf=text), goal=_NOWHERE)
     search = AnaStarConfig(epsilon=0.9, max_expansions=expansions)
     planner = ContactPlanner(
-        robot, world, recorder, PlannerConfig(heuristic="euclidean", wide_steps="on", search=search)
+        robot,
+        world,
+        recorder,
+        PlannerConfig(heuristic="euclidean", wide_steps="on", cost=CostConfig(steep=0.0), search=search),
     )
     with suppress(PlanningError):  # the ground at the start is too steep to stand on: another terrain
         planner.search(rng, np.inf)

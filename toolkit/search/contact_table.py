@@ -85,6 +85,11 @@ class ContactTable:
         """Positions (n, 3) m, rotations (n, 3, 3) and frictions (n,) of contacts (n,); of -1 those of any contact."""
         return self.position[numbers], self.rotation[numbers], self._friction[self.surface[numbers]]
 
+    def steepness(self, numbers: np.ndarray) -> np.ndarray:
+        """(n,) part of its friction that a foot needs to rest on contacts (n,); above 1 it slides."""
+        normal, friction = self.rotation[numbers, :, 2], self._friction[self.surface[numbers]]
+        return np.hypot(normal[:, 0], normal[:, 1]) / np.maximum(normal[:, 2] * friction, 1e-9)
+
     def slide(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where whoever stands on contacts (n,) alone slides.
 

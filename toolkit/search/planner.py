@@ -152,6 +152,7 @@ class ContactPlanner:
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
         evaluator, outside = self._suited(start, com)
         lazy = getattr(evaluator, "costly", False)
+        cost = replace(self.config.cost, steep=0.0) if slides else self.config.cost
         problem = ContactProblem(
             self.robot,
             moves,
@@ -164,7 +165,7 @@ class ContactPlanner:
             self._model(wide).longest_step + self.config.projection.shift,
             self._timings,
             palms and self.config.palms,
-            self.config.cost,
+            cost,
             self.config.reach,
             exclusions,
             lazy=lazy,
@@ -172,7 +173,7 @@ class ContactPlanner:
             haste=self.config.haste if slides and not lazy else None,
             forced=self._terrain.forced_acceleration(),
         )
-        judge = None if self._goal_evaluator is None else Arrival(problem, self._goal_evaluator, self.config.cost)
+        judge = None if self._goal_evaluator is None else Arrival(problem, self._goal_evaluator, cost)
         settings = self._settings(slides, lazy)
         if settings.initial_cost == np.inf and (lazy or not slides):
             way = float(distance(start.mean_feet.position[None], np.array([start.mean_feet.yaw]))[0])

@@ -224,6 +224,10 @@ class ContactProblem:
         cost = candidates.way + self._config.step
         if len(self._timings) > 1:
             cost = cost + self._config.time * self._durations[candidates.timing]
+        if self._config.steep > 0.0:
+            feet = np.flatnonzero(candidates.limb <= Limb.RIGHT_FOOT)
+            beyond = self._table.steepness(candidates.number[feet]) - self._config.gentle
+            cost[feet] += self._config.steep * np.maximum(beyond, 0.0)
         return cost + self._final_cost(candidates)
 
     def _judge(

@@ -152,13 +152,13 @@ def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig 
     Args:
         robot: the robot.
         world: the world.
-        config: settings; dynamics do not count in the cost.
+        config: settings; neither dynamics nor steepness count in the cost.
     """
     config, static = config or PlannerConfig(), QuasiStaticConfig()
     palms = config.palms and bool(robot.arms) and _walls_in_reach(robot, world)
     config = replace(
         config,
-        cost=replace(config.cost, dynamics=0.0),
+        cost=replace(config.cost, dynamics=0.0, steep=0.0),
         rest_friction=None if palms else static.friction,
         wide_steps="off" if config.wide_steps == "auto" else config.wide_steps,
         timings=config.timings[:1],
