@@ -10,7 +10,7 @@ from toolkit.centroidal.body import body_residuals
 from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_problem
 from toolkit.centroidal.pieces import pieces
 from toolkit.centroidal.problem import Margins
-from toolkit.centroidal.program import Landing, Program, Regularisers
+from toolkit.centroidal.program import Landing, Program, Regularisers, wanted_friction
 from toolkit.centroidal.residual import check, cop_margin, objective
 from toolkit.centroidal.sequence import WANTED, WANTED_BODY, SequenceConfig, optimise
 from toolkit.contacts.schedule import ContactSchedule
@@ -270,3 +270,16 @@ def test_a_lightly_loaded_contact_is_as_curved_along_its_load_as_its_objective()
     known = float(np.array(piece.second(v, p, 1.0, none)).ravel()[at])
     exact = (slope(0.02 + 1e-6) - slope(0.02 - 1e-6)) / 2e-6
     assert 0.9 * exact < known < 1.5 * exact
+
+
+def test_a_steep_tile_is_wanted_to_hold_what_resting_on_it_takes(walker):
+    """Between the wanted margin and the friction angle the margin gives way; beyond it nothing rests anyway."""
+    for needed, wanted in [(0.2, 0.66), (0.7, 0.8), (0.85, 0.9), (0.99, 0.9), (1.1, 0.66)]:
+        stance = Stance(tuple(foot(walker, limb, 0.0, slope=np.arctan(needed * 0.5)) for limb in FEET))
+        schedule = ContactSchedule.of(ContactSequence(stance, ()), final_rest=1.0)
+        config = SequenceConfig().problem
+        problem = sequence_problem(walker, schedule, initial_com(walker, stance), np.zeros(3), config=config)
+        steps = np.arange(problem.steps)
+        np.testing.assert_allclose(wanted_friction(problem, steps, 0), wanted, atol=1e-12)
+        unlimited = replace(problem, margins=Margins())
+        np.testing.assert_allclose(wanted_friction(unlimited, steps, 0), 1.0, atol=1e-12)

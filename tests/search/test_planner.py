@@ -232,3 +232,19 @@ def test_bad_settings():
 def test_a_start_at_the_goal_needs_no_transition(robot):
     result = plan(robot, make_world(FLOOR, goal=(0.05, 0, 0)))
     assert result.solutions[0].sequence.transitions == () and result.solutions[0].cost == 0.0
+
+
+def test_a_plan_goes_round_ground_that_nearly_slides(robot):
+    """The straight way leads over a tile that takes 87 % of its friction to rest on; beside it the ground is level."""
+    ends = [box((x, 0.3, -0.05), (0.5, 1.2, 0.05), friction=0.35) for x in (0, 1.8)]
+    tile = box((0.9, 0, -0.05), (0.4, 0.35, 0.05), euler=(17, 0, 0), friction=0.35)
+    beside = box((0.9, 0.95, -0.05), (0.4, 0.5, 0.05), friction=0.35)
+    world = make_world(*ends, tile, beside, goal=(1.8, 0, 0))
+    steep = {}
+    for weight in (500.0, 0.0):
+        config = PlannerConfig(cost=CostConfig(steep=weight), search=AnaStarConfig(max_expansions=400))
+        result = plan(robot, world, config, kinematic=KinematicConfig(friction=0.95))
+        assert result.solutions, result.reason
+        contacts = [item.contact for item in result.solutions[-1].sequence.transitions]
+        steep[weight] = sum(contact.pose.normal[2] < np.cos(np.radians(15.0)) for contact in contacts)
+    assert steep[500.0] == 0 < steep[0.0]

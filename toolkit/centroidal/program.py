@@ -187,7 +187,7 @@ class Program:
             )
             fixed = np.tile(np.concatenate([p.half_size[limb], wanted, least]), (len(step), 1))
             if Limb(limb).is_foot:
-                fixed[:, 2] = _wanted_friction(p, step, limb)
+                fixed[:, 2] = wanted_friction(p, step, limb)
             wanted_force = np.full(len(step), force)
             self._add(
                 self._pieces.contact, step, variables, p.friction[step, limb], fixed, weights, wanted_force, price[step]
@@ -370,7 +370,7 @@ class Program:
         self.variable_bounds[normal, 1] = p.max_normal_force[limb] / (p.mass * G)
 
 
-def _wanted_friction(problem: CentroidalProblem, step: np.ndarray, foot: int) -> np.ndarray:
+def wanted_friction(problem: CentroidalProblem, step: np.ndarray, foot: int) -> np.ndarray:
     """(n,) part of its friction that a foot's contact is wanted to use at most; see `RESERVE`."""
     wanted, normal_z = problem.margins.friction, np.clip(problem.rotation[step, foot, 2, 2], 1e-6, 1.0)
     rest = np.sqrt(1.0 - normal_z**2) / normal_z / np.maximum(problem.friction[step, foot], 1e-9)
