@@ -16,6 +16,7 @@ from toolkit.train import executor, progress_bar
 from validation.trial_file import TrialFile
 
 Record = dict[str, Any]
+_BATCH = 16  # trials of a process before a fresh one takes over: what it has freed stays with it, and looks like need
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -109,7 +110,10 @@ def run_jobs(jobs: Sequence[Job], store: TrialFile, options: PoolOptions, consol
 
 def _run_in_pools(jobs: list[Job], options: PoolOptions, keep: Callable[[Record], None]) -> None:
     """Run jobs in a pool; what was under way when a process died runs again alone, and fails if it dies again."""
-    suspects = _run_in_pool(jobs, options, options.workers, keep)
+    size = _BATCH * max(options.workers, 1)
+    suspects: list[tuple[Job, bool]] = []
+    for first in range(0, len(jobs), size):
+        suspects += _run_in_pool(jobs[first : first + size], options, options.workers, keep)
     while suspects:
         doubtful = [suspect for suspect in suspects if suspect[1]]
         for job, _ in doubtful:
