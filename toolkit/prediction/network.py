@@ -98,7 +98,7 @@ class TransitionNetwork:
     def knows(self, features: np.ndarray) -> np.ndarray:
         """(n,) bool: whether the timing and friction of features (n, d) lie within the training range."""
         values, (least, most) = features[:, TIMING_AND_FRICTION], self._trained
-        return ((values >= least) & (values <= most)).all(1)
+        return np.all((values >= least) & (values <= most), axis=1)
 
     def feasible(self, features: np.ndarray) -> np.ndarray:
         """(n,) bool for features (n, d)."""
