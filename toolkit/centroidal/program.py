@@ -24,7 +24,7 @@ from toolkit.centroidal.layout import Layout, indices
 from toolkit.centroidal.pieces import CONTACT, STATE, WRENCH, G, pieces
 from toolkit.centroidal.problem import CentroidalProblem, Margins
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.geometry.pose import rotation_about_z
+from toolkit.geometry.pose import rotation_about_z, steepness
 from toolkit.robot.model import RobotModel
 
 OPEN = 1e3  # bound of rows that are left free
@@ -372,8 +372,8 @@ class Program:
 
 def wanted_friction(problem: CentroidalProblem, step: np.ndarray, foot: int) -> np.ndarray:
     """(n,) part of its friction that a foot's contact is wanted to use at most; see `RESERVE`."""
-    wanted, normal_z = problem.margins.friction, np.clip(problem.rotation[step, foot, 2, 2], 1e-6, 1.0)
-    rest = np.sqrt(1.0 - normal_z**2) / normal_z / np.maximum(problem.friction[step, foot], 1e-9)
+    wanted = problem.margins.friction
+    rest = steepness(problem.rotation[step, foot, 2, 2]) / np.maximum(problem.friction[step, foot], 1e-9)
     return np.where(rest < 1.0, np.clip(rest + RESERVE, wanted, max(FULL, wanted)), wanted)
 
 

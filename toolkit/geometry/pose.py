@@ -88,6 +88,11 @@ def yaw_of(rotation: np.ndarray) -> np.ndarray | float:
     return np.arctan2(rotation[..., 1, 0], rotation[..., 0, 0])
 
 
+def steepness(normal_z: np.ndarray | float) -> np.ndarray:
+    """Rise over run (...,) of surfaces whose unit normals have the heights (...,): what resting takes of friction."""
+    return np.tan(np.arccos(np.clip(normal_z, 1e-6, 1.0)))
+
+
 def rotation_on_surface(normal: np.ndarray, yaw: np.ndarray | float) -> np.ndarray:
     """Frames with z along a surface normal and x along a heading projected on the surface.
 

@@ -8,7 +8,7 @@ from toolkit.centroidal.problem import GRAVITY
 from toolkit.contacts.projection import Projected
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
-from toolkit.geometry.pose import Pose, yaw_of
+from toolkit.geometry.pose import Pose, steepness, yaw_of
 
 _KEPT = 50_000  # Contact objects kept for reuse
 _LIMBS = tuple(Limb)
@@ -81,14 +81,13 @@ class ContactTable:
             self._objects[number] = found
         return found
 
-    def rows(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions (n, 3) m, rotations (n, 3, 3) and frictions (n,) of contacts (n,); of -1 those of any contact."""
-        return self.position[numbers], self.rotation[numbers], self._friction[self.surface[numbers]]
+    def friction(self, numbers: np.ndarray) -> np.ndarray:
+        """(n,) coefficients of contacts (n,)."""
+        return self._friction[self.surface[numbers]]
 
     def steepness(self, numbers: np.ndarray) -> np.ndarray:
         """(n,) part of its friction that a foot needs to rest on contacts (n,); above 1 it slides."""
-        normal, friction = self.rotation[numbers, :, 2], self._friction[self.surface[numbers]]
-        return np.hypot(normal[:, 0], normal[:, 1]) / np.maximum(normal[:, 2] * friction, 1e-9)
+        return steepness(self.rotation[numbers, 2, 2]) / np.maximum(self.friction(numbers), 1e-9)
 
     def slide(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where whoever stands on contacts (n,) alone slides.
@@ -96,7 +95,7 @@ class ContactTable:
         Returns:
             (n, 2) unit; downhill in XY. (n,) m/s^2; least horizontal acceleration that way, 0 where friction holds.
         """
-        normal, friction = self.rotation[numbers, :, 2], self._friction[self.surface[numbers]]
+        normal, friction = self.rotation[numbers, :, 2], self.friction(numbers)
         steep = np.hypot(normal[:, 0], normal[:, 1])  # sine of the angle
         gain = np.maximum(steep - friction * normal[:, 2], 0.0) * normal[:, 2] * -GRAVITY[2]
         return normal[:, :2] / np.maximum(steep, 1e-12)[:, None], gain

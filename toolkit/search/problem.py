@@ -152,13 +152,13 @@ class ContactProblem:
 
     def _transitions(self, candidates: Candidates) -> TransitionRows:
         limb, number, timing = candidates.limb, candidates.number, candidates.timing
-        position, rotation, friction = self._table.rows(number)
+        table = self._table
         return TransitionRows(
             limb,
             number >= 0,
-            position,
-            rotation,
-            friction,
+            table.position[number],
+            table.rotation[number],
+            table.friction(number),
             self._shifts[timing],
             self._swings[timing],
             lambda row: self._transition(int(limb[row]), int(number[row]), int(timing[row])),

@@ -21,7 +21,7 @@ from toolkit.centroidal.problem import Margins
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
-from toolkit.geometry.pose import rotation_about_z
+from toolkit.geometry.pose import rotation_about_z, steepness
 from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.robot.model import RobotModel
 from toolkit.search.legs import legs_of, violated
@@ -103,8 +103,7 @@ class QuasiStaticEvaluator:
 
     def _holds(self, contact: Contact) -> bool:
         """Whether the surface is within its friction angle."""
-        normal_z = max(contact.pose.normal[2], 1e-6)
-        return bool(np.tan(np.arccos(min(normal_z, 1.0))) <= self._config.friction * contact.friction)
+        return bool(steepness(contact.pose.normal[2]) <= self._config.friction * contact.friction)
 
     def _above(self, feet: list[Contact], touched: Stance) -> np.ndarray:
         """(k, 2) m; points above the support, from its middle towards the middle of the stance."""

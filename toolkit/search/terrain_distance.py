@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.centroidal.problem import GRAVITY
 from toolkit.contacts.projection import Projector
-from toolkit.geometry.pose import Pose
+from toolkit.geometry.pose import Pose, steepness
 from toolkit.robot.model import RobotModel
 from toolkit.search.heuristic import GridConfig, GridDistance
 from toolkit.search.occupancy import BodyBox, Occupancy
@@ -29,14 +29,12 @@ def resting_surfaces(surfaces: Sequence[Surface], friction: float | None) -> tup
     if friction is None:
         return tuple(surfaces)
     return tuple(
-        replace(surface, serves_foot=surface.serves_foot and _steepness(surface) <= friction * surface.friction)
+        replace(
+            surface,
+            serves_foot=surface.serves_foot and bool(steepness(surface.normal[2]) <= friction * surface.friction),
+        )
         for surface in surfaces
     )
-
-
-def _steepness(surface: Surface) -> float:
-    """Tangent of the angle between the surface and the horizontal."""
-    return float(np.tan(np.arccos(np.clip(surface.normal[2], 1e-6, 1.0))))
 
 
 class TerrainDistance:
@@ -123,9 +121,9 @@ class TerrainDistance:
     def too_steep(self, friction: float) -> str:
         """One line on why nothing leads to the goal for a robot whose feet must rest."""
         world = self._world
-        steep = [s for s in world.surfaces if s.serves_foot and _steepness(s) > friction * s.friction]
-        worst = max(steep, key=lambda surface: _steepness(surface) / surface.friction)
-        angle, most = np.degrees(np.arctan([_steepness(worst), worst.friction]))
+        steep = [s for s in world.surfaces if s.serves_foot and steepness(s.normal[2]) > friction * s.friction]
+        worst = max(steep, key=lambda surface: steepness(surface.normal[2]) / surface.friction)
+        angle, most = np.degrees(np.arctan([float(steepness(worst.normal[2])), worst.friction]))
         x, y = world.goal.position[:2]
         return (
             f"{world.path}: nothing leads to the goal at ({x:.3g}, {y:.3g}) in static balance: the ground on the way "
