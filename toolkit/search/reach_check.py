@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.contacts.arm_map import ArmMap
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.search import screen
 from toolkit.search.candidates import Candidates, mean_feet
@@ -28,11 +28,14 @@ class ReachConfig:
         lift_off: parts of the shift time at whose CoM the legs may reach at lift-off, since when the CoM moves is the
             optimiser's choice.
         arm_margin: m; an arm in contact reaches so much less far than it could, since the CoM moves in between.
+        arm_sway: m; how far the CoM may stay short of being over the foot that stands while the other one swings, for
+            the sake of an arm in contact.
     """
 
     com_drops: tuple[float, ...] = (0.0, 0.03, 0.06, 0.1)
     lift_off: tuple[float, ...] = (1.0, 0.5)
     arm_margin: float = 0.05
+    arm_sway: float = 0.05
 
 
 class ReachCheck:
@@ -117,6 +120,12 @@ class ReachCheck:
                 local = [np.stack([(rows * axis).sum(1) for axis in axes], axis=-1) for rows in (reach, normal)]
                 distance, margin = np.linalg.norm(reach, axis=1), self._config.arm_margin
                 within = (distance > arm.min_reach + margin / 2) & (distance < arm.max_reach - margin)
+                limb = candidates.limb[held]
+                standing = after[held, np.where(limb == Limb.LEFT_FOOT, Limb.RIGHT_FOOT, Limb.LEFT_FOOT)]
+                aside = table.position[standing] - end[held]  # from the CoM to where it goes while the other foot swings
+                aside[:, 2] = 0.0
+                stretched = np.linalg.norm(reach - aside, axis=1) > arm.max_reach + self._config.arm_sway
+                within &= ~(stretched & (limb < len(FEET)))
                 codes[held[~(within & self._arms[palm].serves(*local))]] = screen.ARM
         return codes
 
