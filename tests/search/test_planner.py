@@ -5,10 +5,12 @@ from tests.search.worlds import FLOOR, box, corridor, make_world
 from toolkit.contacts.category import Category, category_of
 from toolkit.errors import InputError, PlanningError
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.pose import rotation_about_z
 from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
 from toolkit.search.ana_star import AnaStarConfig
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.problem import CostConfig
+from toolkit.search.reach_check import ReachConfig
 from toolkit.world.timing import Timing
 
 QUICK = PlannerConfig(search=AnaStarConfig(max_expansions=150))
@@ -186,6 +188,30 @@ def test_all_ten_categories_occur_and_palms_are_chosen_where_they_help(robot):
     assert not any(stance.palms for solution in without.solutions for stance in solution.sequence.stances)
 
 
+def test_held_palms_stay_in_reach_while_the_body_is_over_the_standing_foot(robot):
+    def longest(sway):
+        evaluator = KinematicEvaluator(robot, KinematicConfig(palm_relief=0.3, stride=300.0, spread=50.0))
+        config = PlannerConfig(search=AnaStarConfig(max_expansions=300), reach=ReachConfig(arm_sway=sway))
+        found = ContactPlanner(robot, corridor(2), evaluator, config).search(np.random.default_rng(0), 20.0).solutions
+        stretch = []
+        for solution in found:
+            moves = zip(solution.sequence.transitions, solution.sequence.stances[1:], solution.com[1:], strict=True)
+            for transition, stance, com in moves:
+                if not transition.limb.is_foot:
+                    continue
+                foot = next(limb for limb in FEET if limb != transition.limb)
+                over = [*stance[foot].pose.position[:2], com[2]]
+                turn = rotation_about_z(stance.mean_feet.yaw)
+                for palm in stance.palms:
+                    arm = robot.arms[palm]
+                    away = stance[palm].pose.position - over - turn @ arm.shoulder_in_com
+                    stretch.append(np.linalg.norm(away) - arm.max_reach)
+        assert stretch
+        return max(stretch)
+
+    assert longest(0.02) <= 0.02 + 1e-6 < longest(np.inf)
+
+
 def test_timing_is_chosen(robot):
     class HurriesAreHard(KinematicEvaluator):
         def evaluate(self, stance, com, com_velocity, transitions):
@@ -241,10 +267,10 @@ def test_a_plan_goes_round_ground_that_nearly_slides(robot):
     beside = box((0.9, 0.95, -0.05), (0.4, 0.5, 0.05), friction=0.35)
     world = make_world(*ends, tile, beside, goal=(1.8, 0, 0))
     steep = {}
-    for weight in (500.0, 0.0):
+    for weight in (4000.0, 0.0):
         config = PlannerConfig(cost=CostConfig(steep=weight), search=AnaStarConfig(max_expansions=400))
         result = plan(robot, world, config, kinematic=KinematicConfig(friction=0.95))
         assert result.solutions, result.reason
         contacts = [item.contact for item in result.solutions[-1].sequence.transitions]
         steep[weight] = sum(contact.pose.normal[2] < np.cos(np.radians(15.0)) for contact in contacts)
-    assert steep[500.0] == 0 < steep[0.0]
+    assert steep[4000.0] == 0 < steep[0.0]

@@ -43,8 +43,9 @@ class Regularisers:
     Attributes:
         jerk: weight of (change of CoM acceleration from step to step / dt)^2.
         height: weight of the CoM's distance from home height above the feet, m^2.
-        cop: weight of the CoP's distance from the middle of the patch over the patch's size, times the load in weights;
-            decides in slow gaits, whose momenta cost little: slow single support does not forgive a CoP near the edge.
+        cop: weight of the CoP's distance from the middle of the patch over the patch's size, times the load over what
+            the limb is there to bear: the weight, or `palm_force`; decides in slow gaits, whose momenta cost little:
+            slow single support does not forgive a CoP near the edge, nor does a palm.
         load: weight of the normal force (in weights) of a foot in the step after it lands or before it lifts.
         palm: weight of the distance (in weights) of a palm's normal force from `palm_force`.
         palm_force: in weights; a palm that only touches is neither of use nor easy to control.
@@ -173,11 +174,12 @@ class Program:
             made = np.concatenate([[False], on[1:] & ~on[:-1]])[step]
             broken = np.concatenate([on[:-1] & ~on[1:], [False]])[step]
             if Limb(limb).is_foot:
-                press, force = np.where(made | broken, reg.load, 0.0), 0.0
+                press, force, usual = np.where(made | broken, reg.load, 0.0), 0.0, 1.0
             else:
-                press, force = np.full(len(step), reg.palm), reg.palm_force
+                press = np.full(len(step), reg.palm)
+                force = usual = reg.palm_force
             squares = [np.full(len(step), value) for value in (w.force, w.lateral_force, w.torque * weight**2)]
-            squares += [np.full(len(step), w.cop), np.full(len(step), reg.cop), press]
+            squares += [np.full(len(step), w.cop), np.full(len(step), reg.cop / usual**2), press]
             weights = np.sqrt(duration[step, None] * np.stack(squares, 1))
             wanted = np.array([p.margins.friction, *cop_margin[limb], p.margins.yaw])
             least = np.array([self.least.friction, *np.minimum(self.least.cop, cop_margin[limb]), self.least.yaw])

@@ -227,7 +227,7 @@ class ContactProblem:
         if self._config.steep > 0.0:
             feet = np.flatnonzero(candidates.limb <= Limb.RIGHT_FOOT)
             beyond = self._table.steepness(candidates.number[feet]) - self._config.gentle
-            cost[feet] += self._config.steep * np.maximum(beyond, 0.0)
+            cost[feet] += self._config.steep * np.maximum(beyond, 0.0) ** 2
         return cost + self._final_cost(candidates)
 
     def _judge(
