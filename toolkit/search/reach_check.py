@@ -122,7 +122,7 @@ class ReachCheck:
                 within = (distance > arm.min_reach + margin / 2) & (distance < arm.max_reach - margin)
                 limb = candidates.limb[held]
                 standing = after[held, np.where(limb == Limb.LEFT_FOOT, Limb.RIGHT_FOOT, Limb.LEFT_FOOT)]
-                aside = table.position[standing] - end[held]  # from the CoM to where it goes while the other foot swings
+                aside = table.position[standing] - end[held]  # to where the CoM goes while the other foot swings
                 aside[:, 2] = 0.0
                 stretched = np.linalg.norm(reach - aside, axis=1) > arm.max_reach + self._config.arm_sway
                 within &= ~(stretched & (limb < len(FEET)))
