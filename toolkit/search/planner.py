@@ -41,7 +41,7 @@ _UNTRAINED = (
 )
 _DEEP = 10  # patience of a search over slippery ground, in multiples of the patience elsewhere
 _LAYER, _EPSILON, _CROWDING = 1.5, 0.15, 0.6  # of a search that has to slide: see `AnaStarConfig`
-_HASTY_EPSILON, _HASTY_CROWDING = 0.3, 0.2  # of the one before it, which is to find a first sequence soon
+_HASTY_LAYER, _HASTY_EPSILON, _HASTY_CROWDING = 1.0, 0.3, 0.2  # of the one before, to find a first sequence soon
 _HASTY_SHARE, _HASTY_EXPANSIONS = 5, 600  # which has a fifth of the other's expansions, or so many
 _SLIDING = 3  # times the expansions, of such a search: most of them see that they have come too fast
 _LAZY = 20  # expansions with one transition judged in each that count as one with all judged
@@ -182,8 +182,8 @@ class ContactPlanner:
         configs = [settings]
         if slides and not lazy:
             limit = _HASTY_EXPANSIONS if settings.max_expansions is None else settings.max_expansions // _HASTY_SHARE
-            hasty = replace(settings, epsilon=_HASTY_EPSILON, crowding=_HASTY_CROWDING, max_expansions=limit)
-            configs.insert(0, replace(hasty, first_only=True))
+            hasty = replace(settings, layer=_HASTY_LAYER, epsilon=_HASTY_EPSILON, crowding=_HASTY_CROWDING)
+            configs.insert(0, replace(hasty, max_expansions=limit, first_only=True))
         result, early = search_in_turn(problem, rng, configs, judge, time_limit, observer)
         judged = [state for state in result.expanded if not is_pending(state)]
         expanded = problem.feet(unpack(judged)[:, CONTACTS]) if judged else (np.zeros((0, 3)), [])

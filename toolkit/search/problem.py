@@ -47,6 +47,7 @@ from toolkit.world.world import Goal
 
 _LIMBS = tuple(Limb)
 _CROWD, _PACE = 0.1, 0.25  # m, m/s
+_LEAST_RESERVE = 0.02  # of friction; what slides costs no more than what barely holds
 
 
 class ContactProblem:
@@ -226,8 +227,8 @@ class ContactProblem:
             cost = cost + self._config.time * self._durations[candidates.timing]
         if self._config.steep > 0.0:
             feet = np.flatnonzero(candidates.limb <= Limb.RIGHT_FOOT)
-            beyond = self._table.steepness(candidates.number[feet]) - self._config.gentle
-            cost[feet] += self._config.steep * np.maximum(beyond, 0.0) ** 2
+            reserve = np.maximum(1.0 - self._table.steepness(candidates.number[feet]), _LEAST_RESERVE)
+            cost[feet] += self._config.steep * np.maximum(self._config.reserve / reserve - 1.0, 0.0)
         return cost + self._final_cost(candidates)
 
     def _judge(
