@@ -41,7 +41,7 @@ _UNTRAINED = (
 )
 _DEEP = 10  # patience of a search over slippery ground, in multiples of the patience elsewhere
 _LAYER, _EPSILON, _CROWDING = 1.5, 0.15, 0.6  # of a search that has to slide: see `AnaStarConfig`
-_HASTY_LAYER, _HASTY_EPSILON, _HASTY_CROWDING = 1.0, 0.3, 0.2  # of the one before, to find a first sequence soon
+_HASTY_LAYER, _HASTY_EPSILON, _HASTY_CROWDING = 1.0, 0.3, 0.1  # of the one before, to find a first sequence soon
 _HASTY_SHARE, _HASTY_EXPANSIONS = 5, 600  # which has a fifth of the other's expansions, or so many
 _SLIDING = 3  # times the expansions, of such a search: most of them see that they have come too fast
 _LAZY = 20  # expansions with one transition judged in each that count as one with all judged
@@ -172,6 +172,7 @@ class ContactPlanner:
             second=getattr(evaluator, "outside", None) if slides else None,
             haste=self.config.haste if slides and not lazy else None,
             forced=self._terrain.forced_acceleration(),
+            left_first=slides and not lazy,
         )
         judge = None if self._goal_evaluator is None else Arrival(problem, self._goal_evaluator, cost)
         settings = self._settings(slides, lazy)

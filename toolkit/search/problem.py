@@ -73,6 +73,8 @@ class ContactProblem:
         haste: delays states that run ahead of their feet; the second judge is then asked only where the first sees no
             way on. None: nothing is delayed.
         forced: m/s^2; most that the robot accelerates on the way whatever it does; for `haste`.
+        left_first: whether the right foot may not move first: plans that begin with the other foot are often mirror
+            images of each other, and a search that is in want of any plan has no time for both.
 
     Attributes:
         rejected: (len(REASONS),) int; candidates that fell, by reason.
@@ -100,6 +102,7 @@ class ContactProblem:
         second: TransitionEvaluator | None = None,
         haste: HasteConfig | None = None,
         forced: float = 0.0,
+        left_first: bool = False,
     ):
         self._table, self._evaluator, self._distance, self._goal = table, evaluator, distance, goal
         self._lazy, self._second = lazy, second
@@ -119,7 +122,8 @@ class ContactProblem:
         numbers = np.full((1, 4), -1)
         for contact in start.contacts:
             numbers[0, contact.limb] = table.add_contact(contact)
-        self._start = pack(numbers, np.array([-1]), com[None], np.zeros((1, 3)))[0]
+        moved = np.array([int(Limb.RIGHT_FOOT) if left_first else -1])
+        self._start = pack(numbers, moved, com[None], np.zeros((1, 3)))[0]
         self._asked: Sequence[bytes] | None = None
         self._answer = (np.zeros((0, SIZE), np.int32), np.zeros((0, 3)), np.zeros(0))
         self.deadline = np.inf
