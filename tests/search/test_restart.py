@@ -26,9 +26,8 @@ def test_both_searches_count_and_the_second_one_starts_again():
         graph = Graph(np.random.default_rng(seed), goals=4)
         told = []
         result, early = search_in_turn(
-            graph,
+            [(graph, HASTY), (graph, PATIENT)],
             np.random.default_rng(seed),
-            (HASTY, PATIENT),
             None,
             math.inf,
             lambda progress, to=told: to.append(progress),
@@ -56,7 +55,14 @@ def test_both_searches_count_and_the_second_one_starts_again():
 def test_no_later_search_where_all_states_were_seen_or_no_time_is_left():
     graph = Graph(np.random.default_rng(1), goals=1)
     lone = AnaStar(graph, np.random.default_rng(1).spawn(1)[0], PATIENT).run()
-    again, _ = search_in_turn(graph, np.random.default_rng(1), (PATIENT, PATIENT), None, math.inf)
+    again, _ = search_in_turn([(graph, PATIENT), (graph, PATIENT)], np.random.default_rng(1), None, math.inf)
     assert (lone.stopped_by, again.expansions) == ("exhausted", lone.expansions)
-    none, _ = search_in_turn(graph, np.random.default_rng(1), (HASTY, PATIENT), None, 0.0)
+    none, _ = search_in_turn([(graph, HASTY), (graph, PATIENT)], np.random.default_rng(1), None, 0.0)
     assert (none.stopped_by, none.expansions) == ("time", 0)
+
+
+def test_a_part_of_the_graph_that_ends_does_not_end_the_whole():
+    part, graph = Graph(np.random.default_rng(1), goals=1), Graph(np.random.default_rng(1), goals=1)
+    whole, _ = search_in_turn([(part, PATIENT), (graph, PATIENT)], np.random.default_rng(1), None, math.inf)
+    assert part.expansions > 0 and graph.expansions > 0
+    assert whole.expansions == part.expansions + graph.expansions

@@ -172,7 +172,6 @@ class ContactPlanner:
             second=getattr(evaluator, "outside", None) if slides else None,
             haste=self.config.haste if slides and not lazy else None,
             forced=self._terrain.forced_acceleration(),
-            left_first=slides and not lazy,
         )
         judge = None if self._goal_evaluator is None else Arrival(problem, self._goal_evaluator, cost)
         settings = self._settings(slides, lazy)
@@ -180,12 +179,12 @@ class ContactPlanner:
             way = float(distance(start.mean_feet.position[None], np.array([start.mean_feet.yaw]))[0])
             settings = replace(settings, initial_cost=self.config.acceptable_cost * max(way, 1.0))
         problem.deadline = time.perf_counter() + time_limit
-        configs = [settings]
+        searches = [(problem, settings)]
         if slides and not lazy:
             limit = _HASTY_EXPANSIONS if settings.max_expansions is None else settings.max_expansions // _HASTY_SHARE
             hasty = replace(settings, layer=_HASTY_LAYER, epsilon=_HASTY_EPSILON, crowding=_HASTY_CROWDING)
-            configs.insert(0, replace(hasty, max_expansions=limit, first_only=True))
-        result, early = search_in_turn(problem, rng, configs, judge, time_limit, observer)
+            searches.insert(0, (problem.left_first(), replace(hasty, max_expansions=limit, first_only=True)))
+        result, early = search_in_turn(searches, rng, judge, time_limit, observer)
         judged = [state for state in result.expanded if not is_pending(state)]
         expanded = problem.feet(unpack(judged)[:, CONTACTS]) if judged else (np.zeros((0, 3)), [])
         return SearchResult(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
@@ -73,8 +74,6 @@ class ContactProblem:
         haste: delays states that run ahead of their feet; the second judge is then asked only where the first sees no
             way on. None: nothing is delayed.
         forced: m/s^2; most that the robot accelerates on the way whatever it does; for `haste`.
-        left_first: whether the right foot may not move first: plans that begin with the other foot are often mirror
-            images of each other, and a search that is in want of any plan has no time for both.
 
     Attributes:
         rejected: (len(REASONS),) int; candidates that fell, by reason.
@@ -102,7 +101,6 @@ class ContactProblem:
         second: TransitionEvaluator | None = None,
         haste: HasteConfig | None = None,
         forced: float = 0.0,
-        left_first: bool = False,
     ):
         self._table, self._evaluator, self._distance, self._goal = table, evaluator, distance, goal
         self._lazy, self._second = lazy, second
@@ -122,8 +120,7 @@ class ContactProblem:
         numbers = np.full((1, 4), -1)
         for contact in start.contacts:
             numbers[0, contact.limb] = table.add_contact(contact)
-        moved = np.array([int(Limb.RIGHT_FOOT) if left_first else -1])
-        self._start = pack(numbers, moved, com[None], np.zeros((1, 3)))[0]
+        self._start = pack(numbers, np.array([-1]), com[None], np.zeros((1, 3)))[0]
         self._asked: Sequence[bytes] | None = None
         self._answer = (np.zeros((0, SIZE), np.int32), np.zeros((0, 3)), np.zeros(0))
         self.deadline = np.inf
@@ -132,6 +129,16 @@ class ContactProblem:
     def start(self) -> bytes:
         """See `SearchProblem`."""
         return self._start
+
+    def left_first(self) -> ContactProblem:
+        """The same graph without what begins with the right foot: often mirror images of what begins with the left one.
+
+        Contacts, deadline and counts are shared with this one.
+        """
+        row, part = unpack([self._start]).copy(), copy(self)
+        row[:, LAST] = Limb.RIGHT_FOOT
+        part._start = row.tobytes()
+        return part
 
     def stance(self, state: bytes) -> Stance:
         """Stance of a state."""

@@ -1,4 +1,4 @@
-"""Searches of one graph in turn: a hasty one for a first sequence, then a patient one from the start again.
+"""Searches in turn: a hasty one for a first sequence, then a patient one from the start again.
 
 What gets to a goal soonest is seldom what holds: the hasty search would go on around its own first sequence, so the
 patient one does not build on it.
@@ -19,20 +19,18 @@ from toolkit.search.graph import Judge, Path, Progress, SearchProblem, State
 
 
 def search_in_turn(
-    problem: SearchProblem[State],
+    searches: Sequence[tuple[SearchProblem[State], AnaStarConfig]],
     rng: np.random.Generator,
-    configs: Sequence[AnaStarConfig],
     judge: Judge[State] | None,
     time_limit: float,
     observer: Callable[[Progress[State]], None] | None = None,
 ) -> tuple[AnaStarResult[State], int]:
-    """Run one search after the other, each from the start; no later one where one ran out of states or time.
+    """Run one search after the other, each from the start; no later one where one ran out of time, or of all states.
 
     Args:
-        problem: the graph.
+        searches: graph and settings of each; graphs before the last one are the same, or parts of it.
         rng: for the random expansions of the last search; those before it have streams of their own, so that they do
             not change what it finds.
-        configs: of each search.
         judge: see `AnaStar`.
         time_limit: s, for all together.
         observer: told of the progress of all as if they were one; its cost is the best of all so far.
@@ -45,8 +43,8 @@ def search_in_turn(
     expanded: list[State] = []
     seconds, bound = 0.0, 0.0
     result: AnaStarResult[State] | None = None
-    generators, early = [*rng.spawn(len(configs) - 1), rng], 0
-    for config, generator in zip(configs, generators, strict=True):
+    generators, early = [*rng.spawn(len(searches) - 1), rng], 0
+    for (problem, config), generator in zip(searches, generators, strict=True):
         early = len(paths)
         began, before, best = seconds, len(expanded), min(paths, key=lambda path: path.cost, default=None)
 
@@ -64,7 +62,7 @@ def search_in_turn(
             paths.append(replace(path, seconds=began + path.seconds, expansions=before + path.expansions))
         expanded += result.expanded
         seconds, bound = began + result.seconds, max(bound, result.lower_bound)
-        if result.stopped_by in ("exhausted", "time"):
+        if result.stopped_by == "time" or (result.stopped_by == "exhausted" and problem is searches[-1][0]):
             break
     assert result is not None
     whole = replace(
