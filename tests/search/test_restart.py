@@ -66,3 +66,4 @@ def test_a_part_of_the_graph_that_ends_does_not_end_the_whole():
     whole, _ = search_in_turn([(part, PATIENT), (graph, PATIENT)], np.random.default_rng(1), None, math.inf)
     assert part.expansions > 0 and graph.expansions > 0
     assert whole.expansions == part.expansions + graph.expansions
+    assert whole.lower_bound == pytest.approx(graph.least)

@@ -45,12 +45,19 @@ def search_in_turn(
     result: AnaStarResult[State] | None = None
     generators, early = [*rng.spawn(len(searches) - 1), rng], 0
     for (problem, config), generator in zip(searches, generators, strict=True):
-        early = len(paths)
+        early, whole = len(paths), problem is searches[-1][0]
         began, before, best = seconds, len(expanded), min(paths, key=lambda path: path.cost, default=None)
+        # Of a part of the graph the bound holds for that part: of the whole one only what h says at the start is known.
+        least = 0.0 if whole else float(problem.heuristic([problem.start()])[0])
 
         def observed(
-            progress: Progress[State], began: float = began, before: int = before, best: Path[State] | None = best
+            progress: Progress[State],
+            began: float = began,
+            before: int = before,
+            best: Path[State] | None = best,
+            least: float = least,
         ) -> None:
+            progress = replace(progress, bound=_loosened(progress.bound, progress.cost, least))
             if best is not None and best.cost < progress.cost:
                 progress = replace(progress, cost=best.cost, bound=best.bound)
             assert observer is not None
@@ -59,13 +66,14 @@ def search_in_turn(
         search = AnaStar(problem, generator, config, judge)
         result = search.run(time_limit - began, None if observer is None else observed)
         for path in result.paths:
-            paths.append(replace(path, seconds=began + path.seconds, expansions=before + path.expansions))
+            loose = _loosened(path.bound, path.cost, least)
+            paths.append(replace(path, bound=loose, seconds=began + path.seconds, expansions=before + path.expansions))
         expanded += result.expanded
-        seconds, bound = began + result.seconds, max(bound, result.lower_bound)
-        if result.stopped_by == "time" or (result.stopped_by == "exhausted" and problem is searches[-1][0]):
+        seconds, bound = began + result.seconds, max(bound, result.lower_bound if whole else least)
+        if result.stopped_by == "time" or (result.stopped_by == "exhausted" and whole):
             break
     assert result is not None
-    whole = replace(
+    together = replace(
         result,
         paths=tuple(paths),
         lower_bound=bound,
@@ -73,4 +81,9 @@ def search_in_turn(
         expansions=len(expanded),
         expanded=tuple(expanded),
     )
-    return whole, early
+    return together, early
+
+
+def _loosened(bound: float, cost: float, least: float) -> float:
+    """A bound on suboptimality where no path costs less than `least`, if that is more."""
+    return max(bound, cost / least) if least > 0.0 else bound
