@@ -20,6 +20,7 @@ from validation.tables import largest, markdown_table, median, number, values
 
 KIND = "rubble_field"
 TILE = 0.4  # m; edge of the generator's tiles
+WHOLE = 2  # worlds of each length whose search goes on for the whole time limit; the others stop at a first sequence
 
 
 def growth_jobs(settings: TrialSettings, args: argparse.Namespace) -> list[Job]:
@@ -32,7 +33,7 @@ def growth_jobs(settings: TrialSettings, args: argparse.Namespace) -> list[Job]:
         rows = max(round(length / TILE), 1)
         for index in range(args.growth_trials):
             case = Case(KIND, args.seed_offset + index, (("rows", rows),))
-            jobs.append(Job(f"growth-{case.name}", growth_trial, (settings, case, rows * TILE)))
+            jobs.append(Job(f"growth-{case.name}", growth_trial, (settings, case, rows * TILE, index < WHOLE)))
     return jobs
 
 

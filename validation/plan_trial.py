@@ -17,6 +17,7 @@ from toolkit.pipeline import PipelineConfig, run
 from toolkit.pipeline import make_planner as make_pipeline_planner
 from toolkit.search.ana_star import Progress
 from toolkit.search.exclusion import Exclusion
+from toolkit.search.options import planner_config
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult
 from validation.cases import Case
@@ -194,27 +195,30 @@ def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: b
     }
 
 
-def growth_trial(settings: TrialSettings, case: Case, length: float) -> dict[str, Any]:
-    """A search for its whole time limit, without a limit on expansions: how time and memory grow with the world.
+def growth_trial(settings: TrialSettings, case: Case, length: float, whole: bool) -> dict[str, Any]:
+    """A search without a limit on expansions: how time and memory grow with the world.
 
     Args:
         settings: of the planner.
         case: the world.
         length: m; of its rubble.
+        whole: search for the whole time limit, not only until the first sequence.
     """
     world = case.world()
     record = {"kind": case.kind, "seed": case.seed, "found": False, "passed": False, "stage": "planning"}
     record["length"] = length
     record["way"] = float(np.hypot(*(world.goal.position - world.start.position)[:2]))
-    limit = settings.planning.time_limit
+    limit, planning = settings.planning.time_limit, planner_config(settings.planning)
+    planning = replace(planning, search=replace(planning.search, first_only=not whole))
     warm_up(WarmUp(settings.robot, settings.robots, settings.planner))
     try:
-        planner = TimedPlanner(make_planner(settings, world))
+        robot = robot_of(settings.robot, settings.robots)
+        planner = TimedPlanner(make_pipeline_planner(robot, world, settings.planner, planning))
         search = planner.search(np.random.default_rng(case.seed), limit)
     except ToolkitError as error:
         return record | {"reason": " ".join(str(error).split())}
     found = bool(search.solutions)
-    late = search.seconds / limit - 1.0
+    late = search.seconds / limit - 1.0 if whole else None
     return record | planner.figures | {"found": found, "passed": found, "overtime": late, "reason": search.reason}
 
 
