@@ -17,7 +17,6 @@ from toolkit.pipeline import PipelineConfig, run
 from toolkit.pipeline import make_planner as make_pipeline_planner
 from toolkit.search.ana_star import Progress
 from toolkit.search.exclusion import Exclusion
-from toolkit.search.options import planner_config
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult
 from validation.cases import Case
@@ -208,12 +207,10 @@ def growth_trial(settings: TrialSettings, case: Case, length: float, whole: bool
     record = {"kind": case.kind, "seed": case.seed, "found": False, "passed": False, "stage": "planning"}
     record["length"] = length
     record["way"] = float(np.hypot(*(world.goal.position - world.start.position)[:2]))
-    limit, planning = settings.planning.time_limit, planner_config(settings.planning)
-    planning = replace(planning, search=replace(planning.search, first_only=not whole))
+    limit = settings.planning.time_limit
     warm_up(WarmUp(settings.robot, settings.robots, settings.planner))
     try:
-        robot = robot_of(settings.robot, settings.robots)
-        planner = TimedPlanner(make_pipeline_planner(robot, world, settings.planner, planning))
+        planner = TimedPlanner(make_planner(settings, world, first_only=not whole))
         search = planner.search(np.random.default_rng(case.seed), limit)
     except ToolkitError as error:
         return record | {"reason": " ".join(str(error).split())}

@@ -56,10 +56,13 @@ def robot_of(name: str, robots: Path) -> RobotModel:
     return load_robot(name, robots)
 
 
-def make_planner(settings: TrialSettings, world: World, kind: str | None = None) -> ContactPlanner:
-    """The planner of a trial; `kind` in place of that of the settings."""
-    robot = robot_of(settings.robot, settings.robots)
-    return pipeline.make_planner(robot, world, kind or settings.planner, planner_config(settings.planning))
+def make_planner(
+    settings: TrialSettings, world: World, kind: str | None = None, first_only: bool = False
+) -> ContactPlanner:
+    """The planner of a trial; `kind` in place of that of the settings, `first_only` as in `AnaStarConfig`."""
+    config = planner_config(settings.planning)
+    config = replace(config, search=replace(config.search, first_only=first_only))
+    return pipeline.make_planner(robot_of(settings.robot, settings.robots), world, kind or settings.planner, config)
 
 
 def run_pipeline(
