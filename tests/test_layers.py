@@ -8,18 +8,22 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS = [
     "errors",
+    "compiled",
     "geometry",
     "robot",
     "world",
     "contacts",
+    "physics",
     "centroidal",
     "prediction",
     "search",
     "learning",
     "wholebody",
-    "simulation",
-    "report",
+    "control",
+    "replanning",
+    "execution",
     "pipeline",
+    "report",
 ]
 MODULES = sorted((ROOT / "toolkit").rglob("*.py"))
 

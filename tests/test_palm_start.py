@@ -9,7 +9,7 @@ import pytest
 from toolkit import pipeline
 from toolkit.geometry.limb import Limb
 from toolkit.robot.loader import load_robot
-from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.planner import PlannerConfig
 from toolkit.world.loader import load_world
 

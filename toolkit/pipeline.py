@@ -21,16 +21,16 @@ from toolkit.centroidal.sequence import SequenceConfig, optimise
 from toolkit.contacts.room import RoomConfig, landing_room, moved_sequence
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
+from toolkit.execution.check import Check, Result
+from toolkit.execution.result import Execution
+from toolkit.execution.run import ExecutionConfig, execute
+from toolkit.execution.verdict import failure_reason
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.prediction.networks import NetworkEvaluator, load_networks
 from toolkit.robot.model import RobotModel
-from toolkit.search.exclusion import Exclusion, excluded
+from toolkit.search.moves.exclusion import Exclusion, excluded
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult, Solution
-from toolkit.simulation.check import Check, Result
-from toolkit.simulation.execution import Execution
-from toolkit.simulation.run import ExecutionConfig, execute
-from toolkit.simulation.verdict import failure_reason
 from toolkit.wholebody.plan import WholeBodyConfig, whole_body
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.world import World

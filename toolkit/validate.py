@@ -49,13 +49,13 @@ def main(argv: list[str] | None = None) -> int:
     args = arguments().parse_args(argv)
     # Heavy imports come after the options, so that --help and mistakes in them answer at once.
     from toolkit import pipeline
+    from toolkit.execution.options import execution_config
     from toolkit.report.console import StageConsole
     from toolkit.report.files import RunFolder
     from toolkit.report.offscreen import require_rendering
     from toolkit.report.run import write_run
     from toolkit.robot.loader import load_robot
     from toolkit.search.options import planner_config
-    from toolkit.simulation.options import execution_config
     from toolkit.world.loader import load_world
 
     began = time.perf_counter()

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from toolkit import cli
+from toolkit.control.config import ExecutionConfig
+from toolkit.replanning.config import ReplanConfig
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
-from toolkit.simulation.config import ExecutionConfig
-from toolkit.simulation.replan_config import ReplanConfig
 from validation.jobs import PoolOptions
 from validation.machine import ROOT, code_fingerprint, folder_fingerprint
 

@@ -15,8 +15,8 @@ from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import ToolkitError
 from toolkit.pipeline import PipelineConfig, run
 from toolkit.pipeline import make_planner as make_pipeline_planner
-from toolkit.search.ana_star import Progress
-from toolkit.search.exclusion import Exclusion
+from toolkit.search.anytime.ana_star import Progress
+from toolkit.search.moves.exclusion import Exclusion
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult
 from validation.cases import Case

@@ -10,11 +10,11 @@ import numpy as np
 
 from toolkit import cli
 from toolkit.errors import ToolkitError
+from toolkit.execution.disturbance import Disturbance
+from toolkit.execution.run import execute
+from toolkit.execution.verdict import failure_reason
 from toolkit.pipeline import PipelineConfig, PipelineResult
 from toolkit.report.console import make_console
-from toolkit.simulation.disturbance import Disturbance
-from toolkit.simulation.run import execute
-from toolkit.simulation.verdict import failure_reason
 from validation import goals, options
 from validation.cases import Case, kind_of, make_cases
 from validation.goals import Goal

@@ -13,6 +13,8 @@ import numpy as np
 
 from toolkit import pipeline
 from toolkit.errors import ToolkitError
+from toolkit.execution.replay import replay_controls
+from toolkit.execution.result import Execution
 from toolkit.geometry.limb import PALMS
 from toolkit.report.files import REPORT, RunFolder
 from toolkit.report.run import write_run
@@ -21,8 +23,6 @@ from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.search.options import planner_config
 from toolkit.search.planner import ContactPlanner
-from toolkit.simulation.execution import Execution
-from toolkit.simulation.replay import replay_controls
 from toolkit.world.world import World
 from validation.cases import Case
 from validation.options import TrialSettings

@@ -17,7 +17,7 @@ from toolkit.errors import PlanningError
 from toolkit.pipeline import make_planner
 from toolkit.report.colors import OPTIMISED, unit
 from toolkit.robot.model import RobotModel
-from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.planner import PlannerConfig
 from toolkit.world.generators import rubble_corridor, rubble_field
 from toolkit.world.loader import load_world

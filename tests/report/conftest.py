@@ -13,13 +13,13 @@ from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
+from toolkit.execution.check import Check
+from toolkit.execution.result import Execution
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_from_quaternion
 from toolkit.report.run_report import RunReport
 from toolkit.robot.model import LimbModel, RobotModel
 from toolkit.search.result import SearchResult, Solution
-from toolkit.simulation.check import Check
-from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.surface import Surface
 from toolkit.world.timing import Timing

@@ -5,8 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
+from toolkit.execution.check import Check
 from toolkit.report.console import StageConsole
-from toolkit.simulation.check import Check
 
 CHECKS = (Check("slip", 0.02, "m", 0.03), Check("upright", 0.0, "", 0.0), Check("friction", 0.0))
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from toolkit.errors import InputError
+from toolkit.execution.check import Result
 from toolkit.report.arrays import read_execution, read_motion, write_execution, write_motion
 from toolkit.report.files import REPORT, RunFolder, read_json, read_scene, write_json, write_scene
 from toolkit.report.plan_file import read_plan, write_plan
 from toolkit.report.run_report import STAGES, RunReport, read_report, write_report
-from toolkit.simulation.check import Result
 
 
 def assert_same_fields(a, b, *, rtol=0.0, skip=()):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from toolkit.execution.check import Check
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.report import draw
@@ -16,7 +17,6 @@ from toolkit.report.motion_scene import NEWTON_PER_METRE, frames, standing
 from toolkit.report.recording import write_recording
 from toolkit.report.run_report import RunReport
 from toolkit.report.summary import search_summary, summary
-from toolkit.simulation.check import Check
 
 
 class Recording:

@@ -6,7 +6,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from toolkit.search.ana_star import AnaStar, AnaStarConfig, Edge
+from toolkit.search.anytime.ana_star import AnaStar, AnaStarConfig, Edge
 
 
 class Graph:
@@ -125,7 +125,7 @@ def test_judge_forbids_and_changes_the_last_edge():
 
 def test_limits_and_observer(monkeypatch):
     clock = iter(np.arange(0.0, 100.0, 1e-3))  # every look at the clock takes a millisecond
-    monkeypatch.setattr("toolkit.search.ana_star.time.perf_counter", lambda: float(next(clock)))
+    monkeypatch.setattr("toolkit.search.anytime.ana_star.time.perf_counter", lambda: float(next(clock)))
 
     class Line(Graph):
         def __init__(self):

@@ -9,7 +9,7 @@ from tests.search.worlds import FLOOR, box, make_world
 from toolkit.cli import AUTO_TIMINGS
 from toolkit.pipeline import make_planner
 from toolkit.robot.loader import load_robot
-from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.planner import PlannerConfig
 
 TRAINED = sorted(path.parent.name for path in Path("robots").glob("*/networks"))

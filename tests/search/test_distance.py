@@ -5,10 +5,10 @@ import pytest
 from tests.search.worlds import FLOOR, box, make_world
 from toolkit.contacts.projection import Projector
 from toolkit.geometry.pose import Pose
-from toolkit.search.heuristic import EuclideanDistance, GridConfig
-from toolkit.search.obstacles import world_triangles
-from toolkit.search.occupancy import BodyBox, Occupancy
-from toolkit.search.terrain_distance import TerrainDistance
+from toolkit.search.costs.heuristic import EuclideanDistance, GridConfig
+from toolkit.search.costs.terrain_distance import TerrainDistance
+from toolkit.search.moves.obstacles import world_triangles
+from toolkit.search.moves.occupancy import BodyBox, Occupancy
 
 
 def terrain(robot, world):

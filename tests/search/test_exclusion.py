@@ -6,7 +6,7 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
-from toolkit.search.exclusion import Exclusion, excluded
+from toolkit.search.moves.exclusion import Exclusion, excluded
 
 
 def contact(limb, x, y):

@@ -6,9 +6,9 @@ import pytest
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
-from toolkit.search.contact_table import ContactTable
-from toolkit.search.haste import Haste, HasteConfig
-from toolkit.search.open_list import OpenList
+from toolkit.search.anytime.open_list import OpenList
+from toolkit.search.costs.haste import Haste, HasteConfig
+from toolkit.search.states.contact_table import ContactTable
 
 
 @pytest.fixture

@@ -8,11 +8,22 @@ from tests.search.worlds import FLOOR, box, make_world
 from toolkit.contacts.projection import Projected
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
-from toolkit.search.ana_star import AnaStarConfig
-from toolkit.search.candidates import Candidates, mean_feet
-from toolkit.search.drift import Drift
+from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.moves.candidates import Candidates, mean_feet
+from toolkit.search.moves.drift import Drift
 from toolkit.search.planner import ContactPlanner, PlannerConfig
-from toolkit.search.state import COM, CONTACTS, LAST, OLD, TIMING, VELOCITY, is_pending, pack, pack_pending, unpack
+from toolkit.search.states.state import (
+    COM,
+    CONTACTS,
+    LAST,
+    OLD,
+    TIMING,
+    VELOCITY,
+    is_pending,
+    pack,
+    pack_pending,
+    unpack,
+)
 from toolkit.world.timing import Timing
 
 ENDLESS = PlannerConfig(search=AnaStarConfig(epsilon=0.1, max_expansions=30))

@@ -7,9 +7,9 @@ from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z, rotation_on_surface
 from toolkit.robot.loader import load_robot
-from toolkit.search.legs import LIMITS, legs_of, violated
-from toolkit.search.shanks import shanks_of
-from toolkit.search.stances import ENTANGLED, stances_violated
+from toolkit.search.moves.legs import LIMITS, legs_of, violated
+from toolkit.search.moves.shanks import shanks_of
+from toolkit.search.moves.stances import ENTANGLED, stances_violated
 
 ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
 

@@ -3,10 +3,10 @@ import numpy as np
 from tests.search.worlds import FLOOR, box, corridor, make_world
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.kinematic import KinematicEvaluator
-from toolkit.search import screen
-from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.moves import screen
 from toolkit.search.planner import ContactPlanner, PlannerConfig
-from toolkit.search.state import COM, CONTACTS, LAST, VELOCITY, pack, unpack
+from toolkit.search.states.state import COM, CONTACTS, LAST, VELOCITY, pack, unpack
 
 
 def reached(robot, world, limb):

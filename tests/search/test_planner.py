@@ -7,10 +7,10 @@ from toolkit.errors import InputError, PlanningError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
-from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.moves.reach_check import ReachConfig
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.problem import CostConfig
-from toolkit.search.reach_check import ReachConfig
 from toolkit.world.timing import Timing
 
 QUICK = PlannerConfig(search=AnaStarConfig(max_expansions=150))

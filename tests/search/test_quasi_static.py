@@ -6,8 +6,8 @@ from toolkit.centroidal.balance import statically_balanced
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
-from toolkit.search.ana_star import AnaStarConfig
-from toolkit.search.moves import MoveConfig
+from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.moves.moves import MoveConfig
 from toolkit.search.planner import PlannerConfig
 from toolkit.search.quasi_static import QuasiStaticEvaluator, quasi_static_planner
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.search.test_ana_star import Graph
-from toolkit.search.ana_star import AnaStar, AnaStarConfig
-from toolkit.search.restart import search_in_turn
+from toolkit.search.anytime.ana_star import AnaStar, AnaStarConfig
+from toolkit.search.anytime.restart import search_in_turn
 
 HASTY, PATIENT = AnaStarConfig(epsilon=0.5, first_only=True), AnaStarConfig(epsilon=0.3)
 

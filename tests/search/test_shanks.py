@@ -10,10 +10,10 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, rotation_on_surface
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.robot.loader import load_robot
-from toolkit.search import screen
-from toolkit.search.legs import legs_of
+from toolkit.search.moves import screen
+from toolkit.search.moves.legs import legs_of
+from toolkit.search.moves.shanks import ball_free, leg_points, segment_distance, shanks_of
 from toolkit.search.planner import ContactPlanner
-from toolkit.search.shanks import ball_free, leg_points, segment_distance, shanks_of
 
 ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
 

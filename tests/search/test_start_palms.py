@@ -10,7 +10,7 @@ from toolkit.centroidal.balance import statically_balanced
 from toolkit.errors import InputError, WorldError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.prediction.kinematic import KinematicEvaluator
-from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.quasi_static import quasi_static_planner
 

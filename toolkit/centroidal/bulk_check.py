@@ -10,10 +10,10 @@ import math
 from dataclasses import astuple
 
 import numpy as np
-from numba import njit
 
 from toolkit.centroidal.fast import Arrays
 from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalProblem
+from toolkit.compiled import compiled
 
 
 def residual_and_objective(problem: CentroidalProblem, motion: Arrays) -> tuple[float, float]:
@@ -62,7 +62,7 @@ def residual_and_objective(problem: CentroidalProblem, motion: Arrays) -> tuple[
 _NOWHERE, _UPRIGHT = np.zeros(3), np.eye(3)
 
 
-@njit(cache=True, nogil=True)
+@compiled(kept=True)
 def _reach(worst, com, place, rotation, tip, root, yaw, bound):
     """`worst`, or how much further than `bound` the tip is from the root where that is more."""
     cos, sin = math.cos(yaw), math.sin(yaw)
@@ -79,7 +79,7 @@ def _reach(worst, com, place, rotation, tip, root, yaw, bound):
     return max(worst, math.sqrt(square) - bound)
 
 
-@njit(cache=True, nogil=True)
+@compiled(kept=True)
 def _evaluate(
     com,
     linear,

@@ -7,17 +7,15 @@ The first solution on a machine compiles the kernels (numba), which are then kep
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import astuple, dataclass
-from functools import cache
 from time import perf_counter
 
 import numpy as np
-from numba import njit
 
-from toolkit.centroidal.kernels import constraints, interior_point, sensitivity, setup, sources
+from toolkit.centroidal.kernels import constraints, interior_point, sensitivity, setup
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
 from toolkit.centroidal.residual import confirmed
+from toolkit.compiled import compiled
 
 FIRST_KNOT_TOLERANCE = 1e-7
 """m; how far the given first knot may violate reach or height."""
@@ -116,7 +114,7 @@ def _run(
 ) -> tuple[int, int, Arrays, Sensitivity]:
     """Status, iterations, the arrays of the motion, and its derivatives, zero where they are not asked for."""
     config = config or FastConfig()
-    solved = _kernel()(float(config.tolerance), int(config.max_iterations), differentiate, *_arguments(problem))
+    solved = _solved(float(config.tolerance), int(config.max_iterations), differentiate, *_arguments(problem))
     return solved[0], solved[1], solved[2:8], Sensitivity(*solved[8:])
 
 
@@ -165,27 +163,19 @@ def pack(problem: CentroidalProblem) -> tuple[setup.Data, float]:
     return setup.pack(*_arguments(problem))
 
 
-@cache
-def _kernel() -> Callable:
-    """The compiled solver, from disk where its sources have not changed."""
-    key = sources()
-
-    @njit(cache=True, nogil=True)
-    def run(tolerance, max_iterations, differentiate, mass, dt, active, position, *arguments):
-        if key < 0:  # never: makes the hash part of the closure
-            raise ValueError
-        data, violation = setup.pack(mass, dt, active, position, *arguments)
-        contacts, n = data.mu.shape[0], dt.shape[0]
-        u, x, w = np.zeros((contacts, 6)), np.zeros((n + 1, 9)), np.zeros((n, 6))
-        lines, rounds = contacts * setup.ROWS + data.plane_offset.shape[0], contacts + data.ball_radius.shape[0]
-        z = constraints.room(lines, rounds)
-        code, iterations = 3, 0
-        if violation <= FIRST_KNOT_TOLERANCE:
-            code, iterations = interior_point.solve(data, tolerance, max_iterations, u, x, w, z)
-        slopes = np.zeros((5, 6)), np.zeros(9)
-        if differentiate and (code == interior_point.SOLVED or code == interior_point.UNDECIDED):
-            slopes = sensitivity.derivatives(u, z, (mass, dt, active, position, *arguments))
-        com = arguments[6]
-        return (code, iterations, *setup.unpack(data, active, mass, com, u, x), *slopes)
-
-    return run
+@compiled(kept=True)
+def _solved(tolerance, max_iterations, differentiate, mass, dt, active, position, *arguments):
+    """Status, iterations, the arrays of the motion, and its derivatives."""
+    data, violation = setup.pack(mass, dt, active, position, *arguments)
+    contacts, n = data.mu.shape[0], dt.shape[0]
+    u, x, w = np.zeros((contacts, 6)), np.zeros((n + 1, 9)), np.zeros((n, 6))
+    lines, rounds = contacts * setup.ROWS + data.plane_offset.shape[0], contacts + data.ball_radius.shape[0]
+    z = constraints.room(lines, rounds)
+    code, iterations = 3, 0
+    if violation <= FIRST_KNOT_TOLERANCE:
+        code, iterations = interior_point.solve(data, tolerance, max_iterations, u, x, w, z)
+    slopes = np.zeros((5, 6)), np.zeros(9)
+    if differentiate and (code == interior_point.SOLVED or code == interior_point.UNDECIDED):
+        slopes = sensitivity.derivatives(u, z, (mass, dt, active, position, *arguments))
+    com = arguments[6]
+    return (code, iterations, *setup.unpack(data, active, mass, com, u, x), *slopes)

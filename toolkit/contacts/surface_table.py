@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from toolkit.compiled import compiled
 from toolkit.world.surface import Surface
 
 _MAX_CELLS = 400_000
@@ -103,7 +103,7 @@ def surface_table(surfaces: Sequence[Surface], reach: float, cell: float = 0.1) 
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(kept=True)
 def _distance_to_segment(x, y, ax, ay, bx, by):
     """Distance from a point to a segment."""
     dx, dy = bx - ax, by - ay
@@ -152,7 +152,7 @@ def _index(
     return entry_start, entry_surface, entry_inside, near_start, near
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(kept=True)
 def _fill(
     xy, edge_start, surfaces, ranges, corner, cell, columns, near_distance, fill, entry_surface, entry_inside,
     near_start, near,

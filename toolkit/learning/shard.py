@@ -31,8 +31,8 @@ from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.prediction.features import LAYOUT
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
-from toolkit.search.ana_star import AnaStarConfig
-from toolkit.search.cost import CostConfig
+from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.costs.cost import CostConfig
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.world.loader import load_world
 from toolkit.world.timing import Timing

@@ -15,9 +15,9 @@ import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.errors import InputError
+from toolkit.execution.result import Execution
 from toolkit.report.checks import check_entries, read_checks
 from toolkit.report.files import plain
-from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 T = TypeVar("T")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from toolkit.simulation.check import Check, Result
+from toolkit.execution.check import Check, Result
 
 
 def check_entries(checks: Sequence[Check]) -> list[dict[str, Any]]:

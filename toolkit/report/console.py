@@ -13,8 +13,8 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from toolkit.execution.check import Check, Result
 from toolkit.search.result import SearchResult, Solution
-from toolkit.simulation.check import Check, Result
 
 STYLES = {Result.PASS: "bold green", Result.FAIL: "bold red", Result.NOT_CHECKED: "yellow"}
 PLAIN_WIDTH = 160  # columns assumed where the output is no terminal

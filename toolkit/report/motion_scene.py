@@ -12,13 +12,13 @@ from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
+from toolkit.execution.result import Execution
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.report.colors import EXECUTED, LIMB_COLORS, OPTIMISED, PREDICTED
 from toolkit.report.draw import draw_bodies, draw_patches, patch_corners
 from toolkit.robot.model import RobotModel
 from toolkit.search.result import SearchResult
-from toolkit.simulation.execution import Execution
 
 TIMELINE = "time"
 SEARCH_TIMELINE = "search"

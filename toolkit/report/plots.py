@@ -9,10 +9,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from toolkit.contacts.schedule import ContactSchedule
+from toolkit.execution.result import Execution
 from toolkit.geometry.limb import Limb
 from toolkit.report.colors import AXES, EXECUTED, LIMB_COLORS, LIMIT, OPTIMISED, unit
 from toolkit.report.series import slip_steps, thinned
-from toolkit.simulation.execution import Execution
 
 
 def draw_plots(path: Path, execution: Execution, schedule: ContactSchedule | None = None) -> None:

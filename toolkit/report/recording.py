@@ -11,6 +11,7 @@ import rerun as rr
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
+from toolkit.execution.result import Execution
 from toolkit.report.blueprint import blueprint
 from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, start_recording
 from toolkit.report.motion_scene import (
@@ -29,7 +30,6 @@ from toolkit.report.series import plot_execution, plot_motion, send_contact_stat
 from toolkit.report.summary import search_summary, summary
 from toolkit.robot.model import RobotModel
 from toolkit.search.result import SearchResult, Solution
-from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.world import World
 

@@ -8,14 +8,14 @@ from typing import Any, Protocol
 
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
+from toolkit.execution.check import Check
+from toolkit.execution.result import Execution
 from toolkit.report.arrays import write_execution, write_motion
 from toolkit.report.files import EXECUTION, MOTION, PLAN, RECORDING, REPORT, SCENE, write_scene
 from toolkit.report.plan_file import write_plan
 from toolkit.report.run_report import RunReport, write_report
 from toolkit.robot.model import RobotModel
 from toolkit.search.result import SearchResult, Solution
-from toolkit.simulation.check import Check
-from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.world import World
 

@@ -12,11 +12,11 @@ from typing import Any
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.centroidal.residual import check, cop_margin, friction_margin
 from toolkit.errors import InputError
+from toolkit.execution.check import Check
+from toolkit.execution.result import Execution
 from toolkit.report.checks import check_entries, read_checks
 from toolkit.report.files import read_json, write_json
 from toolkit.search.result import SearchResult, Solution
-from toolkit.simulation.check import Check
-from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.surface import Surface
 

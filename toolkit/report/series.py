@@ -10,10 +10,10 @@ import rerun as rr
 
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
+from toolkit.execution.result import Execution
 from toolkit.geometry.limb import Limb
 from toolkit.report.colors import AXES, EXECUTED, LIMB_COLORS, LIMIT, Color
 from toolkit.report.motion_scene import LEAST_FORCE, TIMELINE, at, limb_of, stance_times
-from toolkit.simulation.execution import Execution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 RATE = 100.0

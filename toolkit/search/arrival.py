@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from toolkit.prediction.evaluator import TransitionEvaluator
-from toolkit.search import screen
-from toolkit.search.cost import CostConfig
-from toolkit.search.graph import Edge
+from toolkit.search.anytime.graph import Edge
+from toolkit.search.costs.cost import CostConfig
+from toolkit.search.moves import screen
 from toolkit.search.problem import ContactProblem
-from toolkit.search.state import is_pending
+from toolkit.search.states.state import is_pending
 
 
 class Arrival:
@@ -41,7 +41,7 @@ class Arrival:
         self._windows, self._rest = windows, rest
 
     def __call__(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> Edge[bytes] | None:
-        """See `toolkit.search.graph.Judge`."""
+        """See `toolkit.search.anytime.graph.Judge`."""
         problem = self._problem
         last = problem.transition(edge.state, edge.payload)
         batch = self._evaluator.evaluate(*problem.origin(states[-1]), [last])

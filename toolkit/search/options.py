@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from toolkit.search.ana_star import AnaStarConfig
+from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.planner import PlannerConfig
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.search import screen
-from toolkit.search.graph import Path
+from toolkit.search.anytime.graph import Path
+from toolkit.search.moves import screen
 from toolkit.search.problem import ContactProblem
 from toolkit.search.result import Solution
-from toolkit.search.state import COM, VELOCITY, is_pending, unpack
+from toolkit.search.states.state import COM, VELOCITY, is_pending, unpack
 
 
 def solution_of(problem: ContactProblem, path: Path[bytes]) -> Solution:

@@ -17,23 +17,23 @@ from toolkit.errors import InputError, PlanningError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
-from toolkit.search import screen
-from toolkit.search.ana_star import AnaStarConfig, AnaStarResult
+from toolkit.search.anytime.ana_star import AnaStarConfig, AnaStarResult
+from toolkit.search.anytime.graph import Progress
+from toolkit.search.anytime.restart import search_in_turn
 from toolkit.search.arrival import Arrival
-from toolkit.search.contact_table import ContactTable
-from toolkit.search.exclusion import Exclusion
-from toolkit.search.graph import Progress
-from toolkit.search.heuristic import Distance, EuclideanDistance
-from toolkit.search.moves import MoveGenerator
+from toolkit.search.costs.heuristic import Distance, EuclideanDistance
+from toolkit.search.costs.terrain_distance import TerrainDistance, resting_surfaces
+from toolkit.search.moves import screen
+from toolkit.search.moves.exclusion import Exclusion
+from toolkit.search.moves.moves import MoveGenerator
+from toolkit.search.moves.start_palms import with_palms
 from toolkit.search.outcome import reason_of, solution_of
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.problem import ContactProblem
-from toolkit.search.restart import search_in_turn
 from toolkit.search.result import SearchResult
-from toolkit.search.start import place_feet
-from toolkit.search.start_palms import with_palms
-from toolkit.search.state import CONTACTS, is_pending, unpack
-from toolkit.search.terrain_distance import TerrainDistance, resting_surfaces
+from toolkit.search.states.contact_table import ContactTable
+from toolkit.search.states.start import place_feet
+from toolkit.search.states.state import CONTACTS, is_pending, unpack
 from toolkit.world.world import PALM_SITES, World
 
 _UNTRAINED = (

@@ -1,7 +1,7 @@
 """The contact search as a graph for ANA*: states, the transitions out of them, and what these cost (paper, Sec. V).
 
 Where judging a transition takes long, transitions wait to be judged until they are the best to go on with: the graph
-then has, between two states, one that stands for the transition not yet judged (`toolkit.search.state.pack_pending`).
+then has, between two states, one that stands for the transition not yet judged (`state.pack_pending`).
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.geometry.limb import PALMS, Limb
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
-from toolkit.search import screen
-from toolkit.search.candidates import CandidateGenerator, Candidates, mean_feet
-from toolkit.search.contact_table import ContactTable
-from toolkit.search.cost import CostConfig
-from toolkit.search.drift import Drift
-from toolkit.search.exclusion import Exclusion
-from toolkit.search.graph import Edge
-from toolkit.search.haste import Haste, HasteConfig
-from toolkit.search.heuristic import Distance
-from toolkit.search.moves import MoveGenerator
-from toolkit.search.reach_check import ReachCheck, ReachConfig
-from toolkit.search.state import (
+from toolkit.search.anytime.graph import Edge
+from toolkit.search.costs.cost import CostConfig
+from toolkit.search.costs.haste import Haste, HasteConfig
+from toolkit.search.costs.heuristic import Distance
+from toolkit.search.moves import screen
+from toolkit.search.moves.candidates import CandidateGenerator, Candidates, mean_feet
+from toolkit.search.moves.drift import Drift
+from toolkit.search.moves.exclusion import Exclusion
+from toolkit.search.moves.moves import MoveGenerator
+from toolkit.search.moves.reach_check import ReachCheck, ReachConfig
+from toolkit.search.states.contact_table import ContactTable
+from toolkit.search.states.state import (
     COM,
     CONTACTS,
     LAST,
@@ -52,7 +52,7 @@ _LEAST_RESERVE = 0.02  # of friction; what slides costs no more than what barely
 
 
 class ContactProblem:
-    """Graph of one search; see `toolkit.search.graph.SearchProblem`. Edge payloads are (objective, timing index).
+    """Graph of one search; see `search.anytime.graph.SearchProblem`. Edge payloads are (objective, timing index).
 
     Args:
         robot: the robot.

@@ -24,8 +24,8 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z, steepness
 from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.robot.model import RobotModel
-from toolkit.search.legs import legs_of, violated
-from toolkit.search.moves import MoveConfig
+from toolkit.search.moves.legs import legs_of, violated
+from toolkit.search.moves.moves import MoveConfig
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.world.surface import Surface

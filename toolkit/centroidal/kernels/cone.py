@@ -8,17 +8,17 @@ Reference: L. Vandenberghe, The CVXOPT linear and quadratic cone program solvers
 
 import math
 
-from toolkit.centroidal.kernels import compiled
+from toolkit.compiled import compiled
 
 
-@compiled
+@compiled(reordered=True)
 def norm_squared(x):
     """x_0^2 - |x_1..3|^2 as a product, which keeps its digits near the boundary."""
     tail = math.sqrt(x[1] * x[1] + x[2] * x[2] + x[3] * x[3])
     return (x[0] - tail) * (x[0] + tail)
 
 
-@compiled
+@compiled(reordered=True)
 def scale(s, z, w, lam):
     """Scaling of an interior pair (s, z): fills w (4,) and lam (4,), returns eta."""
     ss, zz = math.sqrt(max(norm_squared(s), 1e-300)), math.sqrt(max(norm_squared(z), 1e-300))
@@ -32,7 +32,7 @@ def scale(s, z, w, lam):
     return eta
 
 
-@compiled
+@compiled(reordered=True)
 def multiply(w, eta, x, out):
     """Out = W x."""
     dot = w[1] * x[1] + w[2] * x[2] + w[3] * x[3]
@@ -43,7 +43,7 @@ def multiply(w, eta, x, out):
     out[0] = first
 
 
-@compiled
+@compiled(reordered=True)
 def divide(w, eta, x, out):
     """Out = W^-1 x."""
     dot = w[1] * x[1] + w[2] * x[2] + w[3] * x[3]
@@ -54,7 +54,7 @@ def divide(w, eta, x, out):
     out[0] = first
 
 
-@compiled
+@compiled(reordered=True)
 def divide_twice(w, eta, x, out):
     """Out = W^-2 x = (2 J w (J w)' - J) x / eta^2."""
     dot = 2.0 * (w[0] * x[0] - w[1] * x[1] - w[2] * x[2] - w[3] * x[3])
@@ -64,7 +64,7 @@ def divide_twice(w, eta, x, out):
         out[i] = (x[i] - dot * w[i]) * inverse
 
 
-@compiled
+@compiled(reordered=True)
 def jordan_multiply(x, y, out):
     """Out = x o y, the Jordan product (x'y, x_0 y_1 + y_0 x_1)."""
     first = x[0] * y[0]
@@ -74,7 +74,7 @@ def jordan_multiply(x, y, out):
     out[0] = first
 
 
-@compiled
+@compiled(reordered=True)
 def jordan_divide(lam, d, out):
     """Out with lam o out = d."""
     dot = lam[1] * d[1] + lam[2] * d[2] + lam[3] * d[3]
@@ -84,7 +84,7 @@ def jordan_divide(lam, d, out):
     out[0] = first
 
 
-@compiled
+@compiled(reordered=True)
 def longest_step(s, ds):
     """Largest step t <= 1e10 with s + t ds in the cone, for s inside."""
     a = ds[0] * ds[0] - ds[1] * ds[1] - ds[2] * ds[2] - ds[3] * ds[3]

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled, cone
+from toolkit.centroidal.kernels import cone
 from toolkit.centroidal.kernels.setup import ROWS
+from toolkit.compiled import compiled
 
 
 class Point(NamedTuple):
@@ -24,13 +25,13 @@ class Point(NamedTuple):
     round: np.ndarray
 
 
-@compiled
+@compiled(reordered=True)
 def room(lines, rounds):
     """A point with undefined entries."""
     return Point(np.empty(lines), np.empty((rounds, 4)))
 
 
-@compiled
+@compiled(reordered=True)
 def add(point, factor, change):
     """Point += factor change."""
     for i in range(point.line.shape[0]):
@@ -40,7 +41,7 @@ def add(point, factor, change):
             point.round[i, a] += factor * change.round[i, a]
 
 
-@compiled
+@compiled(reordered=True)
 def copy(point, out):
     """Out = point."""
     for i in range(point.line.shape[0]):
@@ -50,7 +51,7 @@ def copy(point, out):
             out.round[i, a] = point.round[i, a]
 
 
-@compiled
+@compiled(reordered=True)
 def largest(point):
     """Largest absolute entry."""
     value = 0.0
@@ -62,7 +63,7 @@ def largest(point):
     return value
 
 
-@compiled
+@compiled(reordered=True)
 def dot(x, y):
     """Inner product of two points."""
     value = 0.0
@@ -74,7 +75,7 @@ def dot(x, y):
     return value
 
 
-@compiled
+@compiled(reordered=True)
 def invert(s, mu, z):
     """Z = mu s^-1: the multipliers that are central with the slacks s."""
     for i in range(s.line.shape[0]):
@@ -86,7 +87,7 @@ def invert(s, mu, z):
             z.round[i, a] = -factor * s.round[i, a]
 
 
-@compiled
+@compiled(reordered=True)
 def barrier(s):
     """Sum of log s of the half lines and of half the log s_0^2 - |s_1|^2 of the cones."""
     value = 0.0
@@ -97,7 +98,7 @@ def barrier(s):
     return value
 
 
-@compiled
+@compiled(reordered=True)
 def constants(data, out):
     """Fill a point with c."""
     line, round = out.line, out.round
@@ -114,7 +115,7 @@ def constants(data, out):
             round[contacts + b, 1 + a] = -data.ball_center[b, a]
 
 
-@compiled
+@compiled(reordered=True)
 def apply(data, u, x, out):
     """Fill a point with A (u, x)."""
     line, round = out.line, out.round
@@ -136,7 +137,7 @@ def apply(data, u, x, out):
                 round[contacts + b, 1 + a] = x[t, a]
 
 
-@compiled
+@compiled(reordered=True)
 def subtract_adjoint(data, point, contact_gradient, knot_gradient):
     """Subtract A' of a point from the gradients of contacts (C, 6) and knots (N + 1, 9)."""
     line, round = point.line, point.round
@@ -160,7 +161,7 @@ def subtract_adjoint(data, point, contact_gradient, knot_gradient):
                 g[a] -= round[contacts + b, 1 + a]
 
 
-@compiled
+@compiled(reordered=True)
 def add_hessian(data, weight, w, eta, contact_hessian, knot_hessian):
     """Add A' W^-2 A: `weight` is W^-2 of the half lines, (w, eta) the scaling of the cones. Lower triangles only."""
     contacts = data.mu.shape[0]
@@ -197,7 +198,7 @@ def add_hessian(data, weight, w, eta, contact_hessian, knot_hessian):
                 hessian[a, a] += inverse
 
 
-@compiled
+@compiled(reordered=True)
 def longest_step(point, change):
     """Largest step <= 1e10 with point + step change in the cones."""
     step = 1e10
@@ -209,7 +210,7 @@ def longest_step(point, change):
     return step
 
 
-@compiled
+@compiled(reordered=True)
 def refutes(data, multipliers, y_rest):
     """Whether multipliers of the knots' constraints prove that no motion exists.
 

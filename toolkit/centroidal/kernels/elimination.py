@@ -6,10 +6,10 @@ S = sum B H^-1 B', see `riccati`.
 
 import math
 
-from toolkit.centroidal.kernels import compiled
+from toolkit.compiled import compiled
 
 
-@compiled
+@compiled(reordered=True)
 def cholesky(a, n):
     """Lower factor in place of a symmetric matrix whose lower triangle is given; small pivots are lifted."""
     for j in range(n):
@@ -26,7 +26,7 @@ def cholesky(a, n):
             a[i, j] = value * inverse
 
 
-@compiled
+@compiled(reordered=True)
 def solve_lower(lower, b, n):
     """Solve L x = b in place."""
     for i in range(n):
@@ -36,7 +36,7 @@ def solve_lower(lower, b, n):
         b[i] = value / lower[i, i]
 
 
-@compiled
+@compiled(reordered=True)
 def solve_upper(lower, b, n):
     """Solve L' x = b in place."""
     for i in range(n - 1, -1, -1):
@@ -46,7 +46,7 @@ def solve_upper(lower, b, n):
         b[i] = value / lower[i, i]
 
 
-@compiled
+@compiled(reordered=True)
 def factor(first, wrench, hessian, spread, total):
     """Factor the contacts' Hessians, and sum them up into K of each step, with S = K K'.
 

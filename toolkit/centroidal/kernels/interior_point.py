@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled, cone, constraints, elimination, objective, riccati, start
+from toolkit.centroidal.kernels import cone, constraints, elimination, objective, riccati, start
 from toolkit.centroidal.kernels.setup import ROWS
+from toolkit.compiled import compiled
 
 SOLVED, INFEASIBLE, UNDECIDED = 0, 1, 2
 REST_STIFFNESS = 1e7
@@ -41,7 +42,7 @@ class Model(NamedTuple):
     step_hessian: np.ndarray
 
 
-@compiled
+@compiled(reordered=True)
 def linearise(data, u, x, w, y_rest, model, sweep):
     """Fill the model at a motion; returns the objective."""
     n = data.h.shape[0]
@@ -64,7 +65,7 @@ def linearise(data, u, x, w, y_rest, model, sweep):
     return value
 
 
-@compiled
+@compiled(reordered=True)
 def rest_terms(data, x, y_rest):
     """What the final rest adds to the barrier function."""
     total = 0.0
@@ -75,7 +76,7 @@ def rest_terms(data, x, y_rest):
     return total
 
 
-@compiled
+@compiled(reordered=True)
 def slope(data, model, du, dx):
     """Derivative of the objective along a direction."""
     total = 0.0
@@ -101,7 +102,7 @@ class Scaling(NamedTuple):
     lam: np.ndarray
 
 
-@compiled
+@compiled(reordered=True)
 def scale(s, z, scaling):
     """Fill the scaling of (s, z); returns s'z."""
     gap = 0.0
@@ -115,7 +116,7 @@ def scale(s, z, scaling):
     return gap
 
 
-@compiled
+@compiled(reordered=True)
 def enter_cones(residual, s):
     """Fill s with a point well inside the cones, equal to `residual` where that lies inside."""
     for i in range(s.line.shape[0]):
@@ -128,7 +129,7 @@ def enter_cones(residual, s):
             there[a] = here[a]
 
 
-@compiled
+@compiled(reordered=True)
 def direction(data, model, sweep, scaling, residual, s, z, gap, correct, targets, scratch, du, dx, ds, dz):
     """Fill the step that aims at complementarity `gap`.
 
@@ -190,7 +191,7 @@ def direction(data, model, sweep, scaling, residual, s, z, gap, correct, targets
             ds.round[i, a] += residual.round[i, a]
 
 
-@compiled
+@compiled(reordered=True)
 def solve(data, tolerance, max_iterations, u, x, w, z):
     """Solve a problem.
 

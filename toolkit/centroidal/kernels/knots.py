@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled
+from toolkit.compiled import compiled
 
 
-@compiled
+@compiled(reordered=True)
 def _ball(place, rotation, tip, root, yaw, com, center):
     """Fill the centre (3,) of the ball, about `com`, in which the CoM is within reach of a contact."""
     cos, sin = math.cos(yaw), math.sin(yaw)
@@ -20,7 +20,7 @@ def _ball(place, rotation, tip, root, yaw, com, center):
     center[2] -= root[2]
 
 
-@compiled
+@compiled(reordered=True)
 def reach(
     active,
     position,
@@ -73,7 +73,7 @@ def reach(
     ball_first[n + 1] = k
 
 
-@compiled
+@compiled(reordered=True)
 def planes(lowest, min_height, yaw, com, final_center, final_half_size, plane_first, plane_normal, plane_offset):
     """Fill the planes: least height of knots 1 .. N, final box."""
     n, p = lowest.shape[0] - 1, 0
@@ -100,7 +100,7 @@ def planes(lowest, min_height, yaw, com, final_center, final_half_size, plane_fi
     plane_first[n + 1] = p
 
 
-@compiled
+@compiled(reordered=True)
 def guess(active, position, com, final_center):
     """Path (N + 1, 3) of the CoM that follows the mean of the feet and ends in the middle of the final box."""
     n = active.shape[0]

@@ -6,10 +6,11 @@ averaged over a step, rbar = r + h/2 v + h^2/6 g, the rate of the angular moment
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled, riccati
+from toolkit.centroidal.kernels import riccati
+from toolkit.compiled import compiled
 
 
-@compiled
+@compiled(reordered=True)
 def advance(h, x, w, out):
     """Fill the knot `out` (9,) after a step of length h from x (9,) under the total wrench w (6,)."""
     riccati.forward(h, x, w, out)
@@ -17,7 +18,7 @@ def advance(h, x, w, out):
     out[5] -= h
 
 
-@compiled
+@compiled(reordered=True)
 def rollout(data, u, x, w):
     """Fill the knots x (N + 1, 9) and the total wrenches w (N, 6) of contact wrenches u (C, 6)."""
     for a in range(9):
@@ -27,7 +28,7 @@ def rollout(data, u, x, w):
         advance(data.h[t], x[t], w[t], x[t + 1])
 
 
-@compiled
+@compiled(reordered=True)
 def contact_terms(omega, weights, cop_weight, u, gradient, hessian):
     """Gradient (6,) and Gauss-Newton Hessian (6, 6) of a contact's terms; returns their value."""
     weight_f, weight_lateral, weight_torque = omega * weights[4], omega * weights[6], omega * weights[5]
@@ -63,7 +64,7 @@ def contact_terms(omega, weights, cop_weight, u, gradient, hessian):
     return 0.5 * (value + weight_x * cop_x * cop_x + weight_y * cop_y * cop_y)
 
 
-@compiled
+@compiled(reordered=True)
 def knot_terms(omega, weights, x, gradient, hessian):
     """Add to gradient (9,) and Hessian (9, 9) the terms |l|^2 and |k|^2 of a knot x, k = L - r x v; returns them."""
     wl, wk = omega * weights[0], omega * weights[2]
@@ -93,7 +94,7 @@ def knot_terms(omega, weights, x, gradient, hessian):
     return 0.5 * value
 
 
-@compiled
+@compiled(reordered=True)
 def step_terms(h, omega, weights, x, w, gradient, hessian):
     """Gradient (15,) and Hessian (15, 15) in (x, w) of the terms |l'|^2 and |k'|^2 of a step; returns their value."""
     wl, wk = omega * weights[1], omega * weights[3]
@@ -132,7 +133,7 @@ def step_terms(h, omega, weights, x, w, gradient, hessian):
     return 0.5 * value
 
 
-@compiled
+@compiled(reordered=True)
 def value(data, u, x, w):
     """The objective alone."""
     total = 0.0

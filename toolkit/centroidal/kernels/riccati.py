@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled
 from toolkit.centroidal.kernels.elimination import cholesky, solve_lower, solve_upper
+from toolkit.compiled import compiled
 
 
 class Sweep(NamedTuple):
@@ -36,7 +36,7 @@ class Sweep(NamedTuple):
     control: np.ndarray
 
 
-@compiled
+@compiled(reordered=True)
 def allocate(n, contacts):
     """Room for the factors of n steps."""
     return Sweep(
@@ -50,7 +50,7 @@ def allocate(n, contacts):
     )
 
 
-@compiled
+@compiled(reordered=True)
 def forward(h, x, w, out):
     """Out = A x + B w: the dynamics' linear part, gravity's constant left out."""
     for a in range(3):
@@ -61,7 +61,7 @@ def forward(h, x, w, out):
     out[7] += h * x[0] + h * h / 2 * x[3] + h**3 / 6 * w[0]
 
 
-@compiled
+@compiled(reordered=True)
 def backward(h, y, x, w):
     """X = A'y (9,) and w = B'y (6,): the adjoint of `forward`."""
     for a in range(3):
@@ -78,7 +78,7 @@ def backward(h, y, x, w):
     w[1] -= h**3 / 6 * y[6]
 
 
-@compiled
+@compiled(reordered=True)
 def factor_steps(data, knot_hessian, step_hessian, sweep):
     """Backward sweep of the matrices, with Hessians (N + 1, 9, 9) of knots and (N, 15, 15) of steps in (x, w)."""
     n = data.h.shape[0]
@@ -138,7 +138,7 @@ def factor_steps(data, knot_hessian, step_hessian, sweep):
                 value[a, b] = value[b, a] = entry
 
 
-@compiled
+@compiled(reordered=True)
 def sweep_back(data, contact_gradient, knot_gradient, step_gradient, sweep):
     """Backward sweep of gradients (C, 6), (N + 1, 9) and (N, 15); the contacts' are overwritten for `step_forward`."""
     n = data.h.shape[0]
@@ -180,7 +180,7 @@ def sweep_back(data, contact_gradient, knot_gradient, step_gradient, sweep):
                     y[c] += mixed[a, c] * row_w[a]
 
 
-@compiled
+@compiled(reordered=True)
 def step_forward(data, t, contact_gradient, sweep, dx, du):
     """Change of the wrenches of step t for a change dx (9,) of its first knot: fills du (C, 6) of its contacts."""
     v, lower = np.empty(6), sweep.total[t]
@@ -200,7 +200,7 @@ def step_forward(data, t, contact_gradient, sweep, dx, du):
         solve_upper(sweep.hessian[j], du[j], 6)
 
 
-@compiled
+@compiled(reordered=True)
 def total_wrench(first, wrench, t, u, w):
     """Fill w (6,) with the sum of the wrenches u (C, 6) of step t about the origin."""
     for a in range(6):
@@ -211,7 +211,7 @@ def total_wrench(first, wrench, t, u, w):
                 w[a] += wrench[j, a, b] * u[j, b]
 
 
-@compiled
+@compiled(reordered=True)
 def solve(data, contact_gradient, knot_gradient, step_gradient, sweep, du, dx):
     """Newton step of given gradients, as in `sweep_back`: fills du (C, 6) and dx (N + 1, 9)."""
     sweep_back(data, contact_gradient, knot_gradient, step_gradient, sweep)

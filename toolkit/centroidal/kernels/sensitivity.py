@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled, constraints, objective, setup
+from toolkit.centroidal.kernels import constraints, objective, setup
+from toolkit.compiled import compiled
 
 STEP = 1e-5
 """m, m/s, rad, s or friction; of the central differences, which err by 1e-9 relatively."""
@@ -19,7 +20,7 @@ PLACE, ROTATION, COM, VELOCITY, DURATION, FRICTION = 0, 1, 2, 3, 4, 5
 """What is varied."""
 
 
-@compiled
+@compiled(reordered=True)
 def lagrangian(data, u, z, x, w, slack, constant):
     """Objective less multipliers z times slacks of wrenches u (C, 6), no final rest; the other arrays are room."""
     objective.rollout(data, u, x, w)
@@ -29,7 +30,7 @@ def lagrangian(data, u, z, x, w, slack, constant):
     return objective.value(data, u, x, w) - constraints.dot(z, slack)
 
 
-@compiled
+@compiled(reordered=True)
 def turn(rotation, axis, angle):
     """Turn a frame (3, 3) in place about an axis of the world."""
     cos, sin = math.cos(angle), math.sin(angle)
@@ -39,7 +40,7 @@ def turn(rotation, axis, angle):
         rotation[b, k], rotation[c, k] = cos * first - sin * second, sin * first + cos * second
 
 
-@compiled
+@compiled(reordered=True)
 def heading(left, right):
     """Mean heading in rad of two feet with frames (3, 3), as in `build`."""
     x = y = 0.0
@@ -52,7 +53,7 @@ def heading(left, right):
     return math.atan2(y, x)
 
 
-@compiled
+@compiled(reordered=True)
 def vary(kind, row, axis, step, arguments):
     """The arguments of `setup.pack` with one thing changed by a step, and what follows from it.
 
@@ -110,7 +111,7 @@ def vary(kind, row, axis, step, arguments):
             root, tip, reach, height, center, box, rest, weights, grip, yaw_margin, limb, place, frame)  # fmt: skip
 
 
-@compiled
+@compiled(reordered=True)
 def derivatives(u, z, arguments):
     """Derivatives of the least objective of a transition.
 

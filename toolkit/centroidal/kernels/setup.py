@@ -17,8 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled, knots
+from toolkit.centroidal.kernels import knots
 from toolkit.centroidal.problem import STANDARD_GRAVITY
+from toolkit.compiled import compiled
 
 ROWS = 13
 """Linear constraints of a contact."""
@@ -71,7 +72,7 @@ class Data(NamedTuple):
     weights: np.ndarray
 
 
-@compiled
+@compiled(reordered=True)
 def contact_rows(mu, x, y, bound, yaw, rows):
     """Fill the 13 rows of a contact: force bound, 4 of the CoP, 8 of the yaw moment (Caron et al. 2015)."""
     rows[:] = 0.0
@@ -90,7 +91,7 @@ def contact_rows(mu, x, y, bound, yaw, rows):
         rows[5 + i, 5] = -sign * scale / yaw
 
 
-@compiled
+@compiled(reordered=True)
 def pack(
     mass,
     dt,
@@ -226,7 +227,7 @@ def pack(
     return data, violation
 
 
-@compiled
+@compiled(reordered=True)
 def unpack(data, active, mass, com, u, x):
     """Knots and contact forces in SI units, as in `CentroidalMotion`: com, linear, angular, force, cop, yaw torque."""
     n = data.h.shape[0]

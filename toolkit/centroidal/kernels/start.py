@@ -8,8 +8,9 @@ import math
 
 import numpy as np
 
-from toolkit.centroidal.kernels import compiled, elimination, objective, riccati
+from toolkit.centroidal.kernels import elimination, objective, riccati
 from toolkit.centroidal.kernels.setup import ROWS
+from toolkit.compiled import compiled
 
 FOLLOW = 30.0
 """Weight of the CoM's distance from its guess, per step of 0.2 s."""
@@ -23,7 +24,7 @@ ASTRAY = 20.0
 """m; a start further than this from its guess is given up."""
 
 
-@compiled
+@compiled(reordered=True)
 def share_weight(data, t, inside, u):
     """Fill u of step t with vertical forces that add up to the weight where the contacts' normals allow."""
     total = 0.0
@@ -37,7 +38,7 @@ def share_weight(data, t, inside, u):
         pull_inside(data.mu[j], data.force_bound[j], data.rows[j], inside, u[j])
 
 
-@compiled
+@compiled(reordered=True)
 def pull_inside(mu, bound, rows, inside, u):
     """Pull a wrench (6,) of a contact in: the normal force into its range; if `inside`, all into the cones."""
     u[2] = min(max(u[2], LEAST_FORCE), INSIDE * bound)
@@ -58,7 +59,7 @@ def pull_inside(mu, bound, rows, inside, u):
             u[a] *= factor
 
 
-@compiled
+@compiled(reordered=True)
 def follow(data, sweep, u, x, w):
     """Fill wrenches u (C, 6), states x (N + 1, 9) and total wrenches w (N, 6)."""
     n = data.h.shape[0]

@@ -1,0 +1,103 @@
+"""Contact states: early, in time, late, palms; force bounds without jumps."""
+
+import numpy as np
+import pytest
+
+from toolkit.contacts.stance import Contact
+from toolkit.control.config import ControllerConfig, TouchdownConfig
+from toolkit.control.reference import Reference, Swing
+from toolkit.control.touchdown import ContactTracker, LimbState
+from toolkit.geometry.limb import Limb
+from toolkit.geometry.pose import Pose
+
+PERIOD, WEIGHT = 0.002, 700.0
+TOUCH = TouchdownConfig()
+
+
+def tracker(swings, resting=(0, 1)):
+    contact = np.zeros((1, 4), bool)
+    contact[0, list(resting)] = True
+    empty = dict.fromkeys(Reference.__dataclass_fields__)
+    reference = Reference(**(empty | {"in_contact": contact, "swings": tuple(swings)}))
+    limits = np.array([np.inf, np.inf, 150.0, 150.0])
+    return ContactTracker(reference, tuple(Limb), WEIGHT, limits, ControllerConfig(), TOUCH)
+
+
+def swing(limb, start=1.0, end=2.0, makes=True, breaks=True):
+    contact = Contact(limb, Pose.identity(), 0.5, 0) if makes else None
+    return Swing(limb, start, end, 0, contact, breaks)
+
+
+def follow(state, limb, force, until, start=0.0):
+    """Run ticks with a force as a function of time; returns when contact was made."""
+    made = []
+    for time in np.arange(start, until, PERIOD):
+        measured = np.zeros(4)
+        measured[limb] = force(time)
+        state.update(time, PERIOD, measured)
+        if state.made[limb]:
+            made.append(time)
+    return made
+
+
+def test_a_foot_that_meets_the_ground_early_rests_there():
+    state = tracker([swing(Limb.LEFT_FOOT)])
+    made = follow(state, 0, lambda t: 30.0 if t > 1.8 else 0.0, 2.5)
+    assert len(made) == 1 and made[0] == pytest.approx(1.8, abs=2 * PERIOD)
+    assert state.in_contact[0]
+
+
+def test_forces_before_the_fraction_of_the_swing_are_ignored():
+    state = tracker([swing(Limb.LEFT_FOOT)])
+    made = follow(state, 0, lambda t: 300.0 if 1.0 < t < 1.5 else 0.0, 1.9)
+    assert made == [] and not state.in_contact[0]
+
+
+def test_a_foot_that_finds_no_ground_goes_on_but_not_for_ever():
+    state = tracker([swing(Limb.LEFT_FOOT)])
+    follow(state, 0, lambda t: 0.0, 2.1)
+    assert state.state[Limb.LEFT_FOOT] is LimbState.SEARCH
+    assert state.depth[0] == pytest.approx(0.1 * TOUCH.late_foot_speed, rel=0.05)
+    follow(state, 0, lambda t: 0.0, 5.0, start=2.1)
+    assert state.depth[0] == TOUCH.max_depth and state.search_speed(Limb.LEFT_FOOT) == 0.0
+    assert follow(state, 0, lambda t: 16.0, 5.1, start=5.0) and state.in_contact[0]
+
+
+def test_a_palm_needs_two_ticks_of_force():
+    state = tracker([swing(Limb.LEFT_PALM, breaks=False)], resting=(0, 1))
+    assert not state.in_contact[2]
+    ticks = iter([5.0, 0.0] * 400)
+    assert follow(state, 2, lambda t: next(ticks), 2.2, start=1.0) == []
+    assert len(follow(state, 2, lambda t: 5.0, 2.3, start=2.2)) == 1
+
+
+def test_a_broken_palm_hangs_free():
+    state = tracker([swing(Limb.LEFT_PALM, makes=False)], resting=(0, 1, 2))
+    follow(state, 2, lambda t: 50.0, 1.5)
+    assert state.state[Limb.LEFT_PALM] is LimbState.SWING and not state.in_contact[2]
+    follow(state, 2, lambda t: 0.0, 2.1, start=1.5)
+    assert state.state[Limb.LEFT_PALM] is LimbState.FREE
+
+
+def test_the_bound_on_the_normal_force_falls_before_the_swing_and_rises_after_it():
+    state, config = tracker([swing(Limb.LEFT_FOOT)]), ControllerConfig()
+    bounds = {}
+    for k in range(1200):
+        time = k * PERIOD
+        state.update(time, PERIOD, np.array([100.0 if time >= 2.0 else 0.0, 0, 0, 0]))
+        assert 0.0 <= state.min_force[0] <= state.max_force[0]
+        bounds[k] = state.max_force[0]
+    full = bounds[0]
+    assert full > 2.0 * WEIGHT
+    assert bounds[499] < config.release_force + 0.05 * full and bounds[450] == full
+    assert bounds[700] == 0.0
+    assert bounds[1001] < config.settle_force + 0.05 * full and bounds[1040] == full
+    # From one tick to the next while in contact: never more than the ramp's slope.
+    steps = [abs(bounds[k + 1] - bounds[k]) for k in range(499)]
+    assert max(steps) <= 1.01 * full * PERIOD / config.release_ramp
+
+
+def test_palms_keep_their_own_limit():
+    state = tracker([], resting=(0, 1, 2))
+    state.update(0.0, PERIOD, np.zeros(4))
+    assert state.max_force[2] == 150.0

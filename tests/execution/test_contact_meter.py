@@ -1,0 +1,35 @@
+import mujoco
+import pytest
+
+from toolkit.execution.contact_meter import ContactMeter
+from toolkit.execution.scene_index import SceneIndex
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.world.scene import compose_scene
+
+
+@pytest.fixture
+def landed(standing):
+    """A meter and a state with both soles on the floor."""
+    scene = compose_scene(standing.robot, standing.world)
+    data = mujoco.MjData(scene)
+    data.qpos[:] = standing.trajectory.qpos[0]
+    data.qpos[2] -= 1e-4
+    mujoco.mj_step(scene, data)
+    return ContactMeter(SceneIndex(scene, standing.robot)), data
+
+
+def test_soles_on_the_floor_are_planned(landed):
+    meter, data = landed
+    meter.read(data)
+    assert (meter.normal_force[list(FEET)] > 0.0).all()
+    assert not meter.unplanned
+
+
+def test_a_patch_that_should_be_free_touches_unplanned(landed):
+    """Its force is read all the same."""
+    meter, data = landed
+    meter.expected[Limb.LEFT_FOOT] = False
+    meter.read(data)
+    assert meter.unplanned and meter.unplanned_time == pytest.approx(data.time)
+    assert all("floor" in world for _, world in meter.unplanned_names)
+    assert meter.normal_force[Limb.LEFT_FOOT] > 0.0

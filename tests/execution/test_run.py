@@ -1,0 +1,158 @@
+"""Whole runs: standing, walking, replay; and runs that are broken on purpose must fail."""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+
+from toolkit.control.config import ExecutionConfig
+from toolkit.errors import ExecutionError, InputError
+from toolkit.execution.check import Result
+from toolkit.execution.disturbance import Disturbance
+from toolkit.execution.replay import replay, replay_controls
+from toolkit.execution.run import execute
+
+
+def failed(execution):
+    return {check.name for check in execution.checks if check.result is not Result.PASS}
+
+
+def test_a_standing_robot_stands_still(standing):
+    execution = standing.run()
+    assert failed(execution) == set()
+    assert execution.com_rms_error < 2e-3
+    assert execution.slip == (execution.max_slip,) and execution.max_slip < 1e-3
+    weight = standing.robot.mass * 9.81
+    np.testing.assert_allclose(execution.wrench[-1, :, 2].sum(), weight, rtol=1e-3)
+
+
+def test_a_short_walk_arrives(walking, walked):
+    assert failed(walked) == set(), walked.checks
+    assert walked.completed and walked.goal_reached and not walked.fell
+    assert walked.solver_failures == 0
+    assert walked.com_rms_error < 0.01
+    assert len(walked.touchdowns) == 2 and walked.max_touchdown_error < 0.01
+    assert len(walked.slip) == 3
+    for entry, transition in zip(walked.touchdowns, walking.sequence.transitions, strict=True):
+        assert entry["limb"] == transition.limb.label
+        assert abs(entry["time"] - entry["planned_time"]) < 0.1
+
+
+def test_measured_forces_carry_the_measured_motion(walking, walked):
+    """Newton: contact forces and gravity change the momentum by just what was measured."""
+    force = walked.wrench[:, :, :3].sum(1) + walking.robot.mass * np.array([0.0, 0.0, -9.81])
+    period = walked.tick_times[1] - walked.tick_times[0]
+    gained = np.cumsum(force[:-1], axis=0) * period
+    change = walked.momentum[1:, :3] - walked.momentum[0, :3]
+    # Implicit damping moves some impulse between neighbouring steps; 1 N s of 700 N is 1.5 ms of weight.
+    np.testing.assert_allclose(change, gained, atol=1.0)
+
+
+def test_replay_of_the_controls_ends_in_the_same_state_exactly(walked, tmp_path):
+    again = replay_controls(walked.scene, walked.qpos0, walked.qvel0, walked.ctrl)
+    assert np.abs(again - walked.final_qpos).max() == 0.0
+    mujoco.mj_saveModel(walked.scene, str(tmp_path / "scene.mjb"), None)
+    names = ("timestep", "qpos0", "qvel0", "ctrl")
+    arrays = {name: getattr(walked, name) for name in names} | {"qpos": walked.final_qpos[None]}
+    np.savez(tmp_path / "execution.npz", **arrays)
+    assert replay(tmp_path / "scene.mjb", tmp_path / "execution.npz").difference == 0.0
+    arrays["ctrl"] = walked.ctrl + 1e-3
+    np.savez(tmp_path / "other.npz", **arrays)
+    assert replay(tmp_path / "scene.mjb", tmp_path / "other.npz").difference > 0.0
+
+
+def test_replay_refuses_what_is_not_a_run(walked, tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        replay(tmp_path / "scene.mjb", tmp_path / "execution.npz")
+    mujoco.mj_saveModel(walked.scene, str(tmp_path / "scene.mjb"), None)
+    np.savez(tmp_path / "execution.npz", qpos0=walked.qpos0)
+    with pytest.raises(InputError, match="lacks timestep, qvel0, ctrl, qpos"):
+        replay(tmp_path / "scene.mjb", tmp_path / "execution.npz")
+
+
+def test_only_limited_joint_torques_act(walking, walked):
+    limit = walking.robot.torque_limit
+    assert (np.abs(walked.ctrl) <= limit).all()
+    assert (np.abs(walked.torque) <= limit).all() and walked.max_torque_ratio <= 1.0
+    np.testing.assert_array_equal(walked.torque[0], walked.ctrl[0])
+
+
+def test_sampled_poses_are_those_of_the_sampled_states(walking, walked):
+    data = mujoco.MjData(walked.scene)
+    for k in (0, len(walked.qpos) // 2, len(walked.qpos) - 1):
+        data.qpos[:], data.qvel[:] = walked.qpos[k], walked.qvel[k]
+        mujoco.mj_forward(walked.scene, data)
+        for limb, model in walking.robot.limbs.items():
+            np.testing.assert_allclose(walked.limb_pose[k, limb, :3], data.site(model.site).xpos, atol=1e-12)
+        np.testing.assert_allclose(walked.com[k], data.subtree_com[0], atol=1e-12)
+
+
+def test_a_robot_without_its_motors_falls(walking):
+    """A robot whose motors give a hundredth of what the plan needs sinks, and the run says so."""
+    weak = dataclasses.replace(walking.robot, torque_limit=0.01 * walking.robot.torque_limit)
+    execution = execute(weak, walking.world, walking.sequence, walking.schedule, walking.motion, walking.trajectory)
+    assert execution.fell and not execution.completed and execution.fall_reason
+    assert {"upright", "completed"} <= failed(execution)
+
+
+def test_a_push_that_is_too_strong_is_a_fall_and_is_not_replayable(walking):
+    config = ExecutionConfig(disturbance=Disturbance(push=3000.0, push_time=0.3, push_duration=0.3))
+    execution = walking.run(config=config)
+    assert not execution.replayable and execution.fell
+    again = replay_controls(execution.scene, execution.qpos0, execution.qvel0, execution.ctrl)
+    assert np.abs(again - execution.final_qpos).max() > 0.0
+
+
+def test_a_foot_planned_below_the_floor_touches_early_and_is_missed_by_its_plan(walking):
+    """Touchdown error is measured against the plan, not against where the foot happens to be."""
+    moved = walking.sequence.transitions[0]
+    pose = dataclasses.replace(moved.contact.pose, position=moved.contact.pose.position - [0.0, 0.0, 0.03])
+    contact = dataclasses.replace(moved.contact, pose=pose)
+    transitions = (dataclasses.replace(moved, contact=contact), *walking.sequence.transitions[1:])
+    sequence = dataclasses.replace(walking.sequence, transitions=transitions)
+    execution = walking.run_with(sequence)
+    assert execution.touchdowns[0]["position_error"] == pytest.approx(0.03, abs=0.01)
+
+
+def test_wrong_friction_in_the_scene_is_noticed(walking, monkeypatch):
+    from toolkit.execution import run
+
+    def slippery(robot, world):
+        scene = compose(robot, world)
+        scene.geom_priority[:] = 0  # the larger of both frictions wins: the robot's own 1.0
+        scene.geom_friction[:, 0] = np.where(scene.geom_bodyid == 0, scene.geom_friction[:, 0], 1.0)
+        return scene
+
+    compose = run.compose_scene
+    monkeypatch.setattr(run, "compose_scene", slippery)
+    assert "friction" in failed(walking.run())
+
+
+def test_the_goal_counts_for_the_feet(walking, flat):
+    elsewhere = flat(5.0)
+    execution = execute(
+        walking.robot, elsewhere, walking.sequence, walking.schedule, walking.motion, walking.trajectory
+    )
+    assert failed(execution) == {"goal_distance"} and not execution.goal_reached
+
+
+def test_plans_of_another_length_or_robot_are_refused(walking, standing):
+    with pytest.raises(ExecutionError, match="plan both together"):
+        execute(walking.robot, walking.world, walking.sequence, walking.schedule, standing.motion, walking.trajectory)
+    cut = dataclasses.replace(walking.trajectory, qpos=walking.trajectory.qpos[:, :-1])
+    with pytest.raises(ExecutionError, match="plan it with the robot that executes it"):
+        execute(walking.robot, walking.world, walking.sequence, walking.schedule, walking.motion, cut)
+
+
+def test_progress_is_told(standing):
+    told = []
+    standing.run(observer=lambda share, detail: told.append((share, detail)))
+    shares = [share for share, _ in told]
+    assert shares == sorted(shares) and 0.0 <= shares[0] and shares[-1] < 1.0
+
+
+def test_palms_are_free_without_contacts(walked, walking):
+    for palm in (limb for limb in walking.robot.limbs if not limb.is_foot):
+        assert (walked.wrench[:, palm] == 0.0).all()
+        assert np.isnan(walked.cop_margin[:, palm]).all()

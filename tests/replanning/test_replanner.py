@@ -1,0 +1,191 @@
+"""Replanning: the program about a plan, and runs with it."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from toolkit.control.config import ExecutionConfig
+from toolkit.control.reference import sample_reference
+from toolkit.execution.disturbance import Disturbance
+from toolkit.geometry.limb import Limb
+from toolkit.replanning.config import ReplanConfig
+from toolkit.replanning.contacts import Cones, Situation
+from toolkit.replanning.dynamics import G
+from toolkit.replanning.kernel import solve
+from toolkit.replanning.nominal import Nominal
+from toolkit.replanning.problem import ReplanProblem
+from toolkit.wholebody.limb_paths import limb_paths
+
+CONFIG = ReplanConfig(enabled=True)
+WITH = ExecutionConfig(replanning=CONFIG)
+
+
+@pytest.fixture(scope="module")
+def nominal(walking):
+    plan = walking
+    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion)
+    times = np.arange(0.0, plan.schedule.duration, 0.01)
+    reference = sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, paths, plan.robot)
+    return Nominal.of(plan.motion, reference, plan.robot, CONFIG)
+
+
+@pytest.fixture(scope="module")
+def problem(walking, nominal):
+    return ReplanProblem(nominal, walking.robot, walking.world.surfaces, CONFIG)
+
+
+def situation(walking, nominal, time, com=(0, 0, 0), velocity=(0, 0, 0), **options):
+    """The planned state at a time, displaced."""
+    planned_com, planned_velocity, _ = walking.motion.sample(time)
+    spin = [np.interp(time, nominal.times, nominal.spin[:, k]) for k in range(3)]
+    step = int(np.searchsorted(nominal.times, time + 1e-6)) - 1
+    standing = {
+        Limb(limb): (int(nominal.landing[step, limb]), nominal.position[step, limb], nominal.rotation[step, limb])
+        for limb in np.flatnonzero(nominal.active[step])
+    }
+    moving = {
+        index: np.zeros(3)
+        for index, swing in enumerate(nominal.swings)
+        if swing.start <= time < swing.end and swing.limb not in standing
+    }
+    values: dict[str, Any] = dict(
+        time=time,
+        com=planned_com + com,
+        velocity=planned_velocity + velocity,
+        spin=np.array(spin),
+        standing=standing,
+        fixed={},
+        moving=moving,
+        goal={},
+        landing={},
+        earliest={},
+        com_shift=np.zeros(3),
+        displaced=True,
+        cones=Cones(0.85, 0.8, walking.robot.half_sizes - 0.02),
+    )
+    return Situation(**(values | options))
+
+
+def mid_swing(nominal):
+    """A time early in the first swing."""
+    swing = nominal.swings[0]
+    return swing.start + 0.2 * (swing.end - swing.start)
+
+
+def test_the_grid_is_the_plan(walking, nominal):
+    for k in range(0, len(nominal.times), 7):
+        com, velocity, _ = walking.motion.sample(float(nominal.times[k]))
+        np.testing.assert_allclose(nominal.com[k], com, rtol=0.0, atol=1e-9)
+        if nominal.times[k] < walking.motion.problem.times[-1]:
+            np.testing.assert_allclose(nominal.velocity[k], velocity, rtol=0.0, atol=1e-9)
+    assert np.diff(nominal.times).max() <= CONFIG.max_dt + 1e-9
+    assert (nominal.rows.clearance >= 0.0).all() and np.isfinite(nominal.rows.gradient).all()
+
+
+def test_an_undisturbed_state_changes_nothing(walking, nominal, problem):
+    for time in (0.0, mid_swing(nominal), 0.5 * nominal.times[-1]):
+        replan = problem.solve(situation(walking, nominal, time), solve)
+        assert replan is not None
+        # What the solver leaves of the distance to its rows at its tolerance.
+        np.testing.assert_allclose(replan.com, 0.0, rtol=0.0, atol=2e-3)
+        assert all(np.linalg.norm(shift) < 2e-3 for shift in replan.landing.values())
+
+
+def test_a_replan_obeys_the_dynamics(walking, nominal, problem):
+    time = mid_swing(nominal)
+    replan = problem.solve(situation(walking, nominal, time, velocity=(0.05, 0.1, 0.0)), solve)
+    dt = np.diff(replan.times)
+    k = int(np.searchsorted(nominal.times, time + 1e-6)) - 1
+    planned = [walking.motion.sample(float(each))[:2] for each in replan.times]
+    com, velocity = (np.array(part) for part in zip(*planned, strict=True))
+    velocity[replan.times >= walking.motion.problem.times[-1]] = 0.0
+    com, velocity = com + replan.com, velocity + replan.velocity
+    spin = (
+        np.column_stack([np.interp(replan.times, nominal.times, part) for part in nominal.wrench_spin.T]) + replan.spin
+    )
+    for t in range(len(dt)):
+        force, moment = np.zeros(3), np.zeros(3)
+        for limb in np.flatnonzero(nominal.active[k + t]):
+            place = nominal.position[k + t, limb].copy()
+            event = int(nominal.landing[k + t, limb])
+            place += replan.landing.get(event, np.zeros(3))
+            turn = nominal.rotation[k + t, limb]
+            own = G * turn @ replan.wrench[t, limb, :3]
+            force += own
+            moment += np.cross(place, own) + G * turn @ replan.wrench[t, limb, 3:]
+        acceleration = force - [0.0, 0.0, G]
+        np.testing.assert_allclose(np.diff(velocity, axis=0)[t], dt[t] * acceleration, rtol=0.0, atol=1e-9)
+        about = spin[t : t + 2] + np.cross(com[t : t + 2], velocity[t : t + 2])
+        mean = com[t] + dt[t] * (velocity[t] / 2 + dt[t] * acceleration / 6)
+        rate = moment + np.cross(mean, [0.0, 0.0, -G])
+        # The product of a landing's shift and the change of its force is left out: 5 cm times a part of the weight.
+        exact = 1e-9 if not any(np.abs(shift).max() > 1e-9 for shift in replan.landing.values()) else 0.3
+        np.testing.assert_allclose(np.diff(about, axis=0)[0], dt[t] * rate, rtol=0.0, atol=exact * dt[t])
+
+
+def test_a_push_moves_the_landing_along(walking, nominal, problem):
+    time = mid_swing(nominal)
+    ahead = problem.solve(situation(walking, nominal, time, velocity=(0.4, 0.0, 0.0)), solve)
+    back = problem.solve(situation(walking, nominal, time, velocity=(-0.4, 0.0, 0.0)), solve)
+    assert ahead.landing[0][0] > 0.005 and back.landing[0][0] < -0.005
+    assert max(np.abs(shift).max() for shift in (*ahead.landing.values(), *back.landing.values())) < 0.16
+
+
+def test_a_kept_landing_is_not_moved(walking, nominal, problem):
+    time = mid_swing(nominal)
+    fixed = {0: np.array([0.01, 0.0, 0.0])}
+    kept = situation(walking, nominal, time, velocity=(0.25, 0.0, 0.0), moving={}, fixed=fixed)
+    assert 0 not in problem.solve(kept, solve).landing
+
+
+def test_no_answer_is_none(walking, nominal, problem):
+    broken = situation(walking, nominal, 0.0, com=(np.nan, 0.0, 0.0))
+    assert problem.solve(broken, solve) is None
+
+
+def test_a_small_push_moves_no_landing(walking, nominal, problem):
+    time = mid_swing(nominal)
+    small = problem.solve(situation(walking, nominal, time, velocity=(0.01, 0.0, 0.0), displaced=False), solve)
+    assert small is not None and not small.landing and not small.ends
+    large = problem.solve(situation(walking, nominal, time, velocity=(0.4, 0.0, 0.0), displaced=False), solve)
+    assert large is not None and large.landing[0][0] > 0.005
+
+
+def test_an_undisturbed_run_is_the_same_with_replanning(walking):
+    run = walking.run(config=WITH)
+    assert run.replans >= 20 * (run.simulated_seconds - CONFIG.horizon)
+    assert run.replan_landings == run.replan_failures == 0
+    assert all(check.result.value == "PASS" for check in run.checks if check.name != "goal")
+    without = walking.run(config=replace(WITH, replanning=replace(CONFIG, enabled=False)))
+    if not run.replan_departures:
+        np.testing.assert_array_equal(run.ctrl, without.ctrl)
+    assert run.com_rms_error < without.com_rms_error + 1e-3
+
+
+def test_a_push_is_replanned_and_the_error_counts_from_there(walking):
+    run = walking.run(config=replace(WITH, disturbance=Disturbance(push=120.0, push_time=0.3, push_direction=1.5)))
+    assert not run.fell and run.replan_departures > 0 and run.replan_failures == 0
+    error = np.sqrt(((run.com - run.com_planned) ** 2).sum(1).mean())
+    assert 0.0 < run.com_rms_error < error
+
+
+def test_a_run_without_it_counts_none(walking):
+    run = walking.run(config=replace(WITH, replanning=replace(CONFIG, enabled=False)))
+    assert run.replans == run.replan_failures == 0 and run.replan_seconds == 0.0
+
+
+@pytest.mark.slow
+def test_a_pushed_run_is_the_same_twice(walking):
+    config = replace(WITH, disturbance=Disturbance(push=150.0, push_time=0.9, push_direction=1.5))
+    first, second = walking.run(config=config), walking.run(config=config)
+    assert not first.fell
+    np.testing.assert_array_equal(first.ctrl, second.ctrl)
+
+
+def test_an_answer_that_fails_is_counted_and_the_last_goes_on(walking, monkeypatch):
+    monkeypatch.setattr(ReplanProblem, "solve", lambda *_: None)
+    run = walking.run(config=replace(WITH, disturbance=Disturbance(push=60.0, push_time=0.3, push_direction=1.5)))
+    assert run.replan_failures == run.replan_departures > 0
+    assert not run.fell

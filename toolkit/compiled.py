@@ -1,0 +1,150 @@
+"""The one door to the compiler: functions that numba compiles, and a cache on disk that knows their sources.
+
+numba's own cache watches only the file of the compiled function. Here the entry on disk carries a digest of the
+function and of everything that it calls or reads, however far below and in whatever file. An edit anywhere in it makes
+the next call compile again; an edit of a comment, or of a function that is not called, does not.
+
+A function that only other compiled functions call is decorated with `@compiled`. One that Python calls is decorated
+with `@compiled(kept=True)`, and what was compiled is kept on disk: beside the source, or, where that folder cannot be
+written, in numba's folder of the user. Where neither can be written, it is compiled anew in each process.
+"""
+
+from __future__ import annotations
+
+import enum
+import hashlib
+import types
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.dispatcher import Dispatcher
+
+REORDERED = frozenset({"reassoc", "contract", "arcp", "nsz"})
+"""What LLVM may do to floating-point sums where a kernel allows it; nan and inf keep their meaning."""
+
+
+def compiled(function: Callable | None = None, *, kept: bool = False, reordered: bool = False) -> Any:
+    """Compile a function with numba when it is first called.
+
+    Division by zero gives inf or nan, and the GIL is released.
+
+    Args:
+        function: The function; None where the decorator is called with options.
+        kept: Whether the compiled code is kept on disk. This is for functions that Python calls.
+        reordered: Whether the compiler may reorder sums.
+
+    Returns:
+        The dispatcher that takes the function's place, or the decorator that makes it.
+    """
+    if function is None:
+        return lambda function: compiled(function, kept=kept, reordered=reordered)
+    dispatcher = njit(function, error_model="numpy", nogil=True, fastmath=set(REORDERED) if reordered else False)
+    if kept:
+        try:
+            dispatcher._cache = _SourceCache(function)
+        except RuntimeError:  # numba found no folder to write to
+            pass
+    return dispatcher
+
+
+def digest(function: Callable) -> str:
+    """A digest of a function's code and of all code and constants that it reaches through global names.
+
+    Args:
+        function: A plain function, or one that was compiled.
+
+    Returns:
+        Hexadecimal digits. They are the same in every process while nothing that the function reaches has changed.
+    """
+    found: dict[str, str] = {}
+    waiting: list[Any] = [function]
+    while waiting:
+        item = waiting.pop()
+        item = item.py_func if isinstance(item, Dispatcher) else item
+        name = f"{item.__module__}.{item.__qualname__}"
+        if name in found:
+            continue
+        found[name] = ""  # before what it calls, which may call it
+        text, called = _described(item)
+        found[name] = text
+        waiting += called
+    return hashlib.sha256(repr(sorted(found.items())).encode()).hexdigest()
+
+
+class _SourceCache(FunctionCache):
+    """numba's cache of one function, whose index is dropped when the digest of the function changes."""
+
+    def __init__(self, py_func: Callable):
+        super().__init__(py_func)
+        self._digested = False
+
+    def _load_overload(self, sig, target_context):
+        self._digest()
+        return super()._load_overload(sig, target_context)
+
+    def _save_overload(self, sig, data):
+        self._digest()
+        super()._save_overload(sig, data)
+
+    def _digest(self) -> None:
+        """Stamp the index with the digest instead of the file's time; late, since callees may be defined late."""
+        if not self._digested:
+            self._digested = True
+            stamp = digest(self._py_func)
+            self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
+
+
+def _described(function: Callable) -> tuple[str, list[Callable]]:
+    """A function's own code and constants as text, and the functions that it may call."""
+    codes = _codes(function.__code__)
+    known = dict(function.__globals__)
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        known[name] = cell.cell_contents
+    names = {name for code in codes for name in (*code.co_names, *code.co_freevars)}
+    parts = [_text(code) for code in codes] + [repr(function.__defaults__)]
+    called: list[Callable] = []
+    for name in sorted(names & known.keys()):
+        value = known[name]
+        if isinstance(value, types.ModuleType) and not value.__name__.startswith("toolkit."):
+            continue  # a library: its version is numba's concern
+        members = [value]
+        if isinstance(value, types.ModuleType):  # of a module, whatever the code may take from it
+            members = [vars(value)[attribute] for attribute in sorted(names & vars(value).keys())]
+        for member in members:
+            if isinstance(member, (Dispatcher, types.FunctionType)):
+                called.append(member)
+            else:
+                parts.append(f"{name}={_constant(member)}")
+    return "\n".join(parts), called
+
+
+def _codes(code: types.CodeType) -> list[types.CodeType]:
+    """A code object and those nested in it."""
+    nested = [item for item in code.co_consts if isinstance(item, types.CodeType)]
+    return [code, *(inner for item in nested for inner in _codes(item))]
+
+
+def _text(code: types.CodeType) -> str:
+    """What a code object does, without its line numbers and its docstring."""
+    constants = [item for item in code.co_consts if not isinstance(item, types.CodeType)]
+    if code.co_consts and isinstance(code.co_consts[0], str):
+        constants = constants[1:]
+    return repr((code.co_code.hex(), constants, code.co_names, code.co_varnames))
+
+
+def _constant(value: Any) -> str:
+    """A global value as text that is the same in every process."""
+    if isinstance(value, type) and issubclass(value, enum.Enum):
+        return repr([(item.name, item.value) for item in value])
+    if isinstance(value, type):
+        return repr((value.__qualname__, getattr(value, "_fields", ())))
+    if isinstance(value, np.ndarray):
+        return repr((value.shape, value.dtype.str, value.tobytes()))
+    if isinstance(value, (tuple, list)):
+        return repr([_constant(item) for item in value])
+    if isinstance(value, (bool, int, float, str, bytes, type(None), np.generic)):
+        return repr(value)
+    return type(value).__qualname__

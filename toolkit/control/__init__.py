@@ -1,0 +1,1 @@
+"""Control: the plan as a reference, and the joint torques that carry it out."""

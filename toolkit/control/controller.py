@@ -1,0 +1,243 @@
+"""Controller: joint torques that carry a reference out, by inverse dynamics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.centroidal.problem import Margins
+from toolkit.control.config import ExecutionConfig, TaskGains
+from toolkit.control.dynamics import RobotDynamics
+from toolkit.control.joint_box import JointBox
+from toolkit.control.limb_target import LimbTargets
+from toolkit.control.qp import FORCE_UNIT, ContactQP
+from toolkit.control.reference import Reference
+from toolkit.control.touchdown import ContactTracker, LimbState
+from toolkit.geometry.limb import Limb
+from toolkit.replanning.problem import Cones
+from toolkit.replanning.replanner import MotionTarget, Replanner
+from toolkit.robot.model import RobotModel
+
+
+class Controller:
+    """Tracks a reference with an inverse-dynamics QP, once per control tick.
+
+    A tick evaluates the robot's dynamics at the given state, decides which limbs are in contact, and solves for joint
+    accelerations and contact wrenches that follow all tasks best while respecting physics and the robot's limits.
+
+    Attributes:
+        tracker: which limbs are in contact.
+        failures: ticks whose QP was not solved as posed; each was then solved without acceleration boxes and least
+            forces, or, where that failed too (`blind`), held its posture with joint gains.
+        wrench: (4, 6) wanted wrenches in the contact frames at the last tick.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        reference: Reference,
+        margins: Margins,
+        config: ExecutionConfig,
+        replanner: Replanner | None = None,
+    ):
+        """Prepare for a run.
+
+        Args:
+            robot: the robot as the controller knows it.
+            reference: the plan at the control ticks.
+            margins: the plan's margins; the controller's lie between them and none.
+            config: settings.
+            replanner: optimises motion and landing points anew; they stay as planned where None.
+        """
+        self._replanner, self.aim = replanner, MotionTarget.zeros()
+        self._com, self._com_velocity = np.zeros(3), np.zeros(3)
+        self._robot, self._reference, self._config = robot, reference, config.controller
+        self._period = config.control_period
+        self.dynamics = RobotDynamics(robot)
+        self.limbs = self.dynamics.limbs
+        weight = self.dynamics.mass * float(np.linalg.norm(self.dynamics.gravity))
+        limit = np.zeros(4)
+        for limb, model in robot.limbs.items():
+            limit[limb] = model.max_normal_force
+        self.tracker = ContactTracker(reference, self.limbs, weight, limit, config.controller, config.touchdown)
+        self.targets = LimbTargets(reference, self.tracker, config.controller)
+        self._box = JointBox(robot, config.controller)
+        self._torque_limit = config.controller.torque_fraction * robot.torque_limit
+        nesting, urgent_nesting = config.controller.nesting, config.controller.urgent_nesting
+        self._limits = {
+            urgent: Cones(
+                min(1.0 + nesting * (margins.friction - 1.0), config.controller.max_friction),
+                min(1.0 + nesting * (margins.yaw - 1.0), config.controller.max_yaw),
+                robot.half_sizes - shrink * np.minimum(margins.cop, robot.half_sizes / 2.0),
+            )
+            for urgent, shrink in ((False, nesting), (True, urgent_nesting))
+        }
+        self._urgent, self._calm = False, 1.0
+        legs = np.zeros(len(robot.joint_names), bool)
+        for limb in self.limbs:
+            if limb.is_foot:
+                legs[robot.joints_to(limb)] = True
+        gains, nv = config.controller, self.dynamics.nv
+        self._posture_weight = np.where(legs, gains.leg_posture, 1.0) * gains.posture.weight
+        self._arms = {limb: robot.arm_joints(limb) for limb in self.limbs if not limb.is_foot}
+        self._posture = self._posture_weight.copy()
+        self._diagonal = np.full(nv + 18, gains.acceleration)
+        self._diagonal[3:6] += gains.base.weight
+        self._diagonal[6:nv] += self._posture_weight
+        self._diagonal[nv:] = gains.force * FORCE_UNIT**2
+        self._target = np.zeros(nv + 18)
+        self._tasks, self._wanted = np.zeros((6 + 24, nv)), np.zeros(6 + 24)
+        self._qps: dict[tuple[Limb, ...], ContactQP] = {}
+        self._error = np.zeros(3)
+        self.failures = self.blind = 0
+        self.wrench = np.zeros((4, 6))
+
+    def tick(self, index: int, qpos: np.ndarray, qvel: np.ndarray, normal_force: np.ndarray) -> np.ndarray:
+        """One control tick.
+
+        Args:
+            index: row of the reference.
+            qpos: (7 + n,) MuJoCo order.
+            qvel: (6 + n,) MuJoCo order.
+            normal_force: (4,) N; measured along the patches' normals.
+
+        Returns:
+            (n,) joint torques in N m within the limits.
+        """
+        self.dynamics.update(qpos, qvel)
+        self.tracker.update(float(self._reference.times[index]), self._period, normal_force)
+        self._com[:], self._com_velocity[:] = self._reference.com[index], self._reference.com_velocity[index]
+        self.aim.follow(self._reference, index)
+        if self._replanner is not None:
+            cones = self._limits[self._urgent]
+            self._replanner.update(index, self._period, self.dynamics, self.tracker, self.targets, cones, self.aim)
+            self._com += self._replanner.com_shift
+        self.targets.update(index, self.dynamics)
+        limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
+        qp = self._qps.get(limbs)
+        if qp is None:
+            qp = self._qps[limbs] = ContactQP(limbs, self.dynamics.nv)
+        self._sense_urgency()
+        self._constrain(qp, index, qpos, qvel)
+        self._pursue(qp, index, qpos, qvel)
+        x = qp.solve()
+        if x is None:
+            self.failures += 1
+            x = qp.solve_relaxed()
+        if x is None:
+            self.blind += 1
+            return self._hold(index, qpos, qvel)
+        self.wrench[:] = 0.0
+        for limb in limbs:
+            self.wrench[limb] = qp.wrench(x, limb)
+        torque = (qp.rows[6 : qp.nv] @ x) + self.dynamics.bias[6:]
+        limit = self._robot.torque_limit
+        return np.clip(torque, -limit, limit)
+
+    def _constrain(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Fill in dynamics, cones and boxes."""
+        dynamics, tracker = self.dynamics, self.tracker
+        friction, limits = self._reference.friction[index], self._limits[self._urgent]
+        qp.set_dynamics(
+            dynamics.mass_matrix, dynamics.bias, dynamics.jacobian, dynamics.limb_rotation, self._torque_limit
+        )
+        for limb in qp.limbs:
+            qp.set_cone(limb, friction[limb] * limits.friction, limits.half_size[limb], limits.yaw)
+            qp.set_normal_force(limb, tracker.min_force[limb], tracker.max_force[limb])
+        self._box.update(qpos[7:], qvel[6:])
+        qp.set_acceleration(self._box.lower, self._box.upper)
+
+    def _pursue(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Fill in the objective."""
+        reference, dynamics, gains, nv = self._reference, self.dynamics, self._config, self.dynamics.nv
+        tasks, wanted, target, aim = self._tasks, self._wanted, self._target, self.aim
+        root = gains.com.weight**0.5
+        np.multiply(dynamics.com_jacobian, root, out=tasks[:3])
+        error = gains.com.kp * (aim.com - dynamics.com)
+        error += gains.com.kd * (aim.com_velocity - dynamics.com_velocity)
+        wanted[:3] = root * (error + aim.com_acceleration - dynamics.com_drift)
+        root = (gains.angular_momentum.weight * self._calm) ** 0.5 / gains.angular_momentum_scale
+        np.multiply(dynamics.momentum_jacobian, root, out=tasks[3:6])
+        error = gains.angular_momentum.kp * (aim.angular_momentum - dynamics.angular_momentum)
+        wanted[3:6] = root * (error + aim.angular_momentum_rate - dynamics.momentum_drift)
+        rows = 6
+        for limb in self.limbs:
+            rows = self._pursue_limb(limb, rows)
+        self._orient_base(index, qvel, target)
+        posture = gains.posture
+        target[6:nv] = reference.joint_acceleration[index]
+        target[6:nv] += posture.kp * (reference.joints[index] - qpos[7:])
+        target[6:nv] += posture.kd * (reference.joint_velocity[index] - qvel[6:])
+        target[6:nv] *= self._posture / self._diagonal[6:nv]
+        diagonal = self._diagonal[: qp.size]
+        for limb, slot in qp.slots.items():
+            moments = slice(slot.start + 3, slot.stop)
+            diagonal[slot] = gains.force * FORCE_UNIT**2
+            diagonal[moments] = gains.moment * FORCE_UNIT**2
+            target[slot] = aim.wrench[limb, : slot.stop - slot.start] / FORCE_UNIT
+        qp.set_objective(tasks[:rows], wanted[:rows], diagonal, target[: qp.size])
+
+    def _sense_urgency(self) -> None:
+        """See how far the CoM diverges from its plan.
+
+        A robot about to fall uses its feet to their edges and swings its body: the margins of the CoP shrink, and so do
+        the weights of angular momentum, of the base's orientation and of the posture. Friction keeps its margin: a slip
+        saves nobody.
+        """
+        gains, dynamics = self._config, self.dynamics
+        x, y = (dynamics.com - self._com + (dynamics.com_velocity - self._com_velocity) / gains.divergence_rate)[:2]
+        squared = (x * x + y * y) / gains.divergence_scale**2
+        self._calm = 1.0 / (1.0 + squared)
+        self._urgent = squared > (0.25 if self._urgent else 1.0)
+        self._diagonal[3:6] = gains.acceleration + gains.base.weight * self._calm
+        np.multiply(self._posture_weight, self._calm, out=self._posture)
+        for limb, joints in self._arms.items():
+            if self.tracker.in_contact[limb] and self.tracker.current[limb] is not None:
+                self._posture[joints] *= gains.arm_posture  # a palm of the start is where it was planned to be
+        np.add(self._posture, gains.acceleration, out=self._diagonal[6 : dynamics.nv])
+
+    def _pursue_limb(self, limb: Limb, rows: int) -> int:
+        """Append a limb's task rows after the first `rows`; returns their new number."""
+        gains, dynamics, targets = self._config, self.dynamics, self.targets
+        if self.tracker.in_contact[limb]:
+            linear = gains.stance
+            angular = gains.stance if limb.is_foot else gains.stance_palm_rotation
+        elif self.tracker.state[limb] is LimbState.FREE or targets.authority[limb] <= 0.0:
+            return rows
+        else:
+            linear, angular = (gains.swing, gains.swing_rotation) if limb.is_foot else (gains.hand, gains.hand)
+        share = 1.0 if self.tracker.in_contact[limb] else targets.authority[limb]
+        rows = self._append(limb, slice(0, 3), linear, share, rows)
+        rows = self._append(limb, slice(3, 6), angular, share, rows)
+        if limb.is_foot or self.tracker.in_contact[limb]:
+            return rows
+        # In the air a palm may turn about the normal as its arm likes: only its two other axes are rows.
+        last, tilt = slice(rows - 3, rows), dynamics.limb_rotation[limb, :, :2].T
+        self._tasks[rows - 3 : rows - 1] = tilt @ self._tasks[last]
+        self._wanted[rows - 3 : rows - 1] = tilt @ self._wanted[last]
+        return rows - 1
+
+    def _append(self, limb: Limb, part: slice, task: TaskGains, share: float, rows: int) -> int:
+        """Append the three rows of a limb's linear or angular task; returns the new number of rows."""
+        dynamics, targets = self.dynamics, self.targets
+        root, here = (share * task.weight) ** 0.5, slice(rows, rows + 3)
+        np.multiply(dynamics.jacobian[limb, part], root, out=self._tasks[here])
+        error = task.kd * (targets.velocity[limb, part] - dynamics.limb_velocity[limb, part])
+        error += task.kp * targets.error[limb, part]
+        self._wanted[here] = root * (error + targets.acceleration[limb, part] - dynamics.drift[limb, part])
+        return rows + 3
+
+    def _orient_base(self, index: int, qvel: np.ndarray, target: np.ndarray) -> None:
+        """Wanted angular acceleration of the base, in the base."""
+        task, reference = self._config.base, self._reference
+        turn = self.dynamics.base_rotation.T @ reference.base_rotation[index]
+        error = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        acceleration = reference.base_acceleration[index] + task.kp * error
+        acceleration += task.kd * (reference.base_velocity[index] - qvel[3:6])
+        target[3:6] = acceleration * (self._calm * task.weight / self._diagonal[3:6])
+
+    def _hold(self, index: int, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
+        """Last resort of a tick: gravity and Coriolis forces, and joint gains to the planned posture."""
+        reference, robot = self._reference, self._robot
+        torque = self.dynamics.bias[6:] + robot.kp * (reference.joints[index] - qpos[7:])
+        torque += robot.kd * (reference.joint_velocity[index] - qvel[6:])
+        return np.clip(torque, -robot.torque_limit, robot.torque_limit)

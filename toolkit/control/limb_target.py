@@ -1,0 +1,86 @@
+"""LimbTargets: where limbs should be now, given where they really are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.control.config import ControllerConfig
+from toolkit.control.dynamics import RobotDynamics
+from toolkit.control.reference import Reference, Swing
+from toolkit.control.touchdown import ContactTracker, LimbState
+
+
+class LimbTargets:
+    """Task errors and feed-forward of the limbs that are not in contact; zeros for those that are.
+
+    A swing starts from where the limb rests, not from where it was planned to rest: that offset fades away during the
+    first part of the swing. A limb that has not met its surface in time goes on along the inward normal.
+
+    Attributes:
+        error: (4, 6) m and rad; from the limb to its target, world frame.
+        velocity, acceleration: (4, 6).
+        authority: (4,) in [0, 1]; how binding the target is (palms blend to and from their free posture).
+        shift: (4, 3) m; displacement of the landing point, and shift_velocity: (4, 3) m/s.
+    """
+
+    fade = 0.7  # fraction of a swing over which the initial offset is lost
+
+    def __init__(self, reference: Reference, tracker: ContactTracker, config: ControllerConfig):
+        self._reference, self._tracker, self._rest_speed = reference, tracker, config.rest_speed
+        self._swing_share = config.swing_share
+        self.error, self.velocity, self.acceleration = np.zeros((4, 6)), np.zeros((4, 6)), np.zeros((4, 6))
+        self.authority = np.ones(4)
+        self.shift, self.shift_velocity = np.zeros((4, 3)), np.zeros((4, 3))
+        self._offset = np.zeros((4, 3))
+        self._period = float(reference.times[1] - reference.times[0]) if len(reference.times) > 1 else 1.0
+
+    def update(self, index: int, dynamics: RobotDynamics) -> None:
+        """Evaluate at a row of the reference and the measured limbs."""
+        reference, tracker = self._reference, self._tracker
+        for limb in dynamics.limbs:
+            state, swing = tracker.state[limb], tracker.current[limb]
+            self.error[limb] = self.velocity[limb] = self.acceleration[limb] = 0.0
+            self.authority[limb] = reference.authority[index, limb]
+            if state is LimbState.REST and tracker.loose[limb]:
+                self.velocity[limb, :3] = -self._rest_speed * dynamics.limb_rotation[limb, :, 2]
+            if state in (LimbState.REST, LimbState.FREE) or swing is None:
+                continue
+            if tracker.begun[limb]:
+                self._offset[limb] = dynamics.limb_position[limb] - reference.limb_position[index, limb]
+                if not swing.breaks:
+                    self._offset[limb] = 0.0
+                self.shift[limb] = self.shift_velocity[limb] = 0.0
+            pace, row = tracker.pace[limb], self._row(index, tracker.lead[limb])
+            target = reference.limb_position[row, limb] + self.shift[limb]
+            self.velocity[limb] = pace * reference.limb_velocity[row, limb]
+            self.velocity[limb, :3] += self.shift_velocity[limb]
+            self.acceleration[limb] = pace * pace * reference.limb_acceleration[row, limb]
+            if limb.is_foot and state is LimbState.SWING:
+                late = min(max((reference.times[row] - swing.start) / (swing.end - swing.start) - 0.5, 0.0) / 0.4, 1.0)
+                self.authority[limb] = self._swing_share + (1.0 - self._swing_share) * late * late * (3.0 - 2.0 * late)
+            if state is LimbState.SEARCH and swing.contact is not None:
+                normal = swing.contact.pose.normal
+                target = target - tracker.depth[limb] * normal
+                self.velocity[limb, :3] -= tracker.search_speed(limb) * normal
+            else:
+                target = target + self._remaining(swing, reference.times[row]) * self._offset[limb]
+            self.error[limb, :3] = target - dynamics.limb_position[limb]
+            self.error[limb, 3:] = rotation_error(reference.limb_rotation[row, limb], dynamics.limb_rotation[limb])
+
+    def _row(self, index: int, lead: float) -> int:
+        """Row of the reference that a limb whose swing runs ahead has reached."""
+        return min(index + round(lead / self._period), len(self._reference.times) - 1) if lead else index
+
+    def _remaining(self, swing: Swing, time: float) -> float:
+        """Share of the initial offset that is left."""
+        share = min((time - swing.start) / (self.fade * (swing.end - swing.start)), 1.0)
+        return 1.0 - share * share * (3.0 - 2.0 * share)
+
+
+def rotation_error(wanted: np.ndarray, actual: np.ndarray) -> np.ndarray:
+    """Rotation vector (3,) in rad, world frame, that turns `actual` towards `wanted` (exact for small angles).
+
+    The sine of the angle along its axis: monotonic to 90 degrees.
+    """
+    turn = wanted @ actual.T
+    return 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])

@@ -1,0 +1,141 @@
+"""Contact state of the limbs while the plan is carried out."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+
+from toolkit.control.config import ControllerConfig, TouchdownConfig
+from toolkit.control.reference import Reference, Swing
+from toolkit.geometry.limb import Limb
+
+
+class LimbState(Enum):
+    """What a limb does."""
+
+    REST = "rest"
+    SWING = "swing"
+    SEARCH = "search"
+    FREE = "free"
+
+
+class ContactTracker:
+    """Decides from planned times and measured forces which limbs are in contact, and how much force each may bear.
+
+    A foot that meets the ground late in its swing rests where it is; one that has not met it in time goes on along the
+    inward normal. A palm needs two ticks of force. The bound on the normal force rises after contact is made and falls
+    before it is broken, so that forces never jump.
+
+    Attributes:
+        state: by limb.
+        in_contact: (4,) bool.
+        min_force, max_force: (4,) N; range of the normal force at the current tick.
+        depth: (4,) m; how far a searching limb has gone beyond the planned surface.
+        begun, made: (4,) bool; swings that began, contacts that were made at this very tick.
+        lead: (4,) s; how far the last swing has come before its planned time.
+        pace: (4,) how fast swings go on relative to the plan; to be set by whoever wants them to end earlier.
+        loose: (4,) bool; limbs that should be in contact but are measured to bear next to nothing.
+        current: by limb, the swing under way or the last one; None before the first.
+    """
+
+    def __init__(
+        self,
+        reference: Reference,
+        limbs: tuple[Limb, ...],
+        weight: float,
+        max_normal_force: np.ndarray,
+        controller: ControllerConfig,
+        touchdown: TouchdownConfig,
+    ):
+        """Start in the planned contacts.
+
+        Args:
+            reference: the plan.
+            limbs: those the robot has.
+            weight: N; of the robot.
+            max_normal_force: (4,) N.
+            controller: settings of the force bounds.
+            touchdown: settings of making contact.
+        """
+        self._config, self._touchdown = controller, touchdown
+        self._cap = np.minimum(2.5 * weight, max_normal_force)
+        self._pending = {limb: [swing for swing in reference.swings if swing.limb == limb] for limb in limbs}
+        self.current: dict[Limb, Swing | None] = dict.fromkeys(limbs)
+        self.state = {limb: LimbState.REST if reference.in_contact[0, limb] else LimbState.FREE for limb in limbs}
+        self._since = np.full(4, -np.inf)
+        self._loaded_ticks = np.zeros(4, int)
+        self.in_contact = np.zeros(4, bool)
+        self.min_force, self.max_force, self.depth = np.zeros(4), np.zeros(4), np.zeros(4)
+        self.lead, self.pace = np.zeros(4), np.ones(4)
+        self.begun, self.made = np.zeros(4, bool), np.zeros(4, bool)
+        self.loose = np.zeros(4, bool)
+
+    def update(self, time: float, period: float, normal_force: np.ndarray) -> None:
+        """Advance to a tick.
+
+        Args:
+            time: s.
+            period: s since the last tick.
+            normal_force: (4,) N measured along each patch's normal.
+        """
+        self.begun[:] = False
+        self.made[:] = False
+        for limb in self.state:
+            pending = self._pending[limb]
+            if pending and time >= pending[0].start - 1e-9:
+                self.current[limb] = pending.pop(0)
+                self.state[limb] = LimbState.SWING
+                self.depth[limb], self._loaded_ticks[limb] = 0.0, 0
+                self.begun[limb] = True
+                self.lead[limb], self.pace[limb] = 0.0, 1.0
+            swing = self.current[limb]
+            if swing is not None and self.state[limb] in (LimbState.SWING, LimbState.SEARCH):
+                self.lead[limb] += (self.pace[limb] - 1.0) * period
+                self._advance(limb, swing, time + self.lead[limb], period, normal_force[limb])
+            self.in_contact[limb] = self.state[limb] is LimbState.REST
+            self.loose[limb] = self.in_contact[limb] and normal_force[limb] < self._config.loose_force
+            self._bound(limb, time)
+
+    def _advance(self, limb: Limb, swing: Swing, time: float, period: float, force: float) -> None:
+        """Follow one limb through its swing; its time runs ahead by its lead."""
+        settings, over = self._touchdown, time >= swing.end - 1e-9
+        if swing.contact is None:
+            if over:
+                self.state[limb] = LimbState.FREE
+            return
+        late_enough = time - swing.start >= settings.early_fraction * (swing.end - swing.start)
+        if limb.is_foot:
+            met = force > (settings.late_foot_force if over else settings.early_foot_force)
+        else:
+            self._loaded_ticks[limb] = self._loaded_ticks[limb] + 1 if force > settings.palm_force else 0
+            met = self._loaded_ticks[limb] >= settings.confirm_ticks
+        if met and late_enough:
+            self.state[limb], self._since[limb] = LimbState.REST, time - self.lead[limb]
+            self.made[limb] = True
+        elif over:
+            self.state[limb] = LimbState.SEARCH
+            speed = settings.late_foot_speed if limb.is_foot else settings.palm_speed
+            self.depth[limb] = min(self.depth[limb] + speed * period, settings.max_depth)
+
+    def search_speed(self, limb: Limb) -> float:
+        """Speed in m/s along the inward normal of a limb that searches its contact."""
+        if self.depth[limb] >= self._touchdown.max_depth:
+            return 0.0
+        return self._touchdown.late_foot_speed if limb.is_foot else self._touchdown.palm_speed
+
+    def _bound(self, limb: Limb, time: float) -> None:
+        """Range of the normal force."""
+        if not self.in_contact[limb]:
+            self.min_force[limb] = self.max_force[limb] = 0.0
+            return
+        config, pending = self._config, self._pending[limb]
+        ramp = config.foot_ramp if limb.is_foot else config.palm_ramp
+        wanted = config.min_foot_force if limb.is_foot else config.min_palm_force
+        share, floor = (time - self._since[limb]) / ramp, config.settle_force
+        if pending and pending[0].breaks and (left := (pending[0].start - time) / config.release_ramp) < share:
+            share, floor = left, config.release_force
+        share = min(max(share, 0.0), 1.0)
+        floor = min(floor, self._cap[limb])
+        self.max_force[limb] = floor + share * (self._cap[limb] - floor)
+        self.min_force[limb] = min(share * wanted, floor)

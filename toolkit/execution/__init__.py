@@ -1,0 +1,1 @@
+"""Execution in MuJoCo: the run, its disturbances, measurements and verdict."""

@@ -1,0 +1,84 @@
+"""ContactMeter: what MuJoCo's contacts say about a robot in a scene."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from toolkit.execution.scene_index import SceneIndex
+
+
+class ContactMeter:
+    """Reads contact forces after a physics step; they belong to the state before it.
+
+    Attributes:
+        wrench: (4, 6) N and N m; contact force and moment about each patch's centre, world frame, of the last step.
+        normal_force: (4,) N; its part along the patch's z axis.
+        expected: (4,) bool; limbs whose patch may touch now, to be set by whoever knows the plan; all at first.
+        unplanned: (robot geom, world geom) pairs that touched outside the expected patches, since the start.
+        unplanned_time: s; when the first of them happened, None before.
+        trunk_touched: name of a trunk geom that touched the world, "" if none did.
+        friction_mismatches: contacts whose friction was not the world geom's, since the start.
+    """
+
+    def __init__(self, index: SceneIndex):
+        self._index = index
+        self.wrench, self.normal_force = np.zeros((4, 6)), np.zeros(4)
+        self.expected = np.ones(4, bool)
+        self.unplanned: set[tuple[int, int]] = set()
+        self.unplanned_time: float | None = None
+        self.trunk_touched = ""
+        self.friction_mismatches = 0
+        self._force = np.zeros(6)
+
+    def read(self, data: mujoco.MjData) -> None:
+        """Read the contacts of the physics step just made."""
+        scene, index = self._index.scene, self._index
+        self.wrench[:] = 0.0
+        self.normal_force[:] = 0.0
+        count = data.ncon
+        if not count:
+            return
+        contact = data.contact
+        geoms = contact.geom[:count]
+        of_robot = index.robot_geom[geoms]
+        touching = np.flatnonzero((of_robot[:, 0] != of_robot[:, 1]) & (contact.efc_address[:count] >= 0))
+        if not len(touching):
+            return
+        second = of_robot[touching, 1]
+        robot_geom = np.where(second, geoms[touching, 1], geoms[touching, 0])
+        world_geom = np.where(second, geoms[touching, 0], geoms[touching, 1])
+        wrong = contact.friction[touching, 0] != scene.geom_friction[world_geom, 0]
+        self.friction_mismatches += int(np.count_nonzero(wrong))
+        limbs = index.patch_limb[robot_geom]
+        position, frame = contact.pos[touching], contact.frame[touching].reshape(-1, 3, 3)
+        for k, number in enumerate(touching):
+            limb = limbs[k]
+            if limb < 0 or not self.expected[limb]:
+                self._note(int(robot_geom[k]), int(world_geom[k]), data.time)
+            if limb < 0:
+                continue
+            mujoco.mj_contactForce(scene, data, int(number), self._force)
+            # The force acts on the second geom, in rows of the contact's frame (normal first).
+            sign = 1.0 if second[k] else -1.0
+            force, moment = sign * (self._force[:3] @ frame[k]), sign * (self._force[3:] @ frame[k])
+            lever = position[k] - data.site_xpos[index.sites[limb]]
+            self.wrench[limb, :3] += force
+            self.wrench[limb, 3:] += moment
+            self.wrench[limb, 3] += lever[1] * force[2] - lever[2] * force[1]
+            self.wrench[limb, 4] += lever[2] * force[0] - lever[0] * force[2]
+            self.wrench[limb, 5] += lever[0] * force[1] - lever[1] * force[0]
+        for limb, site in index.sites.items():
+            self.normal_force[limb] = self.wrench[limb, :3] @ data.site_xmat[site, 2::3]
+
+    def _note(self, robot_geom: int, world_geom: int, time: float) -> None:
+        """Keep an unplanned contact."""
+        self.unplanned.add((robot_geom, world_geom))
+        self.unplanned_time = time if self.unplanned_time is None else self.unplanned_time
+        if self._index.trunk_geom[robot_geom] and not self.trunk_touched:
+            self.trunk_touched = self._index.geom_name(robot_geom)
+
+    @property
+    def unplanned_names(self) -> tuple[tuple[str, str], ...]:
+        """Unplanned contacts by name, sorted."""
+        return tuple(sorted({(self._index.geom_name(a), self._index.geom_name(b)) for a, b in self.unplanned}))

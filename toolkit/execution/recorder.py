@@ -1,0 +1,87 @@
+"""Recorder: what happened at each control tick, read from the simulation."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from toolkit.control.config import ExecutionConfig
+from toolkit.execution.contact_meter import ContactMeter
+from toolkit.execution.scene_index import SceneIndex
+from toolkit.geometry.pose import quaternion_from_rotation
+from toolkit.robot.model import RobotModel
+
+
+class Recorder:
+    """Samples of a run at its control ticks; rows beyond `count` are not filled.
+
+    A physics step leaves positions of bodies, contacts and forces of the state before it in the data, beside the new
+    state: so nothing has to be computed again, and reading changes nothing.
+
+    Attributes:
+        count: rows filled.
+        fall: one line once the robot has fallen, "" before.
+        qpos, qvel, com, momentum, wrench, normal_force, cop_margin, limb_position, torque: see `Execution`.
+        limb_rotation: (C, 4, 3, 3) world_from_limb.
+    """
+
+    def __init__(
+        self, ticks: int, scene: mujoco.MjModel, robot: RobotModel, index: SceneIndex, config: ExecutionConfig
+    ):
+        self._scene, self._robot, self._index, self._config = scene, robot, index, config
+        self.meter = ContactMeter(index)
+        self.count, self.fall = 0, ""
+        self.qpos, self.qvel = np.zeros((ticks, scene.nq)), np.zeros((ticks, scene.nv))
+        self.com, self.momentum = np.zeros((ticks, 3)), np.zeros((ticks, 6))
+        self.wrench, self.normal_force = np.zeros((ticks, 4, 6)), np.zeros((ticks, 4))
+        self.cop_margin = np.full((ticks, 4), np.nan)
+        self.limb_position = np.full((ticks, 4, 3), np.nan)
+        self.limb_rotation = np.full((ticks, 4, 3, 3), np.nan)
+        self.torque = np.zeros((ticks, scene.nu))
+        self._mass = float(scene.body_subtreemass[index.base])
+        self._half_size = robot.half_sizes
+
+    def record(self, data: mujoco.MjData, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Take a sample after the physics step that began in the state (qpos, qvel); contacts must have been read."""
+        k, index, meter = self.count, self._index, self.meter
+        self.count += 1
+        self.qpos[k], self.qvel[k] = qpos, qvel
+        mujoco.mj_subtreeVel(self._scene, data)
+        self.com[k] = data.subtree_com[index.base]
+        self.momentum[k, :3] = self._mass * data.subtree_linvel[index.base]
+        self.momentum[k, 3:] = data.subtree_angmom[index.base]
+        self.wrench[k], self.normal_force[k] = meter.wrench, meter.normal_force
+        self.torque[k] = data.qfrc_actuator[6:]
+        for limb, site in index.sites.items():
+            rotation = data.site_xmat[site].reshape(3, 3)
+            self.limb_position[k, limb], self.limb_rotation[k, limb] = data.site_xpos[site], rotation
+            if meter.normal_force[limb] > self._config.slip_force:
+                moment = meter.wrench[limb, 3:] @ rotation
+                half = self._half_size[limb]
+                x, y = -moment[1] / meter.normal_force[limb], moment[0] / meter.normal_force[limb]
+                self.cop_margin[k, limb] = min(half[0] - abs(x), half[1] - abs(y))
+        self._judge(data)
+
+    def _judge(self, data: mujoco.MjData) -> None:
+        """See whether the robot has fallen."""
+        index, config, k = self._index, self._config, self.count - 1
+        upright = data.xmat[index.base, 8]
+        height = self.com[k, 2] - np.nanmin(self.limb_position[k, :2, 2])
+        least = config.min_height * self._robot.com_height
+        if self.meter.trunk_touched:
+            self.fall = f"{self.meter.trunk_touched} touched the world"
+        elif upright < np.cos(config.max_tilt):
+            self.fall = f"the base tilted by {np.degrees(np.arccos(np.clip(upright, -1.0, 1.0))):.0f} degrees"
+        elif height < least:
+            self.fall = f"the CoM sank to {height:.2f} m above the lower foot, below {least:.2f} m"
+        elif not np.isfinite(self.qpos[k]).all():
+            self.fall = "the simulation diverged"
+
+    @property
+    def limb_pose(self) -> np.ndarray:
+        """(count, 4, 7) positions and quaternions wxyz, NaN for limbs that the robot has not."""
+        pose = np.full((self.count, 4, 7), np.nan)
+        for limb in self._index.limbs():
+            pose[:, limb, :3] = self.limb_position[: self.count, limb]
+            pose[:, limb, 3:] = [quaternion_from_rotation(each) for each in self.limb_rotation[: self.count, limb]]
+        return pose

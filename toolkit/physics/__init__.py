@@ -1,0 +1,1 @@
+"""The laws that planner, controller and checks share, each written once."""

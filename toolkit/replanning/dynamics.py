@@ -1,0 +1,221 @@
+"""The linear dynamics of a replan about the plan: its knots, its contacts, and how wrenches move the states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.centroidal.problem import STANDARD_GRAVITY
+from toolkit.geometry.limb import FEET
+from toolkit.replanning.contacts import ContactTable, Situation
+from toolkit.replanning.kernel import GIVEN
+from toolkit.replanning.nominal import Nominal
+
+G = STANDARD_GRAVITY
+
+
+@dataclass(frozen=True)
+class Window:
+    """The plan at the N + 1 knots of a replan, the first one at the time of the measured state.
+
+    Attributes:
+        first, last: knots of the plan that it begins (or is inside the step of) and ends with.
+        times: (N + 1,) s.
+        com, velocity: (N + 1, 3) of the plan.
+        spin: (N + 1, 3) angular momentum about the CoM per mass; of the postures.
+        wrench_spin: (N + 1, 3) the same as the plan's wrenches make it.
+    """
+
+    first: int
+    last: int
+    times: np.ndarray
+    com: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    wrench_spin: np.ndarray
+
+    @classmethod
+    def of(cls, nominal: Nominal, time: float, horizon: float) -> Window:
+        """The knots from a time on, as far as the horizon goes."""
+        first = int(np.searchsorted(nominal.times, time + 1e-6, side="right")) - 1
+        last = min(int(np.searchsorted(nominal.times, time + horizon, side="left")), len(nominal.times) - 1)
+        knots = slice(first, last + 1)
+        times, com, velocity = nominal.times[knots].copy(), nominal.com[knots].copy(), nominal.velocity[knots].copy()
+        spin, made = nominal.spin[knots].copy(), nominal.wrench_spin[knots].copy()
+        inside = time - nominal.times[first]
+        times[0] = time
+        com[0] += inside * (velocity[0] + 0.5 * inside * nominal.acceleration[first])
+        velocity[0] += inside * nominal.acceleration[first]
+        for each in (spin, made):
+            each[0] += inside / (nominal.times[first + 1] - nominal.times[first]) * (each[1] - each[0])
+        return cls(first, last, times, com, velocity, spin, made)
+
+    @property
+    def steps(self) -> int:
+        """N."""
+        return self.last - self.first
+
+    @property
+    def span(self) -> slice:
+        """The steps in the plan's arrays."""
+        return slice(self.first, self.last)
+
+    @property
+    def dt(self) -> np.ndarray:
+        """(N,) s."""
+        return np.diff(self.times)
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(3,) the point about which the state's angular momentum is."""
+        return self.com[0]
+
+    def deviation(self, situation: Situation) -> np.ndarray:
+        """(12,) deviation of a measured state from the plan, as the states of `replan_problem` have it."""
+        com, velocity = situation.com - self.com[0], situation.velocity - self.velocity[0]
+        spin = situation.spin - self.spin[0] + np.cross(situation.com - self.origin, situation.velocity)
+        return np.concatenate([com - situation.com_shift, velocity, spin, np.zeros(3)])
+
+    def spin_rows(self, size: int) -> np.ndarray:
+        """(N + 1, 3, size) the change of angular momentum about the CoM, linear in the states."""
+        rows, axis = np.zeros((self.steps + 1, 3, size)), np.arange(3)
+        rows[:, :, :3], rows[:, :, 3:6] = _skew(self.velocity), -_skew(self.com - self.origin)
+        rows[:, axis, 6 + axis] = 1.0
+        return rows
+
+    def spin_of(self, states: np.ndarray) -> np.ndarray:
+        """(N + 1, 3) the change of angular momentum about the CoM, exactly."""
+        turned = states[:, 6:9] + np.cross(self.com - self.origin, self.velocity)
+        return turned - np.cross(self.com + states[:, :3] - self.origin, self.velocity + states[:, 3:6])
+
+
+@dataclass(frozen=True)
+class FreeLandings:
+    """Landing points that a replan may move.
+
+    Attributes:
+        events: swings, the next one first.
+        planes: (3, 2) axes of each landing point's plane.
+        column: (N, 4) which of them a limb stands on in each step; -1 where on none.
+    """
+
+    events: list[int]
+    planes: list[np.ndarray]
+    column: np.ndarray
+
+    @classmethod
+    def of(cls, events: list[int], planes: list[np.ndarray], nominal: Nominal, contacts: ContactTable) -> FreeLandings:
+        """Find where limbs stand on the landing points of these swings."""
+        column = np.full(contacts.active.shape, -1)
+        for index, event in enumerate(events):
+            limb = nominal.swings[event].limb
+            column[contacts.event[:, limb] == event, limb] = index
+        return cls(events, planes, column)
+
+    def states(self, index: int) -> slice:
+        """Where the shifts of a landing point stand in the states."""
+        return slice(GIVEN + 2 * index, GIVEN + 2 * index + 2)
+
+    def offset_of_feet(self, shift: np.ndarray, share: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+        """Where the CoM should follow shifted feet: rows (N, 3, size) of the states, and a constant (N, 3).
+
+        Args:
+            shift: (N, 4, 3) m; of contacts already made.
+            share: (N, 4) how much of the CoM each foot takes along.
+            size: number of states.
+        """
+        follow, offset = np.zeros((len(shift), 3, size)), np.zeros((len(shift), 3))
+        follow[:, np.arange(3), np.arange(3)] = 1.0
+        for foot in FEET:
+            offset += share[:, foot, None] * shift[:, foot]
+            for index, plane in enumerate(self.planes):
+                here = self.column[:, foot] == index
+                follow[here, :, self.states(index)] -= share[here, foot, None, None] * plane
+        return follow, offset
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """x_{t+1} = a x_t + b sum_j spread_j u_j + drift, for C contacts of N steps.
+
+    Attributes:
+        step, limb: (C,) of each contact.
+        first: (N + 1,) first contact of each step, and C.
+        wrench: (C, 6) planned, in the contact frame, in weights.
+        a: (N, n, n), b: (N, n, 6), drift: (N, n), spread: (C, 6, 6).
+    """
+
+    step: np.ndarray
+    limb: np.ndarray
+    first: np.ndarray
+    wrench: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    drift: np.ndarray
+    spread: np.ndarray
+
+    @classmethod
+    def of(
+        cls, window: Window, planned: np.ndarray, contacts: ContactTable, landings: FreeLandings, size: int
+    ) -> Dynamics:
+        """Linearise about the plan.
+
+        Args:
+            window: the plan at the knots.
+            planned: (N, 4, 6) its wrenches in the contact frames, in weights.
+            contacts: where limbs stand.
+            landings: what is free.
+            size: n, number of states.
+        """
+        steps, dt, origin = window.steps, window.dt, window.origin
+        step, limb = np.nonzero(contacts.active)
+        first = np.concatenate([[0], np.cumsum(contacts.active.sum(1))]).astype(np.int64)
+        turn, wrench = contacts.rotation[step, limb], planned[step, limb]
+        lever = contacts.position[step, limb] + contacts.shift[step, limb] - origin
+        spread = np.zeros((len(step), 6, 6))
+        spread[:, :3, :3] = spread[:, 3:, 3:] = G * turn
+        spread[:, 3:, :3] = G * np.cross(lever[:, None], turn.swapaxes(1, 2)).swapaxes(1, 2)
+        pull = np.einsum("cij,cj->ci", spread, wrench)
+        pulls = np.zeros((steps, 6))
+        np.add.at(pulls, step, pull)
+        pulls[:, 2] -= G
+
+        a, b = np.tile(np.eye(size), (steps, 1, 1)), np.zeros((steps, size, 6))
+        axis = np.arange(3)
+        half, cube = dt**2 / 2, dt**3 / 6
+        a[:, axis, 3 + axis] = dt[:, None]
+        a[:, 6, 1], a[:, 6, 4], a[:, 7, 0], a[:, 7, 3] = -G * dt, -G * half, G * dt, G * half
+        b[:, axis, axis], b[:, 3 + axis, axis], b[:, 6 + axis, 3 + axis] = half[:, None], dt[:, None], dt[:, None]
+        b[:, 6, 1], b[:, 7, 0] = -G * cube, G * cube
+        column = landings.column[step, limb]
+        for c in np.flatnonzero(column >= 0):
+            t, plane = step[c], landings.planes[column[c]]
+            a[t, 6:9, landings.states(int(column[c]))] += dt[t] * np.cross(plane.T, pull[c, :3]).T
+        a[:, 9:12] = window.spin_rows(size)[:-1]
+        drift = np.einsum("tij,tj->ti", b, pulls - _planned_rates(window))
+        return cls(step, limb, first, wrench, a, b, drift, spread)
+
+
+def _planned_rates(window: Window) -> np.ndarray:
+    """(N, 6) the rates that the plan's wrenches make: its acceleration, and its angular momentum about the origin.
+
+    That the postures have another angular momentum is left to the controller.
+    """
+    dt, origin = window.dt, window.origin
+    about = window.wrench_spin + np.cross(window.com - origin, window.velocity)
+    rates = np.zeros((window.steps, 6))
+    rates[:, :3] = np.diff(window.velocity, axis=0) / dt[:, None]
+    weight_moment = np.zeros((window.steps, 3))
+    mean = window.com[:-1] + dt[:, None] * (window.velocity[:-1] / 2 + dt[:, None] * rates[:, :3] / 6) - origin
+    weight_moment[:, 0], weight_moment[:, 1] = -G * mean[:, 1], G * mean[:, 0]
+    rates[:, 3:] = np.diff(about, axis=0) / dt[:, None] - weight_moment
+    return rates
+
+
+def _skew(v: np.ndarray) -> np.ndarray:
+    """(n, 3, 3) matrices of the cross product with (n, 3) vectors."""
+    matrix = np.zeros((len(v), 3, 3))
+    matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
+    matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = v[:, 2], -v[:, 1], v[:, 0]
+    return matrix

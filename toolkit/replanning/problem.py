@@ -1,0 +1,314 @@
+"""ReplanProblem: the quadratic program of a replan.
+
+States are deviations from the plan: of the CoM, of its velocity, of the angular momentum per mass about a fixed point
+near it; of the spin (about the CoM) at the knot before; then two shifts along its plane for each landing point that is
+free. Wrenches are deviations too, in weights.
+The dynamics are those of `toolkit.centroidal.problem`, exact but for the product of a landing's shift with the change
+of its force; the limits of the body are linear about the plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.contacts.stance import Contact
+from toolkit.geometry.pose import Pose
+from toolkit.physics.cone import friction_rows, sole_rows
+from toolkit.replanning.config import ReplanConfig
+from toolkit.replanning.contacts import Cones, ContactTable, Situation
+from toolkit.replanning.dynamics import Dynamics, FreeLandings, Window
+from toolkit.replanning.kernel import GIVEN, Program
+from toolkit.replanning.landing import apart_row, landing_rows
+from toolkit.replanning.nominal import Nominal
+from toolkit.robot.model import RobotModel
+from toolkit.world.surface import Surface
+
+SIDES = 8
+ROWS = SIDES + 12 + 10 + 1
+HARD = 1e4  # price of a landing point outside its region, per m
+ROOM = 1e-3  # of the plan's own wrenches inside their rows
+PALM_MOMENT = 1e3  # weight that keeps a palm's moments as planned: the controller has none
+
+
+@dataclass(frozen=True)
+class Replan:
+    """A replanned motion at N + 1 knots, as its deviation from the plan; world frame, SI units.
+
+    Attributes:
+        times: (N + 1,) s.
+        com, velocity, spin: (N + 1, 3). acceleration, spin_rate: (N, 3).
+        wrench: (N, 4, 6) in the contact frames, in weights; with the contacts' own planned wrenches.
+        landing: swing -> (3,) m shift of its contact.
+        ends: swing -> s; when it ends, where that is before its planned end.
+        objective: reached; excess: its part for limits of the body exceeded.
+        divergence: m; (N + 1,) from the plan.
+        next_landing: knot at which the next foot lands; the last one where none does.
+        iterations: of the solver.
+    """
+
+    times: np.ndarray
+    com: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    acceleration: np.ndarray
+    spin_rate: np.ndarray
+    wrench: np.ndarray
+    landing: dict[int, np.ndarray]
+    ends: dict[int, float]
+    objective: float
+    excess: float
+    divergence: np.ndarray
+    next_landing: int
+    iterations: int
+
+
+class ReplanProblem:
+    """Builds and solves the programs of one run."""
+
+    def __init__(self, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...], config: ReplanConfig):
+        self._nominal, self._config, self._surfaces = nominal, config, surfaces
+        self._half_sizes = robot.half_sizes
+        self._landings: dict[int, Contact] = {
+            event: swing.contact
+            for event, swing in enumerate(nominal.swings)
+            if swing.contact is not None and swing.limb.is_foot and swing.contact.surface >= 0
+        }
+        self._regions: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._cone_rows: dict[tuple, np.ndarray] = {}
+        self._size = GIVEN + 2 * config.landings
+
+    def solve(self, situation: Situation, solver: Callable) -> Replan | None:
+        """The best motion from a measured state; None where the solver gives no answer.
+
+        Landing points move only where the motion cannot be brought back to the plan without that; and where not even
+        that is enough, swings under way may also end earlier, at any of a few times.
+        """
+        if not situation.displaced:
+            kept = self._solve(situation, solver, {}, landings=0)
+            if kept is not None and self._is_settled(kept):
+                return kept
+        decided = {event: time for event, time in situation.landing.items() if self._is_early(event, time)}
+        best = self._solve(situation, solver, decided)
+        if best is None or best.objective < self._config.early_objective:
+            return best
+        for event, earliest in situation.earliest.items():
+            for time in self._early_times(event, earliest):
+                found = self._solve(situation, solver, {event: time})
+                if found is not None and found.objective < best.objective - self._config.early_gain:
+                    best = found
+        return best
+
+    def _is_settled(self, kept: Replan) -> bool:
+        """Whether a motion with the planned landing points is back at the plan when the next foot lands."""
+        config = self._config
+        return kept.divergence[kept.next_landing] <= config.settled and kept.excess <= config.excess
+
+    def _is_early(self, event: int, time: float) -> bool:
+        return time < self._nominal.swings[event].end - 1e-3
+
+    def _early_times(self, event: int, earliest: float) -> np.ndarray:
+        """The first, middle and last knot between the earliest end of a swing and its planned end."""
+        knots = self._nominal.times
+        knots = knots[(knots >= earliest - 1e-9) & (knots < self._nominal.swings[event].end - 1e-3)]
+        return knots[np.unique([0, len(knots) // 2, len(knots) - 1])] if len(knots) else knots
+
+    def _solve(
+        self, situation: Situation, solver: Callable, early: dict[int, float], landings: int | None = None
+    ) -> Replan | None:
+        """The best motion with given ends of the swings under way, and at most so many landing points free."""
+        nominal, config, size = self._nominal, self._config, self._size
+        window = Window.of(nominal, situation.time, config.horizon)
+        contacts = ContactTable.of(nominal, situation, window.first, window.times, early)
+        events = self._free_landings(situation, window, config.landings if landings is None else landings)
+        planes = [self._landings[event].pose.rotation[:, :2] for event in events]
+        free = FreeLandings.of(events, planes, nominal, contacts)
+        dynamics = Dynamics.of(window, nominal.wrench[window.span], contacts, free, size)
+        cost, slope, constant = self._objective(window, contacts, free, situation)
+        rows, bound = self._contact_rows(window, contacts, dynamics, situation.cones)
+        knot, soft, soft_bound, price = self._soft_rows(window, contacts, free, situation, early)
+        weight = np.empty((len(dynamics.step), 6))
+        duration = window.dt[dynamics.step]
+        weight[:, :3] = (config.force * duration)[:, None]
+        weight[:, 3:] = (np.where(dynamics.limb < 2, config.moment, PALM_MOMENT) * duration)[:, None]
+        program = Program(
+            a=dynamics.a,
+            b=dynamics.b,
+            drift=dynamics.drift,
+            cost=cost,
+            slope=slope,
+            first=dynamics.first,
+            spread=dynamics.spread,
+            weight=weight,
+            rows=rows,
+            bound=bound,
+            knot=knot,
+            soft_rows=soft,
+            soft_bound=soft_bound,
+            price=price,
+            softness=0.05,
+            start=self._start(window, situation),
+        )
+        u = np.zeros((len(dynamics.step), 6))
+        guess = np.zeros(size - GIVEN)
+        for index, (event, plane) in enumerate(zip(events, planes, strict=True)):
+            guess[2 * index : 2 * index + 2] = plane.T @ situation.goal.get(event, np.zeros(3))
+        x, iterations, residual, gap = solver(program, u, guess, config.max_iterations, config.tolerance)
+        if not (np.isfinite(x).all() and np.isfinite(u).all() and residual < 1e-3 and gap < 1e-3):
+            return None
+        excess = price * np.maximum(np.einsum("ki,ki->k", soft, x[knot]) - soft_bound, 0.0)
+        objective = constant + 0.5 * np.einsum("ti,tij,tj", x, cost, x) + (slope * x).sum()
+        objective += 0.5 * (weight * u * u).sum() + excess.sum()
+        objective += config.early * sum(nominal.swings[k].end - t for k, t in early.items())
+        wrench = np.zeros((window.steps, 4, 6))
+        wrench[dynamics.step, dynamics.limb] = dynamics.wrench + u
+        ends = [nominal.swings[event].end for event in self._landings]
+        next_end = min((end for end in ends if end > situation.time), default=np.inf)
+        times, dt, spin = window.times, window.dt[:, None], window.spin_of(x)
+        return Replan(
+            times=times,
+            com=x[:, :3],
+            velocity=x[:, 3:6],
+            spin=spin,
+            acceleration=np.diff(x[:, 3:6], axis=0) / dt,
+            spin_rate=np.diff(spin, axis=0) / dt,
+            wrench=wrench,
+            landing={event: planes[index] @ x[0, free.states(index)] for index, event in enumerate(events)},
+            ends=early,
+            objective=float(objective),
+            excess=float(excess.sum()),
+            divergence=np.linalg.norm(x[:, :3] + x[:, 3:6] / config.frequency, axis=1),
+            next_landing=int(np.searchsorted(times, next_end) if next_end < times[-1] else window.steps),
+            iterations=iterations,
+        )
+
+    def _start(self, window: Window, situation: Situation) -> np.ndarray:
+        """(12,) the measured deviation from the plan, less what is too small to be worth a reaction."""
+        start = window.deviation(situation)
+        divergence = float(np.linalg.norm(start[:3] + start[3:6] / self._config.frequency))
+        start *= max(1.0 - self._config.deadband / max(divergence, 1e-9), 0.0)
+        start[:3] += situation.com_shift
+        return start
+
+    def _free_landings(self, situation: Situation, window: Window, most: int) -> list[int]:
+        """Swings of feet whose landing point is free, the next ones first."""
+        nominal = self._nominal
+        standing = {event for event, _, _ in situation.standing.values()}
+        free = []
+        for event in self._landings:
+            swing = nominal.swings[event]
+            if event in standing or event in situation.fixed or swing.end <= situation.time:
+                continue
+            if swing.end >= nominal.times[window.last] - 1e-6 or len(free) == most:
+                break
+            free.append(event)
+        return free
+
+    def _objective(self, window: Window, contacts: ContactTable, free: FreeLandings, situation: Situation):
+        """Quadratic costs of the knots: Hessians, gradients and the constant."""
+        config, size, dt = self._config, self._size, window.dt
+        spin = window.spin_rows(size)[1:]
+        follow, offset = free.offset_of_feet(contacts.shift, self._nominal.share[window.span], size)
+        cost, slope = np.zeros((window.steps + 1, size, size)), np.zeros((window.steps + 1, size))
+        duration = dt[:, None, None]
+        cost[1:] += config.com * duration * np.einsum("tki,tkj->tij", follow, follow)
+        slope[1:] -= config.com * dt[:, None] * np.einsum("tki,tk->ti", follow, offset)
+        axis = np.arange(3)
+        cost[1:, 3 + axis, 3 + axis] += dt[:, None] * [config.velocity, config.velocity, config.climb]
+        cost[1:] += config.spin * duration * np.einsum("tki,tkj->tij", spin, spin)
+        change = spin.copy()
+        change[:, axis, 9 + axis] -= 1.0
+        cost[1:] += config.spin_rate / duration * np.einsum("tki,tkj->tij", change, change)
+        end = follow[-1].copy()
+        end[axis, 3 + axis] += 1.0 / config.frequency
+        cost[-1] += config.final * end.T @ end + 0.1 * config.final * spin[-1].T @ spin[-1]
+        slope[-1] -= config.final * end.T @ offset[-1]
+        cost[0, GIVEN:, GIVEN:] += 1e-3 * np.eye(size - GIVEN)
+        for index, (event, plane) in enumerate(zip(free.events, free.planes, strict=True)):
+            own = free.states(index)
+            cost[0, own, own] += (config.landing + config.landing_change) * np.eye(2)
+            slope[0, own] -= config.landing_change * plane.T @ situation.goal.get(event, np.zeros(3))
+        constant = 0.5 * (config.com * dt @ (offset**2).sum(1) + config.final * (offset[-1] ** 2).sum())
+        return cost, slope, float(constant)
+
+    def _contact_rows(self, window: Window, contacts: ContactTable, dynamics: Dynamics, cones: Cones):
+        """Rows and bounds of the wrenches' deviations."""
+        step, limb = dynamics.step, dynamics.limb
+        friction = contacts.friction[step, limb]
+        rows, limit = np.zeros((len(step), ROWS, 6)), np.zeros((len(step), ROWS))
+        for c in range(len(step)):
+            rows[c, : SIDES + 12] = self._cone(int(limb[c]), float(friction[c]), cones)
+            rows[c, -1, 2], limit[c, -1] = 1.0, 3.0
+            if limb[c] < 2:
+                torque = self._nominal.torque[window.first + step[c], limb[c]]
+                rows[c, SIDES + 12 : -1] = np.concatenate([torque, -torque])
+                limit[c, SIDES + 12 : -1] = self._config.body.torque
+        return rows, np.maximum(limit - np.einsum("cri,ci->cr", rows, dynamics.wrench), ROOM)
+
+    def _cone(self, limb: int, friction: float, cones: Cones) -> np.ndarray:
+        """(SIDES + 12, 6) rows of a contact's cone."""
+        key = limb, friction, cones.friction, cones.yaw, float(cones.half_size[limb, 0])
+        rows = self._cone_rows.get(key)
+        if rows is None:
+            rows = np.zeros((SIDES + 12, 6))
+            if limb < 2:
+                rows[:] = sole_rows(friction * cones.friction, cones.half_size[limb], cones.yaw, SIDES)
+            else:
+                rows[:SIDES, :3] = friction_rows(friction * cones.friction, SIDES)
+            self._cone_rows[key] = rows
+        return rows
+
+    def _soft_rows(self, window: Window, contacts: ContactTable, free: FreeLandings, situation: Situation, early):
+        """Limits of the body after the first knot, then regions of the landing points."""
+        table, size, config, first = self._nominal.rows, self._size, self._config, window.first
+        begin, end = np.searchsorted(table.knot, [first + 1, window.last + 1])
+        knot, limb = table.knot[begin:end] - first, table.limb[begin:end]
+        gradient, clearance = table.gradient[begin:end], table.clearance[begin:end]
+        rows = np.zeros((end - begin, size))
+        rows[:, :3] = -gradient
+        # The contact of the step before the knot, or where there is none of the one after it.
+        step = np.where(self._nominal.active[first + knot - 1, limb] | (knot >= window.steps), knot - 1, knot)
+        contact = limb >= 0
+        bound = clearance - np.where(contact, (gradient * contacts.shift[step, limb]).sum(1), 0.0)
+        for index, plane in enumerate(free.planes):
+            here = contact & (free.column[step, limb] == index)
+            rows[here, free.states(index)] = gradient[here] @ plane
+        blocks, bounds = [rows], [bound]
+        for index, event in enumerate(free.events):
+            region, room = self._region(event, situation, early)
+            block = np.zeros((len(region), size))
+            block[:, free.states(index)] = region
+            blocks.append(block)
+            bounds.append(room)
+        landing = sum(len(block) for block in blocks[1:])
+        price = np.concatenate([np.full(len(rows), config.price), np.full(landing, HARD)])
+        knot = np.concatenate([knot, np.zeros(landing, int)]).astype(np.int64)
+        return knot, np.concatenate(blocks), np.concatenate(bounds), price
+
+    def _region(self, event: int, situation: Situation, early: dict[int, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Half planes of a landing point's shift."""
+        swing, config = self._nominal.swings[event], self._config
+        contact = self._landings[event]
+        found = self._regions.get(event)
+        if found is None:
+            half = self._half_sizes[swing.limb]
+            found = landing_rows(contact, half, self._surfaces[contact.surface], config.margin)
+            self._regions[event] = found
+        rows, bounds = [found[0]], [found[1]]
+        axes = np.concatenate([np.eye(2), -np.eye(2)])
+        rows.append(axes)
+        reach = np.full(4, config.max_shift)
+        if event in situation.moving:
+            moved = contact.pose.rotation[:, :2].T @ situation.moving[event]
+            left = config.slew * max(early.get(event, swing.end) - situation.time - 0.05, 0.0)
+            reach = np.minimum(reach, np.maximum(axes @ moved + left, 0.0))
+        bounds.append(reach)
+        other = situation.standing.get(swing.limb.mirrored)
+        if other is not None and swing.start <= situation.time + 1e-9:
+            half = self._half_sizes[swing.limb]
+            row, room = apart_row(contact.pose, half, Pose(other[2], other[1]), half, config.gap)
+            rows.append(row[None])
+            bounds.append(np.array([room]))
+        return np.concatenate(rows), np.concatenate(bounds)

@@ -1,0 +1,272 @@
+"""Replanner: the centroidal motion of the next contacts, optimised again from the measured state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import process_time
+
+import numpy as np
+
+from toolkit.centroidal.problem import STANDARD_GRAVITY
+from toolkit.control.dynamics import RobotDynamics
+from toolkit.control.limb_target import LimbTargets
+from toolkit.control.reference import Reference, Swing
+from toolkit.control.touchdown import ContactTracker, LimbState
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.replanning.config import ReplanConfig
+from toolkit.replanning.contacts import Cones, Situation
+from toolkit.replanning.kernel import solve
+from toolkit.replanning.nominal import Nominal
+from toolkit.replanning.problem import Replan, ReplanProblem
+from toolkit.robot.model import RobotModel
+from toolkit.world.surface import Surface
+
+
+@dataclass
+class MotionTarget:
+    """What the controller tracks at a tick; world frame, SI units.
+
+    Attributes:
+        com, com_velocity, com_acceleration: (3,).
+        angular_momentum, angular_momentum_rate: (3,) about the CoM.
+        wrench: (4, 6) about the patches' centres in the contact frames.
+    """
+
+    com: np.ndarray
+    com_velocity: np.ndarray
+    com_acceleration: np.ndarray
+    angular_momentum: np.ndarray
+    angular_momentum_rate: np.ndarray
+    wrench: np.ndarray
+
+    @classmethod
+    def zeros(cls) -> MotionTarget:
+        """Room for one."""
+        com, velocity, acceleration, momentum, rate = np.zeros((5, 3))
+        return cls(com, velocity, acceleration, momentum, rate, np.zeros((4, 6)))
+
+    def follow(self, reference: Reference, index: int) -> None:
+        """Fill in a row of the plan."""
+        self.com[:], self.com_velocity[:] = reference.com[index], reference.com_velocity[index]
+        self.com_acceleration[:] = reference.com_acceleration[index]
+        self.angular_momentum[:] = reference.angular_momentum[index]
+        self.angular_momentum_rate[:] = reference.angular_momentum_rate[index]
+        self.wrench[:] = reference.wrench[index]
+
+
+class Replanner:
+    """Solves a tracking problem over the next contacts at a fixed rate and says what to track.
+
+    Where the robot is within the deadband of its plan, with its feet where they should be, nothing deviates: the plan
+    itself is the optimum, which needs no solving.
+
+    Attributes:
+        replans: how many. departures: how many of them had to leave the plan; failures: how many of these gave no
+            answer, so that the one before went on; moved: how many of these moved a landing point.
+        seconds: of all of them together (of the processor; never decides anything).
+        com_shift: (3,) m; by how much the feet that bear the plan stand off it, where that is more than the deadband.
+    """
+
+    def __init__(
+        self,
+        reference: Reference,
+        nominal: Nominal,
+        robot: RobotModel,
+        surfaces: tuple[Surface, ...],
+        config: ReplanConfig,
+    ):
+        """Prepare for a run.
+
+        Args:
+            reference: the plan at the control ticks.
+            nominal: the plan on the grid of the replans.
+            robot: the robot.
+            surfaces: that contacts lie on, by their index.
+            config: settings.
+        """
+        self._reference, self._nominal, self._config = reference, nominal, config
+        self._problem = ReplanProblem(nominal, robot, surfaces, config)
+        self._mass = nominal.mass
+        self._weight = self._mass * STANDARD_GRAVITY
+        self._due = 0.0
+        self._plan: Replan | None = None
+        self._made: dict[Limb, int] = {}
+        self._goal: dict[int, np.ndarray] = {}
+        self._ends: dict[int, float] = {}
+        self._shift, self._rate, self._moved = np.zeros((3, 4, 3))
+        self.replans = self.departures = self.failures = self.moved = 0
+        self.seconds = 0.0
+        self.com_shift = np.zeros(3)
+
+    def update(
+        self,
+        index: int,
+        period: float,
+        dynamics: RobotDynamics,
+        tracker: ContactTracker,
+        targets: LimbTargets,
+        cones: Cones,
+        aim: MotionTarget,
+    ) -> None:
+        """Replan where it is due, then say what to track.
+
+        Args:
+            index: row of the reference.
+            period: s since the last tick.
+            dynamics: measured state.
+            tracker: contact states at this tick.
+            targets: whose landing points are moved.
+            cones: what the controller allows now.
+            aim: overwritten where a replan says otherwise.
+        """
+        time = float(self._reference.times[index])
+        for limb in dynamics.limbs:
+            if tracker.made[limb]:
+                swing = tracker.current[limb]
+                self._made[limb] = self._nominal.swings.index(swing) if swing is not None else -1
+                if swing is not None and swing.contact is not None:
+                    off = dynamics.limb_position[limb] - swing.contact.pose.position
+                    self._moved[limb] = off if np.linalg.norm(off) > self._config.deadband else 0.0
+        if time >= self._due - 1e-9:
+            self._due = time + self._config.period
+            self._replan(index, dynamics, tracker, cones)
+        self._follow_feet(index, period)
+        self._track(time, aim)
+        self._move_landings(time, period, tracker, targets)
+
+    def _replan(self, index: int, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones) -> None:
+        """Solve once, where the plan is left at all; where that fails the last answer goes on."""
+        time, displaced = float(self._reference.times[index]), self._displaced(tracker)
+        if time >= self._nominal.times[-1] - self._config.horizon:
+            return
+        self.replans += 1
+        if not displaced and self._divergence(index, dynamics) <= self._config.deadband:
+            self._plan, self._ends = None, {}
+            self._goal.clear()
+            return
+        began = process_time()
+        plan = self._problem.solve(self._situation(time, displaced, dynamics, tracker, cones), solve)
+        self.departures += 1
+        if plan is None:
+            self.failures += 1
+        else:
+            self._plan = plan
+            self._goal.update(plan.landing)
+            self._ends = plan.ends
+            self.moved += bool(plan.landing)
+        self.seconds += process_time() - began
+
+    def _displaced(self, tracker: ContactTracker) -> bool:
+        """Whether feet stand elsewhere than planned, or are on their way there, or to come earlier."""
+        if self._ends or np.linalg.norm(self._moved[:2], axis=1).any():
+            return True
+        for foot in FEET:
+            swing = tracker.current[foot]
+            if swing is None or tracker.state[foot] is not LimbState.SWING:
+                continue
+            shift: np.ndarray = self._shift[foot]
+            goal: np.ndarray = self._goal.get(self._nominal.swings.index(swing), shift)
+            if max(np.linalg.norm(goal), np.linalg.norm(shift)) > self._config.deadband:
+                return True
+        return bool(np.linalg.norm(self.com_shift) > self._config.deadband)
+
+    def _divergence(self, index: int, dynamics: RobotDynamics) -> float:
+        """In m, from the plan moved with the feet that bear it."""
+        off = dynamics.com - self._reference.com[index] - self.com_shift
+        speed = dynamics.com_velocity - self._reference.com_velocity[index]
+        return float(np.linalg.norm(off + speed / self._config.frequency))
+
+    def _follow_feet(self, index: int, period: float) -> None:
+        """Let the plan's shift follow the feet that bear it."""
+        load = np.maximum(self._reference.wrench[index, :2, 2], 0.0)
+        total = float(load.sum())
+        if total > 0.0:
+            wanted = load @ self._moved[:2] / total
+            self.com_shift += period * self._config.frequency * (wanted - self.com_shift)
+
+    @property
+    def mean_seconds(self) -> float:
+        """Seconds of the processor for one that departs from the plan, on average; 0 before the first."""
+        return self.seconds / self.departures if self.departures else 0.0
+
+    def _situation(
+        self, time: float, displaced: bool, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones
+    ) -> Situation:
+        """What is measured, as the problem wants it."""
+        standing, fixed, moving, landing, earliest = {}, {}, {}, {}, {}
+        for limb in dynamics.limbs:
+            if tracker.in_contact[limb]:
+                pose = dynamics.limb_position[limb].copy(), dynamics.limb_rotation[limb].copy()
+                standing[limb] = (self._made.get(limb, -1), *pose)
+                continue
+            swing = tracker.current[limb]
+            if swing is None or swing.contact is None:
+                continue
+            index = self._nominal.swings.index(swing)
+            lead = float(tracker.lead[limb])
+            over = (time + lead - swing.start) / (swing.end - swing.start)
+            if tracker.state[limb] is LimbState.SWING and limb.is_foot:
+                earliest[index] = time + (swing.end - time - lead) / self._most(swing) + 0.02
+                landing[index] = min(max(self._ends.get(index, np.inf), earliest[index]), swing.end - lead)
+            if tracker.state[limb] is not LimbState.SWING or over > self._config.fraction:
+                fixed[index] = self._goal.get(index, np.zeros(3))
+            else:
+                moving[index] = self._shift[limb].copy()
+        return Situation(
+            time=time,
+            com=dynamics.com.copy(),
+            velocity=dynamics.com_velocity.copy(),
+            spin=dynamics.angular_momentum / self._mass,
+            standing=standing,
+            fixed=fixed,
+            moving=moving,
+            goal=self._goal,
+            landing=landing,
+            earliest=earliest,
+            com_shift=self.com_shift.copy(),
+            displaced=displaced,
+            cones=cones,
+        )
+
+    def _most(self, swing: Swing) -> float:
+        """Fastest pace of a swing."""
+        return min(max((swing.end - swing.start) / self._config.shortest, 1.0), self._config.pace)
+
+    def _track(self, time: float, target: MotionTarget) -> None:
+        """Move what to track by the last replan, where it reaches so far; else with the feet that bear it."""
+        plan = self._plan
+        if plan is None or time >= plan.times[-1]:
+            target.com += self.com_shift
+            return
+        k = int(np.searchsorted(plan.times, time + 1e-9, side="right")) - 1
+        tau = time - plan.times[k]
+        acceleration = plan.acceleration[k]
+        target.com += plan.com[k] + tau * plan.velocity[k] + 0.5 * tau * tau * acceleration
+        target.com_velocity += plan.velocity[k] + tau * acceleration
+        target.com_acceleration += acceleration
+        target.angular_momentum_rate += self._mass * plan.spin_rate[k]
+        target.angular_momentum += self._mass * (plan.spin[k] + tau * plan.spin_rate[k])
+        target.wrench[:] = self._weight * plan.wrench[k]
+
+    def _move_landings(self, time: float, period: float, tracker: ContactTracker, targets: LimbTargets) -> None:
+        """Move the landing points of the feet in the air smoothly to where and when the last replan wants them."""
+        for foot in FEET:
+            if tracker.begun[foot]:
+                self._shift[foot] = self._rate[foot] = 0.0
+            swing = tracker.current[foot]
+            if swing is None or tracker.state[foot] is not LimbState.SWING or tracker.begun[foot]:
+                self._rate[foot] = 0.0
+                targets.shift_velocity[foot] = 0.0
+                continue
+            event = self._nominal.swings.index(swing)
+            end = self._ends.get(event, swing.end)
+            pace = (swing.end - time - tracker.lead[foot]) / max(end - time, 0.02) if end < swing.end else 1.0
+            pace = min(max(pace, 1.0), self._most(swing))
+            change = self._config.pace_rate * period
+            tracker.pace[foot] += min(max(pace - tracker.pace[foot], -change), change)
+            goal = self._goal.get(event, self._shift[foot])
+            left = max(min(end, swing.start + 0.9 * (swing.end - swing.start)) - 0.03 - time, 0.05)
+            pull = 6.0 * (goal - self._shift[foot]) / left**2 - 4.0 * self._rate[foot] / left
+            self._rate[foot] += period * pull
+            self._shift[foot] += period * self._rate[foot]
+            targets.shift[foot], targets.shift_velocity[foot] = self._shift[foot], self._rate[foot]

@@ -1,0 +1,1 @@
+"""Anytime search of any graph: ANA*, its open list, searches in turn."""

@@ -1,0 +1,173 @@
+"""Compiled parts of the grid heuristic: heights of the ground, nodes, edges, look-up."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.compiled import compiled
+from toolkit.contacts.projection_kernels import cell_of, plane_height, sole_fits
+from toolkit.search.moves.occupancy import body_free
+
+LEVELS = 4  # heights kept per cell
+
+
+@compiled(kept=True)
+def _add_level(levels, z, merge):
+    """Note a height in a list that falls, -inf where free; of close heights the highest stays."""
+    for k in range(len(levels)):
+        if abs(levels[k] - z) < merge:
+            levels[k] = max(levels[k], z)
+            return
+        if levels[k] < z:
+            for m in range(len(levels) - 1, k, -1):
+                levels[m] = levels[m - 1]
+            levels[k] = z
+            return
+
+
+@compiled(kept=True)
+def sole_levels(corner, cell, half, offsets, merge, table, result):
+    """Fill heights (nx, ny, 4) at which a sole has room in each cell, in any of four headings, with a small shift."""
+    for a in range(result.shape[0]):
+        for b in range(result.shape[1]):
+            for k in range(len(offsets)):
+                x, y = corner[0] + a * cell + offsets[k, 0], corner[1] + b * cell + offsets[k, 1]
+                place = cell_of(table, x, y)
+                if place < 0:
+                    continue
+                for entry in range(table.entry_start[place], table.entry_start[place + 1]):
+                    z = plane_height(table, table.entry_surface[entry], x, y)
+                    known = False
+                    for m in range(LEVELS):
+                        known |= abs(result[a, b, m] - z) < 0.5 * merge
+                    if known:
+                        continue
+                    for turn in range(4):
+                        angle = turn * np.pi / 4
+                        if sole_fits(table, place, entry, x, y, np.cos(angle), np.sin(angle), half):
+                            _add_level(result[a, b], z, merge)
+                            break
+
+
+@compiled(kept=True)
+def spread(levels, disc, merge, result):
+    """Add to a copy of the heights of each cell those of the cells around it, the nearer before the farther."""
+    for a in range(levels.shape[0]):
+        for b in range(levels.shape[1]):
+            for k in range(len(disc)):
+                i, j = a + disc[k, 0], b + disc[k, 1]
+                if i < 0 or j < 0 or i >= levels.shape[0] or j >= levels.shape[1]:
+                    continue
+                for m in range(LEVELS):
+                    z = levels[i, j, m]
+                    if z == -np.inf:
+                        break
+                    new = True
+                    for n in range(LEVELS):
+                        new &= not abs(result[a, b, n] - z) < merge
+                    if new:
+                        _add_level(result[a, b], z, merge)
+    return result
+
+
+@compiled(kept=True)
+def number_nodes(levels, corner, cell, body_corner, body_cell, below, box, nodes):
+    """Number in (nx, ny, 4, yaws) nodes the cells in which the body fits; returns how many there are."""
+    count = 0
+    yaws = nodes.shape[3]
+    for a in range(levels.shape[0]):
+        for b in range(levels.shape[1]):
+            for m in range(LEVELS):
+                z = levels[a, b, m]
+                if z == -np.inf:
+                    break
+                x, y = corner[0] + a * cell, corner[1] + b * cell
+                for k in range(yaws):
+                    if body_free(body_corner, body_cell, below, box, x, y, z, k * np.pi / yaws):
+                        nodes[a, b, m, k] = count
+                        count += 1
+    return count
+
+
+@compiled(kept=True)
+def link_nodes(nodes, levels, cell, climb, turn, start, end, weight):
+    """Compressed rows of the grid graph; every edge goes both ways.
+
+    Fills start (count + 1,) and returns the number of edges; with room for them also their ends and lengths.
+    """
+    used = 0
+    yaws = nodes.shape[3]
+    write = len(end) > 0
+    for a in range(nodes.shape[0]):
+        for b in range(nodes.shape[1]):
+            for m in range(LEVELS):
+                for k in range(yaws):
+                    node = nodes[a, b, m, k]
+                    if node < 0:
+                        continue
+                    for step in range(-1, 2, 2):
+                        other = nodes[a, b, m, (k + step) % yaws]
+                        if other >= 0 and other != node:
+                            if write:
+                                end[used], weight[used] = other, turn
+                            used += 1
+                    for i in range(max(a - 1, 0), min(a + 2, nodes.shape[0])):
+                        for j in range(max(b - 1, 0), min(b + 2, nodes.shape[1])):
+                            if i == a and j == b:
+                                continue
+                            for n in range(LEVELS):
+                                other = nodes[i, j, n, k]
+                                if other >= 0 and abs(levels[i, j, n] - levels[a, b, m]) <= climb:
+                                    if write:
+                                        end[used] = other
+                                        weight[used] = cell * np.sqrt(float((i - a) ** 2 + (j - b) ** 2))
+                                    used += 1
+                    start[node + 1] = used
+    return used
+
+
+@compiled(kept=True)
+def _cell_value(height, distance, i, j, z, layer, span):
+    """Least distance of a cell over the yaw layers around one, at the level nearest to a height."""
+    if i < 0 or j < 0 or i >= height.shape[0] or j >= height.shape[1]:
+        return np.inf
+    level = 0
+    for m in range(1, height.shape[2]):
+        if abs(height[i, j, m] - z) < abs(height[i, j, level] - z):
+            level = m
+    if not abs(height[i, j, level] - z) < 0.5:
+        return np.inf
+    best = np.inf
+    for k in range(-span, span + 1):
+        best = min(best, distance[i, j, level, (layer + k) % distance.shape[3]])
+    return best
+
+
+@compiled(kept=True)
+def query(position, yaw, corner, cell, height, distance, result):
+    """Fill distances (n,), interpolated between cells; others near stand in where the four around are blocked."""
+    yaws = distance.shape[3]
+    for row in range(len(position)):
+        x, y = (position[row, 0] - corner[0]) / cell, (position[row, 1] - corner[1]) / cell
+        z = position[row, 2]
+        layer = int(np.floor(yaw[row] / np.pi * yaws + 0.5)) % yaws
+        i, j = int(np.floor(x)), int(np.floor(y))
+        fx, fy = x - i, y - j
+        total, weights = 0.0, 0.0
+        for di in range(2):
+            for dj in range(2):
+                value = _cell_value(height, distance, i + di, j + dj, z, layer, 1)
+                weight = (fx if di else 1.0 - fx) * (fy if dj else 1.0 - fy)
+                if value < np.inf and weight > 0.0:
+                    total += weight * value
+                    weights += weight
+        if weights > 0.0:
+            result[row] = total / weights
+            continue
+        result[row] = np.inf
+        for di in range(-2, 4):
+            for dj in range(-2, 4):
+                value = _cell_value(height, distance, i + di, j + dj, z, layer, 2)
+                if value < np.inf:
+                    away = cell * np.sqrt((di - fx) ** 2 + (dj - fy) ** 2)
+                    result[row] = min(result[row], value + away)

@@ -1,0 +1,154 @@
+"""How far it is to the goal for a floating box on an SE(2) grid (paper, Sec. V), and the search's heuristic from it.
+
+Cells are 8-connected in XY with free turning in place. A cell counts where a sole finds a surface within half a stride
+(so that gaps up to the longest stride can be crossed, wider ones not) and the body fits above it. Since ground can
+lie above ground, a cell has one node for each height. Dijkstra runs once, from all cells in the goal region.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from toolkit.contacts.projection import Projector
+from toolkit.geometry.limb import Limb
+from toolkit.search.costs.grid_kernels import LEVELS, link_nodes, number_nodes, query, sole_levels, spread
+from toolkit.search.moves.occupancy import BodyBox, Occupancy
+from toolkit.world.world import Goal
+
+_OCTILE = 1.0 / 1.0823923  # largest ratio of 8-connected to straight distance, inverted: keeps the estimate low
+
+
+class Distance(Protocol):
+    """Estimates the way to the goal."""
+
+    def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """(n,) m to the goal region from the mean of the feet (n, 3) m with heading (n,) rad; inf: no way."""
+        ...
+
+
+@dataclass(frozen=True)
+class EuclideanDistance:
+    """The straight line in XY, which knows nothing of walls and gaps."""
+
+    goal: Goal
+
+    def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """See `Distance`."""
+        return np.maximum(np.hypot(*(position[:, :2] - self.goal.position[:2]).T) - self.goal.radius, 0.0)
+
+
+@dataclass(frozen=True)
+class GridConfig:
+    """Settings of the grid.
+
+    Attributes:
+        cell: m; enlarged where the world would need more than `max_cells`.
+        yaws: layers over half a turn (the box is the same both ways).
+        climb: m; largest change of height between neighbouring cells.
+        merge: m; heights in one cell that differ by less are one.
+        turn: m; cost of one yaw layer, only there to prefer straight ways.
+        max_cells: of the XY grid.
+    """
+
+    cell: float = 0.1
+    yaws: int = 8
+    climb: float = 0.35
+    merge: float = 0.3
+    turn: float = 1e-4
+    max_cells: int = 200_000
+
+
+class GridDistance:
+    """Distance to the goal on the grid.
+
+    Args:
+        projector: finds where soles have room.
+        occupancy: of the world.
+        box: the body.
+        goal: where to.
+        bounds: (xmin, ymin, xmax, ymax) m of the grid.
+        stride: m; longest step.
+        config: settings.
+
+    Attributes:
+        supported: whether any cell in the goal region has a surface for a sole.
+    """
+
+    def __init__(
+        self,
+        projector: Projector,
+        occupancy: Occupancy,
+        box: BodyBox,
+        goal: Goal,
+        bounds: tuple[float, float, float, float],
+        stride: float,
+        config: GridConfig | None = None,
+    ):
+        self.config = config = config or GridConfig()
+        self._goal = goal
+        extent = np.array(bounds[2:]) - bounds[:2]
+        self._cell = cell = max(config.cell, float(np.sqrt(extent.prod() / config.max_cells)))
+        shape = np.ceil(extent / cell).astype(np.int64) + 1
+        self._corner = np.array(bounds[:2], float)
+        levels = self._levels(projector, shape, stride)
+        self._height = levels
+        nodes = np.full((*levels.shape, config.yaws), -1, np.int32)
+        count = number_nodes(
+            levels,
+            self._corner,
+            cell,
+            occupancy.corner,
+            occupancy.cell,
+            occupancy.below,
+            np.array([box.half_depth, box.half_width, box.bottom, box.top]),
+            nodes,
+        )
+        self._distance = np.full(nodes.shape, np.inf, np.float64)
+        middle = self._corner + cell * np.stack(np.meshgrid(*(np.arange(k) for k in shape), indexing="ij"), axis=-1)
+        inside = np.hypot(*(middle - goal.position[:2]).transpose(2, 0, 1)) <= max(goal.radius, 0.75 * cell)
+        targets = nodes[inside]
+        targets = targets[targets >= 0]
+        self.supported = bool((levels[inside] > -np.inf).any())
+        if len(targets):
+            start, none = np.zeros(count + 1, np.int32), np.zeros(0)
+            grid = (nodes, levels, cell, config.climb, config.turn, start)
+            edges = link_nodes(*grid, none.astype(np.int32), none)
+            end, weight = np.empty(edges, np.int32), np.empty(edges)
+            link_nodes(*grid, end, weight)
+            graph = csr_matrix((weight, end, start), shape=(count, count))
+            distance = dijkstra(graph, directed=True, indices=targets, min_only=True)
+            self._distance[nodes >= 0] = distance[nodes[nodes >= 0]]
+
+    def _levels(self, projector: Projector, shape: np.ndarray, stride: float) -> np.ndarray:
+        """(nx, ny, 4) float heights of ground in reach of each cell, -inf where there is none."""
+        cell = self._cell
+        low = np.full((*shape, LEVELS), -np.inf)
+        sole_levels(
+            self._corner,
+            cell,
+            projector.half_sizes[Limb.LEFT_FOOT],
+            np.ascontiguousarray(projector.offsets),
+            self.config.merge,
+            projector.table,
+            low,
+        )
+        reach = stride / 2 / cell
+        k = int(np.floor(reach))
+        disc = [(i, j) for i in range(-k, k + 1) for j in range(-k, k + 1) if 0 < i * i + j * j <= reach**2]
+        disc.sort(key=lambda ij: (ij[0] ** 2 + ij[1] ** 2, ij))
+        levels = low.copy()
+        spread(low, np.array(disc, np.int64).reshape(-1, 2), self.config.merge, levels)
+        return levels
+
+    def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """See `Distance`; at least the straight line."""
+        position, yaw = np.ascontiguousarray(position, dtype=float), np.ascontiguousarray(yaw, dtype=float)
+        grid = np.empty(len(position))
+        query(position, yaw, self._corner, self._cell, self._height, self._distance, grid)
+        straight = np.hypot(*(position[:, :2] - self._goal.position[:2]).T) - self._goal.radius
+        return np.maximum(np.maximum(grid * _OCTILE - 0.5 * self._cell, straight), 0.0)

@@ -1,0 +1,145 @@
+"""Candidate transitions out of one state: all that pass the screens, dynamics apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.search.moves import screen
+from toolkit.search.moves.exclusion import Exclusion, excluded
+from toolkit.search.moves.moves import MoveGenerator
+from toolkit.search.states.contact_table import ContactTable
+from toolkit.world.timing import Timing
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Transitions out of one state.
+
+    Attributes:
+        limb: (n,) int.
+        number: (n,) int; new contact, -1 where a palm breaks.
+        contacts: (n, 4) int; contact numbers afterwards.
+        centre: (n, 3) m; mean of the feet afterwards.
+        yaw: (n,) rad; its heading.
+        way: (n,) m; of the mean of the feet in XY.
+        timing: (n,) int; index of the timing.
+    """
+
+    limb: np.ndarray
+    number: np.ndarray
+    contacts: np.ndarray
+    centre: np.ndarray
+    yaw: np.ndarray
+    way: np.ndarray
+    timing: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.limb)
+
+    def select(self, rows: np.ndarray) -> Candidates:
+        """Some of them, by index or mask; an index may repeat."""
+        return Candidates(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+    def at(self, timing: np.ndarray) -> Candidates:
+        """The same with other timings (n,)."""
+        kept = (getattr(self, name) for name in self.__dataclass_fields__ if name != "timing")
+        return Candidates(*kept, timing=timing)
+
+
+def mean_feet(table: ContactTable, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of the feet (n, 3) m and its heading (n,) rad of contact numbers (n, 4)."""
+    left, right = contacts[:, 0], contacts[:, 1]
+    a, b = table.yaw[left], table.yaw[right]
+    yaw = np.arctan2(np.sin(a) + np.sin(b), np.cos(a) + np.cos(b))
+    return (table.position[left] + table.position[right]) / 2, yaw
+
+
+class CandidateGenerator:
+    """Makes the candidates of one search.
+
+    Args:
+        moves: screened moves of single limbs.
+        table: their contacts.
+        palms: that may be used; others that are in contact have to be broken first.
+        timings: to choose from.
+        swing_speed: m/s; a foot may not have to fly faster on average.
+        exclusions: transitions that later stages rejected.
+        rejected: (len(REASONS),) int; candidates that fell, by reason; counted up.
+    """
+
+    def __init__(
+        self,
+        moves: MoveGenerator,
+        table: ContactTable,
+        palms: Sequence[Limb],
+        timings: tuple[Timing, ...],
+        swing_speed: float,
+        exclusions: Sequence[Exclusion],
+        rejected: np.ndarray,
+    ):
+        self._moves, self._table, self._palms = moves, table, palms
+        self._exclusions, self._rejected = exclusions, rejected
+        self._ways = swing_speed * np.array([timing.swing for timing in timings])
+
+    def out_of(self, contacts: np.ndarray, last: int) -> Candidates | None:
+        """Candidates out of contact numbers (4,) whose limb `last` moved last; None where there are none."""
+        limbs: list[np.ndarray] = []
+        numbers: list[np.ndarray] = []
+        held = [palm for palm in PALMS if contacts[palm] >= 0 and palm not in self._palms]
+        for palm in held:  # of the start, and not to be used
+            limbs.append(np.array([int(palm)]))
+            numbers.append(np.array([-1]))
+        for foot in FEET:
+            if foot == last or held:
+                continue
+            old, standing = int(contacts[foot]), int(contacts[foot.mirrored])
+            moves = self._moves.steps(foot, standing)
+            self._rejected += moves.rejected
+            if len(moves.numbers):
+                codes = self._moves.swings(foot, moves.numbers, old, standing, self._ways.max())
+                self._rejected += np.bincount(codes, minlength=len(screen.REASONS))
+                limbs.append(np.full(int((codes == 0).sum()), foot))
+                numbers.append(moves.numbers[codes == 0])
+        for palm in self._palms:
+            if palm == last or held:
+                continue
+            moves = self._moves.palms(palm, int(contacts[0]), int(contacts[1]))
+            self._rejected += moves.rejected
+            places = moves.numbers[moves.numbers != contacts[palm]]
+            if contacts[palm] >= 0:
+                places = np.append(places, -1)
+            limbs.append(np.full(len(places), palm))
+            numbers.append(places)
+        self._rejected[0] = 0
+        limb = np.concatenate(limbs) if limbs else np.zeros(0, int)
+        n = len(limb)
+        if n == 0:
+            return None
+        number = np.concatenate(numbers)
+        after = np.repeat(contacts[None], n, axis=0)
+        after[np.arange(n), limb] = number
+        if self._exclusions:
+            position = np.vstack([self._table.position, np.full(3, np.nan)])  # number -1: no contact
+            allowed = ~excluded(self._exclusions, position[contacts], limb, position[number])
+            self._rejected[screen.EXCLUDED] += n - int(allowed.sum())
+            limb, number, after, n = limb[allowed], number[allowed], after[allowed], int(allowed.sum())
+            if n == 0:
+                return None
+        centre, yaw = mean_feet(self._table, after)
+        before = mean_feet(self._table, contacts[None])[0][0]
+        way = np.hypot(*(centre[:, :2] - before[:2]).T)
+        return Candidates(limb, number, after, centre, yaw, way, np.zeros(n, int))
+
+    def timed(self, contacts: np.ndarray, candidates: Candidates) -> Candidates:
+        """Each candidate out of contact numbers (4,) once for every timing that its swing allows."""
+        if len(self._ways) == 1:  # the speed was screened
+            return candidates
+        table, old = self._table, contacts[candidates.limb]
+        way = np.hypot(*(table.position[candidates.number] - table.position[old])[:, :2].T)
+        way[(candidates.limb > Limb.RIGHT_FOOT) | (candidates.number < 0)] = 0.0
+        rows, timing = np.nonzero(way[:, None] <= self._ways)
+        return candidates.select(rows).at(timing)

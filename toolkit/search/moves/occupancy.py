@@ -1,0 +1,208 @@
+"""Where the robot's body would hit the world: a grid of occupied columns, and the box that stands for the body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from toolkit.compiled import compiled
+from toolkit.geometry.limb import PALMS, Limb
+from toolkit.robot.model import RobotModel
+from toolkit.search.moves.obstacles import world_triangles
+
+_MAX_CELLS = 20_000_000
+
+
+@dataclass(frozen=True)
+class BodyBox:
+    """The body from the knees up as an upright box over the mean of the feet.
+
+    Attributes:
+        half_depth, half_width: m; along and across the heading.
+        bottom, top: m above the soles.
+    """
+
+    half_depth: float
+    half_width: float
+    bottom: float
+    top: float
+
+    @classmethod
+    def of(cls, robot: RobotModel, margin: float = 0.02) -> BodyBox:
+        """The box around torso, head, thighs and shoulders in the home posture; arms may fold in."""
+        model = robot.mujoco_model
+        data = mujoco.MjData(model)
+        data.qpos[:] = robot.home
+        mujoco.mj_kinematics(model, data)
+        leg = robot.legs[Limb.LEFT_FOOT]
+        bottom = -leg.ankle_in_sole[2] if leg.ankle_in_sole[2] < 0 else leg.ankle_in_sole[2]
+        bottom += leg.shin
+        arms = _arm_bodies(robot)
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for geom in range(model.ngeom):
+            if model.geom_bodyid[geom] in arms:
+                continue
+            centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+            rotation = data.geom_xmat[geom].reshape(3, 3)
+            middle, extent = data.geom_xpos[geom] + rotation @ centre, np.abs(rotation) @ half
+            if middle[2] + extent[2] < bottom + 0.05:
+                continue
+            low, high = np.minimum(low, middle - extent), np.maximum(high, middle + extent)
+        width = max(-low[1], high[1])
+        for limb, arm in robot.arms.items():
+            width = max(width, abs(arm.shoulder_in_com[1]) + 1.5 * float(robot.half_sizes[limb].min()))
+        return cls(max(-low[0], high[0]) + margin, width + margin, bottom, float(high[2]) + margin)
+
+
+def _arm_bodies(robot: RobotModel) -> set[int]:
+    """Bodies between each palm and the body that it shares with another limb."""
+    model = robot.mujoco_model
+
+    def chain(limb: Limb) -> list[int]:
+        body, bodies = model.body(robot.limbs[limb].body).id, []
+        while body > 0:
+            bodies.append(body)
+            body = int(model.body_parentid[body])
+        return bodies
+
+    chains = {limb: chain(limb) for limb in robot.limbs}
+    arms: set[int] = set()
+    for limb in PALMS:
+        if limb in chains:
+            others = {body for other, bodies in chains.items() if other != limb for body in bodies}
+            arms |= set(chains[limb]) - others
+    return arms
+
+
+@dataclass(frozen=True)
+class Occupancy:
+    """Occupied cells of a box of the world.
+
+    Attributes:
+        corner: (3,) m; lower corner.
+        cell: m; edge of a cell, in all three directions.
+        below: (nx, ny, nz + 1) int16; occupied cells of a column below each height.
+    """
+
+    corner: np.ndarray
+    cell: float
+    below: np.ndarray
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray, cell: float = 0.05) -> Occupancy:
+        """Occupancy of the box between two corners (3,) m; every cell that a triangle touches counts."""
+        extent = upper - lower
+        cell = max(cell, float((extent.prod() / _MAX_CELLS) ** (1 / 3)))
+        shape = np.ceil(extent / cell).astype(np.int64) + 1
+        triangles = world_triangles(model, lower, upper)
+        occupied = np.zeros(tuple(shape), np.bool_)
+        scratch = np.empty((3, 12, 3))
+        _rasterise(np.ascontiguousarray((triangles - lower) / cell), occupied, *scratch)
+        below = np.zeros((*shape[:2], shape[2] + 1), np.int16)
+        np.cumsum(occupied, axis=2, out=below[:, :, 1:])
+        return cls(np.asarray(lower, float), cell, below)
+
+    def free(self, box: BodyBox, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """Whether the body stands free.
+
+        Args:
+            box: the body.
+            position: (n, 3) m; between the soles.
+            yaw: (n,) rad.
+
+        Returns:
+            (n,) bool; what lies outside the grid counts as free.
+        """
+        result = np.empty(len(position), bool)
+        _free(
+            self.corner,
+            self.cell,
+            self.below,
+            np.array([box.half_depth, box.half_width, box.bottom, box.top]),
+            np.ascontiguousarray(position, dtype=float),
+            np.ascontiguousarray(yaw, dtype=float),
+            result,
+        )
+        return result
+
+
+@compiled(kept=True)
+def body_free(corner, cell, below, box, x, y, z, yaw):
+    """Whether the box (half depth, half width, bottom, top) at a pose meets no occupied cell."""
+    first = min(max(int(np.floor((z + box[2] - corner[2]) / cell)), 0), below.shape[2] - 1)
+    last = min(max(int(np.ceil((z + box[3] - corner[2]) / cell)), 0), below.shape[2] - 1)
+    if last <= first:
+        return True
+    c, s = np.cos(yaw), np.sin(yaw)
+    ex, ey = abs(c) * box[0] + abs(s) * box[1], abs(s) * box[0] + abs(c) * box[1]
+    i0, i1 = int(np.floor((x - ex - corner[0]) / cell)), int(np.floor((x + ex - corner[0]) / cell))
+    j0, j1 = int(np.floor((y - ey - corner[1]) / cell)), int(np.floor((y + ey - corner[1]) / cell))
+    for i in range(max(i0, 0), min(i1, below.shape[0] - 1) + 1):
+        for j in range(max(j0, 0), min(j1, below.shape[1] - 1) + 1):
+            if below[i, j, last] == below[i, j, first]:
+                continue
+            dx, dy = corner[0] + (i + 0.5) * cell - x, corner[1] + (j + 0.5) * cell - y
+            if abs(c * dx + s * dy) <= box[0] and abs(-s * dx + c * dy) <= box[1]:
+                return False
+    return True
+
+
+@compiled(kept=True)
+def _free(corner, cell, below, box, position, yaw, result):
+    for row in range(len(position)):
+        x, y, z = position[row, 0], position[row, 1], position[row, 2]
+        result[row] = body_free(corner, cell, below, box, x, y, z, yaw[row])
+
+
+@compiled(kept=True)
+def _clip(points, count, out, axis, bound, sign):
+    """Polygon cut by sign * point[axis] <= sign * bound (Sutherland and Hodgman); returns the number of corners."""
+    kept = 0
+    for k in range(count):
+        m = k + 1 if k + 1 < count else 0
+        da, db = sign * (points[k, axis] - bound), sign * (points[m, axis] - bound)
+        if da <= 0.0:
+            for c in range(3):
+                out[kept, c] = points[k, c]
+            kept += 1
+        if (da < 0.0 and db > 0.0) or (db < 0.0 and da > 0.0):
+            t = da / (da - db)
+            for c in range(3):
+                out[kept, c] = points[k, c] + t * (points[m, c] - points[k, c])
+            kept += 1
+    return kept
+
+
+@compiled(kept=True)
+def _cells(points, count, axis, most):
+    """First and last cell, within 0 and `most`, that a polygon meets along an axis."""
+    low, high = points[0, axis], points[0, axis]
+    for k in range(1, count):
+        low, high = min(low, points[k, axis]), max(high, points[k, axis])
+    return max(int(np.floor(low)), 0), min(int(np.floor(high)), most)
+
+
+@compiled(kept=True)
+def _rasterise(triangles, occupied, work, strip, column):
+    """Mark the cells that triangles (in cell units) touch: clip each to a strip, to a column, then by height.
+
+    `work`, `strip` and `column` are (12, 3) scratch.
+    """
+    for t in range(len(triangles)):
+        i0, i1 = _cells(triangles[t], 3, 0, occupied.shape[0] - 1)
+        for i in range(i0, i1 + 1):
+            count = _clip(triangles[t], 3, work, 0, 1.0 * i, -1.0)
+            count = _clip(work, count, strip, 0, i + 1.0, 1.0)
+            if count == 0:
+                continue
+            j0, j1 = _cells(strip, count, 1, occupied.shape[1] - 1)
+            for j in range(j0, j1 + 1):
+                inner = _clip(strip, count, work, 1, 1.0 * j, -1.0)
+                inner = _clip(work, inner, column, 1, j + 1.0, 1.0)
+                if inner == 0:
+                    continue
+                k0, k1 = _cells(column, inner, 2, occupied.shape[2] - 1)
+                for k in range(k0, k1 + 1):
+                    occupied[i, j, k] = True

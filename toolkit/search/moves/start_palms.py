@@ -1,0 +1,86 @@
+"""The palms that are in contact when the robot starts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.contacts.projection import shifts
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.errors import WorldError
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.robot.model import RobotModel
+from toolkit.search.moves import screen
+from toolkit.search.moves.moves import MoveGenerator
+from toolkit.search.states.contact_table import ContactTable
+from toolkit.world.polygon import nearest_point
+from toolkit.world.world import PALM_SITE_REACH, PALM_SITES, World
+
+_SEARCH, _STEP = 0.1, 0.02  # m; how far from the point nearest to its site a palm may start
+
+
+def with_palms(robot: RobotModel, world: World, feet: Stance, moves: MoveGenerator, table: ContactTable) -> Stance:
+    """The start stance with the palms that the world asks for, each as near to its site as it can be held.
+
+    Args:
+        robot: the robot.
+        world: its sites say which palms.
+        feet: stance of the feet.
+        moves: projects and screens palms.
+        table: of `moves`.
+
+    Raises:
+        WorldError: the robot has no such arm, or it cannot hold its palm there.
+    """
+    left, right = (table.add_contact(feet[foot]) for foot in FEET)
+    stance = feet
+    for limb, site in world.start_palms.items():
+        if limb not in robot.arms:
+            raise WorldError(
+                f"{world.path}: site '{PALM_SITES[limb]}' asks for a palm that robot {robot.name} does not have; "
+                "remove the site, or take a robot with such an arm"
+            )
+        reach = robot.arms[limb].max_reach
+        stance = stance.replace(_placed(world, limb, site, reach, moves, table, left, right))
+    return stance
+
+
+def _placed(
+    world: World,
+    limb: Limb,
+    site: np.ndarray,
+    reach: float,
+    moves: MoveGenerator,
+    table: ContactTable,
+    left: int,
+    right: int,
+) -> Contact:
+    """The palm's contact nearest to its site (3,) m, with the feet at `left` and `right`; the arm reaches `reach` m."""
+    shoulder = moves.shoulder(limb, left, right)
+    rays = _points(world, site) - shoulder
+    distance = np.maximum(np.linalg.norm(rays, axis=1), 1e-9)
+    palms, codes = moves.aimed(limb, left, right, rays / distance[:, None])
+    codes[(codes == screen.NO_WALL) & (distance > reach)] = screen.FAR
+    far = np.linalg.norm(palms.position - site, axis=1)  # what is hit before the point may be elsewhere
+    codes[(codes == 0) & (far > PALM_SITE_REACH + _SEARCH)] = screen.NO_WALL
+    if not (codes == 0).any():
+        code = screen.POSTURE if (codes == screen.POSTURE).any() else codes[0]  # how far any came, or the nearest point
+        at, above = (f"({x:.3g}, {y:.3g}, {z:.3g})" for x, y, z in (site, shoulder))
+        raise WorldError(
+            f"{world.path}: the {limb.label.replace('_', ' ')} cannot start at site '{PALM_SITES[limb]}' {at}, from "
+            f"the shoulder at {above}: {screen.REASONS[code]}; move the site along the wall, move the start nearer to "
+            "the wall or away from it, or remove the site"
+        )
+    row = int(np.argmin(np.where(codes == 0, far, np.inf)))
+    return table.contact(int(table.add(limb, palms.select(np.array([row])))[0]))
+
+
+def _points(world: World, site: np.ndarray) -> np.ndarray:
+    """(n, 3) m; where the palm may go: about the nearest point of every surface for palms near the site."""
+    spread = shifts(_SEARCH, _STEP)
+    points = []
+    for surface in world.surfaces:
+        if surface.serves_palm:
+            middle = nearest_point(surface, site)
+            if np.linalg.norm(middle - site) <= PALM_SITE_REACH:
+                points.append(middle + spread @ surface.pose.rotation[:, :2].T)
+    return np.concatenate(points)

@@ -1,0 +1,1 @@
+"""What a state of the contact search is: contacts by number, CoM, velocity; where it starts."""

@@ -1,1 +1,0 @@
-"""Execution in MuJoCo: controller, run, measurements, verdict."""
