@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit import cli
-from toolkit.control.config import ExecutionConfig
+from toolkit.execution.config import ExecutionConfig
 from toolkit.replanning.config import ReplanConfig
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from toolkit.control.config import ExecutionConfig
 from toolkit.errors import InputError
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance, StateFilter
 from toolkit.execution.scene_index import SceneIndex
 from toolkit.world.scene import compose_scene

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from toolkit.control.config import ExecutionConfig
 from toolkit.errors import ExecutionError, InputError
 from toolkit.execution.check import Result
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.execution.replay import replay, replay_controls
 from toolkit.execution.run import execute

@@ -4,8 +4,8 @@ import dataclasses
 
 import pytest
 
-from toolkit.control.config import ExecutionConfig
 from toolkit.execution.check import Result
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.verdict import Measured, execution_checks, failure_reason
 
 GOOD = Measured(

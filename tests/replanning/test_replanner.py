@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from toolkit.control.config import ExecutionConfig
 from toolkit.control.reference import sample_reference
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.geometry.limb import Limb
 from toolkit.replanning.config import ReplanConfig

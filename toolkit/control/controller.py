@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.centroidal.problem import Margins
-from toolkit.control.config import ExecutionConfig, TaskGains
+from toolkit.control.config import ControllerConfig, TaskGains, TouchdownConfig
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.joint_box import JointBox
 from toolkit.control.limb_target import LimbTargets
 from toolkit.control.qp import FORCE_UNIT, ContactQP
 from toolkit.control.reference import Reference
+from toolkit.control.target import Cones, Corrector, MotionTarget
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import Limb
-from toolkit.replanning.problem import Cones
-from toolkit.replanning.replanner import MotionTarget, Replanner
 from toolkit.robot.model import RobotModel
 
 
@@ -36,8 +35,10 @@ class Controller:
         robot: RobotModel,
         reference: Reference,
         margins: Margins,
-        config: ExecutionConfig,
-        replanner: Replanner | None = None,
+        period: float,
+        config: ControllerConfig,
+        touchdown: TouchdownConfig,
+        corrector: Corrector | None = None,
     ):
         """Prepare for a run.
 
@@ -45,28 +46,30 @@ class Controller:
             robot: the robot as the controller knows it.
             reference: the plan at the control ticks.
             margins: the plan's margins; the controller's lie between them and none.
+            period: s between control ticks.
             config: settings.
-            replanner: optimises motion and landing points anew; they stay as planned where None.
+            touchdown: when a moving limb is taken to be in contact.
+            corrector: optimises motion and landing points anew; they stay as planned where None.
         """
-        self._replanner, self.aim = replanner, MotionTarget.zeros()
+        self._corrector, self.aim = corrector, MotionTarget.zeros()
         self._com, self._com_velocity = np.zeros(3), np.zeros(3)
-        self._robot, self._reference, self._config = robot, reference, config.controller
-        self._period = config.control_period
+        self._robot, self._reference, self._config = robot, reference, config
+        self._period = period
         self.dynamics = RobotDynamics(robot)
         self.limbs = self.dynamics.limbs
         weight = self.dynamics.mass * float(np.linalg.norm(self.dynamics.gravity))
         limit = np.zeros(4)
         for limb, model in robot.limbs.items():
             limit[limb] = model.max_normal_force
-        self.tracker = ContactTracker(reference, self.limbs, weight, limit, config.controller, config.touchdown)
-        self.targets = LimbTargets(reference, self.tracker, config.controller)
-        self._box = JointBox(robot, config.controller)
-        self._torque_limit = config.controller.torque_fraction * robot.torque_limit
-        nesting, urgent_nesting = config.controller.nesting, config.controller.urgent_nesting
+        self.tracker = ContactTracker(reference, self.limbs, weight, limit, config, touchdown)
+        self.targets = LimbTargets(reference, self.tracker, config)
+        self._box = JointBox(robot, config)
+        self._torque_limit = config.torque_fraction * robot.torque_limit
+        nesting, urgent_nesting = config.nesting, config.urgent_nesting
         self._limits = {
             urgent: Cones(
-                min(1.0 + nesting * (margins.friction - 1.0), config.controller.max_friction),
-                min(1.0 + nesting * (margins.yaw - 1.0), config.controller.max_yaw),
+                min(1.0 + nesting * (margins.friction - 1.0), config.max_friction),
+                min(1.0 + nesting * (margins.yaw - 1.0), config.max_yaw),
                 robot.half_sizes - shrink * np.minimum(margins.cop, robot.half_sizes / 2.0),
             )
             for urgent, shrink in ((False, nesting), (True, urgent_nesting))
@@ -76,7 +79,7 @@ class Controller:
         for limb in self.limbs:
             if limb.is_foot:
                 legs[robot.joints_to(limb)] = True
-        gains, nv = config.controller, self.dynamics.nv
+        gains, nv = config, self.dynamics.nv
         self._posture_weight = np.where(legs, gains.leg_posture, 1.0) * gains.posture.weight
         self._arms = {limb: robot.arm_joints(limb) for limb in self.limbs if not limb.is_foot}
         self._posture = self._posture_weight.copy()
@@ -107,10 +110,10 @@ class Controller:
         self.tracker.update(float(self._reference.times[index]), self._period, normal_force)
         self._com[:], self._com_velocity[:] = self._reference.com[index], self._reference.com_velocity[index]
         self.aim.follow(self._reference, index)
-        if self._replanner is not None:
+        if self._corrector is not None:
             cones = self._limits[self._urgent]
-            self._replanner.update(index, self._period, self.dynamics, self.tracker, self.targets, cones, self.aim)
-            self._com += self._replanner.com_shift
+            self._corrector.update(index, self._period, self.dynamics, self.tracker, self.targets, cones, self.aim)
+            self._com += self._corrector.com_shift
         self.targets.update(index, self.dynamics)
         limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
         qp = self._qps.get(limbs)

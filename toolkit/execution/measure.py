@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.control.config import ExecutionConfig
 from toolkit.control.reference import Reference
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Execution
 from toolkit.execution.slip import ContactInterval, contact_intervals

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from toolkit.control.config import ExecutionConfig
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from toolkit.control.config import ExecutionConfig
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.contact_meter import ContactMeter
 from toolkit.execution.scene_index import SceneIndex
 from toolkit.geometry.pose import quaternion_from_rotation

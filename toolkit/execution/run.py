@@ -11,10 +11,10 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.control.config import ExecutionConfig
 from toolkit.control.controller import Controller
 from toolkit.control.reference import LimbPathSampler, sample_reference
 from toolkit.errors import ExecutionError
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import StateFilter
 from toolkit.execution.measure import RunLog, measure
 from toolkit.execution.recorder import Recorder
@@ -85,7 +85,9 @@ def execute(
     if config.replanning.enabled and motion.problem.margins.friction <= config.replanning.max_friction:
         nominal = Nominal.of(motion, reference, robot, config.replanning)
         replanner = Replanner(reference, nominal, robot, world.surfaces, config.replanning)
-    controller = Controller(robot, reference, motion.problem.margins, config, replanner)
+    controller = Controller(
+        robot, reference, motion.problem.margins, period, config.controller, config.touchdown, replanner
+    )
     recorder = Recorder(ticks, scene, robot, index, config)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(schedule.duration, rng)

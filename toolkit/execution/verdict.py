@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from toolkit.control.config import ExecutionConfig
 from toolkit.execution.check import Check, Result
+from toolkit.execution.config import ExecutionConfig
 
 
 @dataclass(frozen=True)

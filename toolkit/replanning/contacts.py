@@ -6,17 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.control.target import Cones
 from toolkit.geometry.limb import Limb
 from toolkit.replanning.nominal import Nominal
-
-
-@dataclass(frozen=True)
-class Cones:
-    """What the controller allows: factors on friction and yaw moment, (4, 2) m half extents of the patches."""
-
-    friction: float
-    yaw: float
-    half_size: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.contacts.stance import Contact
+from toolkit.control.target import Cones
 from toolkit.geometry.pose import Pose
 from toolkit.physics.cone import friction_rows, sole_rows
 from toolkit.replanning.config import ReplanConfig
-from toolkit.replanning.contacts import Cones, ContactTable, Situation
+from toolkit.replanning.contacts import ContactTable, Situation
 from toolkit.replanning.dynamics import Dynamics, FreeLandings, Window
 from toolkit.replanning.kernel import GIVEN, Program
 from toolkit.replanning.landing import apart_row, landing_rows

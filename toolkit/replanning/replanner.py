@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from time import process_time
 
 import numpy as np
@@ -11,47 +10,16 @@ from toolkit.centroidal.problem import STANDARD_GRAVITY
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.limb_target import LimbTargets
 from toolkit.control.reference import Reference, Swing
+from toolkit.control.target import Cones, MotionTarget
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.replanning.config import ReplanConfig
-from toolkit.replanning.contacts import Cones, Situation
+from toolkit.replanning.contacts import Situation
 from toolkit.replanning.kernel import solve
 from toolkit.replanning.nominal import Nominal
 from toolkit.replanning.problem import Replan, ReplanProblem
 from toolkit.robot.model import RobotModel
 from toolkit.world.surface import Surface
-
-
-@dataclass
-class MotionTarget:
-    """What the controller tracks at a tick; world frame, SI units.
-
-    Attributes:
-        com, com_velocity, com_acceleration: (3,).
-        angular_momentum, angular_momentum_rate: (3,) about the CoM.
-        wrench: (4, 6) about the patches' centres in the contact frames.
-    """
-
-    com: np.ndarray
-    com_velocity: np.ndarray
-    com_acceleration: np.ndarray
-    angular_momentum: np.ndarray
-    angular_momentum_rate: np.ndarray
-    wrench: np.ndarray
-
-    @classmethod
-    def zeros(cls) -> MotionTarget:
-        """Room for one."""
-        com, velocity, acceleration, momentum, rate = np.zeros((5, 3))
-        return cls(com, velocity, acceleration, momentum, rate, np.zeros((4, 6)))
-
-    def follow(self, reference: Reference, index: int) -> None:
-        """Fill in a row of the plan."""
-        self.com[:], self.com_velocity[:] = reference.com[index], reference.com_velocity[index]
-        self.com_acceleration[:] = reference.com_acceleration[index]
-        self.angular_momentum[:] = reference.angular_momentum[index]
-        self.angular_momentum_rate[:] = reference.angular_momentum_rate[index]
-        self.wrench[:] = reference.wrench[index]
 
 
 class Replanner:

@@ -1,0 +1,93 @@
+"""What the controller tracks at a tick, within which cones, and who may correct it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from toolkit.control.dynamics import RobotDynamics
+from toolkit.control.limb_target import LimbTargets
+from toolkit.control.reference import Reference
+from toolkit.control.touchdown import ContactTracker
+
+
+@dataclass(frozen=True)
+class Cones:
+    """What the controller allows of a contact wrench.
+
+    Attributes:
+        friction: factor on the friction.
+        yaw: factor on the yaw moment.
+        half_size: (4, 2) m half extents of the patches within which the centre of pressure stays.
+    """
+
+    friction: float
+    yaw: float
+    half_size: np.ndarray
+
+
+@dataclass
+class MotionTarget:
+    """What the controller tracks at a tick; world frame, SI units.
+
+    Attributes:
+        com, com_velocity, com_acceleration: (3,).
+        angular_momentum, angular_momentum_rate: (3,) about the CoM.
+        wrench: (4, 6) about the patches' centres in the contact frames.
+    """
+
+    com: np.ndarray
+    com_velocity: np.ndarray
+    com_acceleration: np.ndarray
+    angular_momentum: np.ndarray
+    angular_momentum_rate: np.ndarray
+    wrench: np.ndarray
+
+    @classmethod
+    def zeros(cls) -> MotionTarget:
+        """Room for one."""
+        com, velocity, acceleration, momentum, rate = np.zeros((5, 3))
+        return cls(com, velocity, acceleration, momentum, rate, np.zeros((4, 6)))
+
+    def follow(self, reference: Reference, index: int) -> None:
+        """Fill in a row of the plan."""
+        self.com[:], self.com_velocity[:] = reference.com[index], reference.com_velocity[index]
+        self.com_acceleration[:] = reference.com_acceleration[index]
+        self.angular_momentum[:] = reference.angular_momentum[index]
+        self.angular_momentum_rate[:] = reference.angular_momentum_rate[index]
+        self.wrench[:] = reference.wrench[index]
+
+
+class Corrector(Protocol):
+    """Optimises the motion anew while the plan is carried out; see `toolkit.replanning.replanner.Replanner`.
+
+    Attributes:
+        com_shift: (3,) m; by how much the feet that bear the plan stand off it.
+    """
+
+    com_shift: np.ndarray
+
+    def update(
+        self,
+        index: int,
+        period: float,
+        dynamics: RobotDynamics,
+        tracker: ContactTracker,
+        targets: LimbTargets,
+        cones: Cones,
+        aim: MotionTarget,
+    ) -> None:
+        """Say what to track at a tick.
+
+        Args:
+            index: row of the reference.
+            period: s since the last tick.
+            dynamics: measured state.
+            tracker: contact states at this tick.
+            targets: whose landing points may be moved.
+            cones: what the controller allows now.
+            aim: the plan's target; overwritten where another one is better.
+        """
+        ...
