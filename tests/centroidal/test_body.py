@@ -8,21 +8,19 @@ import numpy as np
 import pytest
 
 from tests.centroidal.walks import walk
-from tests.contacts.test_reach import random_legs
+from tests.physics.test_leg import random_legs
 from toolkit.centroidal.body import (
-    TORQUE_ROLES,
     BodyMargins,
     body_residuals,
     knot_contacts,
-    leg_torques,
     lowest_foot,
     swing_ankles,
 )
 from toolkit.centroidal.build import initial_com, sequence_problem
 from toolkit.centroidal.pieces import pieces
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion
-from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.physics.leg import TORQUE_ROLES, ReachMargins, leg_clearances, leg_posture, leg_torques
 from toolkit.robot.loader import find_robots, load_robot
 
 

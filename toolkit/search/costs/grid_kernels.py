@@ -71,7 +71,7 @@ def spread(levels, disc, merge, result):
 
 
 @compiled(kept=True)
-def number_nodes(levels, corner, cell, body_corner, body_cell, below, box, nodes):
+def number_nodes(levels, corner, cell, occupancy, box, nodes):
     """Number in (nx, ny, 4, yaws) nodes the cells in which the body fits; returns how many there are."""
     count = 0
     yaws = nodes.shape[3]
@@ -83,7 +83,7 @@ def number_nodes(levels, corner, cell, body_corner, body_cell, below, box, nodes
                     break
                 x, y = corner[0] + a * cell, corner[1] + b * cell
                 for k in range(yaws):
-                    if body_free(body_corner, body_cell, below, box, x, y, z, k * np.pi / yaws):
+                    if body_free(occupancy, box, x, y, z, k * np.pi / yaws):
                         nodes[a, b, m, k] = count
                         count += 1
     return count
