@@ -16,7 +16,7 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import InputError
-from toolkit.geometry.heading import mean_heading, wrapped
+from toolkit.geometry.heading import joint_heading, wrapped
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 
@@ -241,5 +241,6 @@ def _problem(
 
 def _heading(contacts: Sequence[Contact]) -> float:
     """Mean heading in rad of the feet among the contacts (the first two where both are there)."""
-    headings = [contact.pose.yaw for contact in contacts if contact.limb.is_foot]
-    return float(mean_heading(headings[0], headings[-1]))
+    feet = [contact.pose.rotation for contact in contacts if contact.limb.is_foot]
+    x, y = joint_heading(feet[0], feet[-1])
+    return math.atan2(y, x)
