@@ -159,6 +159,7 @@ import json
 import numpy as np
 from toolkit.contacts.surface_table import SurfaceTable, _fill
 from toolkit.search.moves.legs import Legs, violated
+from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.screen import Sole, screen_swings
 from toolkit.physics.leg import LIMITS
 
@@ -180,7 +181,7 @@ screen_swings(np.array([[0.3, 0.1, 0.0]]), np.zeros(1), *feet, np.array([0.11, 0
 
 kernels = (_fill, violated, screen_swings)
 print(json.dumps({
-    "results": [int(table.near_start[1]), int(reason), int(codes[0])],
+    "results": [int(table.near_start[1]), Reason(reason).name, Reason(codes[0]).name],
     "compiled": [sum(kernel.stats.cache_misses.values()) for kernel in kernels],
 }))
 """
@@ -233,8 +234,8 @@ def copy(tmp_path):
 
 def test_an_edit_below_a_kernel_turns_the_next_run_around(copy):
     first, again = copy.run(RUN), copy.run(RUN)
-    assert first == {"results": [1, 0, 0], "compiled": [1, 1, 1]}
-    assert again == {"results": [1, 0, 0], "compiled": [0, 0, 0]}
+    assert first == {"results": [1, "NONE", "NONE"], "compiled": [1, 1, 1]}
+    assert again == {"results": [1, "NONE", "NONE"], "compiled": [0, 0, 0]}
     copy.edit("toolkit/contacts/surface_table.py", "return np.hypot(", "return 1.0 + np.hypot(")
     copy.edit("toolkit/physics/leg.py", "com[2] + hip_in_com[2]", "com[2] + hip_in_com[2] + 9.0")
     copy.edit(
@@ -242,7 +243,7 @@ def test_an_edit_below_a_kernel_turns_the_next_run_around(copy):
     )
     edited = copy.run(RUN)
     assert edited["compiled"] == [1, 1, 1]
-    assert edited["results"] == [0, 5, 11]  # no edge near, a leg too long, a swing that crosses
+    assert edited["results"] == [0, "LEG_LENGTH", "CROSSES"]
 
 
 @pytest.mark.slow
