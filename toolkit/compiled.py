@@ -7,6 +7,8 @@ the next call compile again; an edit of a comment, or of a function that is not 
 A function that only other compiled functions call is decorated with `@compiled`. One that Python calls is decorated
 with `@compiled(kept=True)`, and what was compiled is kept on disk: beside the source, or, where that folder cannot be
 written, in numba's folder of the user. Where neither can be written, it is compiled anew in each process.
+
+A formula that serves compiled code, NumPy arrays and CasADi's symbols alike is decorated with `@law`.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.dispatcher import Dispatcher
+from numba.extending import register_jitable
 
 REORDERED = frozenset({"reassoc", "contract", "arcp", "nsz"})
 """What LLVM may do to floating-point sums where a kernel allows it; nan and inf keep their meaning."""
@@ -48,6 +51,14 @@ def compiled(function: Callable | None = None, *, kept: bool = False, reordered:
         except RuntimeError:  # numba found no folder to write to
             pass
     return dispatcher
+
+
+def law(function: Callable) -> Callable:
+    """Leave a function as it is for Python, and let compiled functions call it too.
+
+    Written with operators and NumPy's functions of one element, it takes numbers, arrays and CasADi's symbols.
+    """
+    return register_jitable(error_model="numpy", nogil=True)(function)
 
 
 def digest(function: Callable) -> str:

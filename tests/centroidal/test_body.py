@@ -8,21 +8,20 @@ import numpy as np
 import pytest
 
 from tests.centroidal.walks import walk
-from tests.contacts.test_reach import random_legs
+from tests.physics.test_leg import random_legs
 from toolkit.centroidal.body import (
-    TORQUE_ROLES,
     BodyMargins,
     body_residuals,
     knot_contacts,
-    leg_torques,
     lowest_foot,
     swing_ankles,
 )
 from toolkit.centroidal.build import initial_com, sequence_problem
+from toolkit.centroidal.leg_pieces import leg_limits
 from toolkit.centroidal.pieces import pieces
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion
-from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins, leg_clearances, leg_posture, leg_torques
 from toolkit.robot.loader import find_robots, load_robot
 
 
@@ -77,22 +76,13 @@ def test_casadi_and_numpy_agree_about_a_leg(walker):
     for limb in FEET:
         leg = walker.legs[limb]
         for _, _, _, com, position, rotation in random_legs(walker, limb, rng, 20):
-            ranges = [leg.ranges[role] for role in ("ankle_pitch", "ankle_roll", "hip_pitch", "hip_roll")]
-            parameters = np.concatenate(
-                [
-                    leg.hip_in_com,
-                    position + rotation @ leg.ankle_in_sole,
-                    rotation.ravel(),
-                    [leg.thigh, leg.shin, leg.min_length, leg.max_length],
-                    *ranges,
-                    [0.015, 0.1, 0.05],
-                ]
-            )
-            rows = np.array(pieces().leg.value(ca.vertcat(com, 0.0), parameters)).reshape(5, 2).min(1)
-            posture = leg_posture(leg, com[None], np.zeros(1), position[None], rotation[None])
-            clearances = leg_clearances(leg, posture, wanted)
-            names = ("leg length", "ankle pitch", "ankle roll", "hip pitch", "hip roll")
-            expected = [clearances[name][0] * (5 if name == "leg length" else 1) for name in names]
+            ankle = position + rotation @ leg.ankle_in_sole
+            posture = [leg.hip_in_com, ankle, rotation.ravel(), [leg.thigh, leg.shin]]
+            parameters = np.concatenate([*posture, leg_limits(leg, wanted)])
+            rows = np.array(pieces().leg.value(ca.vertcat(com, 0.0), parameters)).reshape(-1, 2).min(1)
+            found = leg_posture(leg, com[None], np.zeros(1), position[None], rotation[None])
+            clearances = leg_clearances(leg, found, wanted)
+            expected = [clearances[item.name][0] * (5 if item.quantity == "length" else 1) for item in PLANNED]
             np.testing.assert_allclose(rows, expected, atol=1e-9)
 
 

@@ -8,7 +8,7 @@ from toolkit.geometry.pose import Pose
 from toolkit.search.costs.heuristic import EuclideanDistance, GridConfig
 from toolkit.search.costs.terrain_distance import TerrainDistance
 from toolkit.search.moves.obstacles import world_triangles
-from toolkit.search.moves.occupancy import BodyBox, Occupancy
+from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
 
 
 def terrain(robot, world):
@@ -118,7 +118,7 @@ def test_occupancy_agrees_with_collision(robot):
             name: any(mujoco.mj_geomDistance(model, data, model.geom(name).id, g, 1.0, None) <= 0 for g in statics)
             for name in sizes
         }
-        free = grid.free(body, position[None], np.array([yaw]))[0]
+        free = body_free(grid, body, *position, yaw)
         if not touch["large"]:
             assert free
         if touch["small"]:

@@ -3,13 +3,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z, rotation_on_surface
+from toolkit.physics.leg import LIMITS, ReachMargins, leg_clearances, leg_posture
 from toolkit.robot.loader import load_robot
-from toolkit.search.moves.legs import LIMITS, legs_of, violated
+from toolkit.search.moves.legs import legs_of, stances_violated, violated
+from toolkit.search.moves.reasons import OF_LIMIT, Reason
 from toolkit.search.moves.shanks import shanks_of
-from toolkit.search.moves.stances import ENTANGLED, stances_violated
 
 ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
 
@@ -32,12 +32,12 @@ def test_same_verdict_as_the_closed_form(name):
         position = np.einsum("nij,nj->ni", rotation_about_z(yaw), offset) + [0, 0, 1] * rng.uniform(-0.1, 0.3, (n, 1))
         leg = robot.legs[limb]
         clearances = leg_clearances(leg, leg_posture(leg, com, yaw, position, rotation), margins)
-        stacked = np.stack([clearances[limit] for limit in LIMITS])
-        expected = np.where((stacked < 0).any(0), (stacked < 0).argmax(0), -1)
+        stacked = np.stack([clearances[limit.name] for limit in LIMITS])
+        expected = np.where((stacked < 0).any(0), np.array(OF_LIMIT)[(stacked < 0).argmax(0)], 0)
         got = np.array([violated(legs, side, *com[i], yaw[i], position[i], rotation[i]) for i in range(n)])
         np.testing.assert_array_equal(got, expected)
         seen |= set(got.tolist())
-    assert {-1, 0, 1, 2} <= seen
+    assert {Reason.NONE, Reason.LEG_LENGTH, Reason.ANKLE_PITCH, Reason.ANKLE_ROLL} <= seen
 
 
 def test_a_lower_com_brings_long_strides_into_reach():
@@ -52,7 +52,7 @@ def test_a_lower_com_brings_long_strides_into_reach():
     low = stances_violated(
         legs, shanks, com, np.array([0.0, 0.05, 0.1, 0.15, 0.2]), np.zeros(1), left, turn, right, turn
     )
-    assert LIMITS[high[0]] == "leg length" and low[0] == -1
+    assert high[0] == Reason.LEG_LENGTH and low[0] == 0
 
 
 def test_legs_in_each_others_way_are_no_stance():
@@ -65,4 +65,4 @@ def test_legs_in_each_others_way_are_no_stance():
         turns = [rotation_about_z(np.array([-sign * turn])) for sign in (1, -1)]
         return int(stances_violated(legs, shanks, com, drop, np.zeros(1), left, turns[0], right, turns[1])[0])
 
-    assert verdict(0.0, 0.2) == -1 and verdict(0.5, 0.24) == ENTANGLED and verdict(0.5, 0.5) == -1
+    assert verdict(0.0, 0.2) == 0 and verdict(0.5, 0.24) == Reason.KNEES and verdict(0.5, 0.5) == 0

@@ -5,6 +5,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.moves import screen
+from toolkit.search.moves.reasons import Reason
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.states.state import COM, CONTACTS, LAST, VELOCITY, pack, unpack
 
@@ -37,9 +38,9 @@ def test_screens_name_their_reasons(robot):
     steps, rejected = reached(robot, flat, Limb.LEFT_FOOT)
     assert len(steps) > 40 and (steps[:, 1] > -0.1).all()
     far, dropped = reached(robot, make_world(box([0, 0, -0.05], [0.3, 0.4, 0.05]), goal=(0.2, 0, 0)), Limb.LEFT_FOOT)
-    assert len(far) < len(steps) and dropped[screen.NO_SURFACE] > rejected[screen.NO_SURFACE]
+    assert len(far) < len(steps) and dropped[Reason.NO_SURFACE] > rejected[Reason.NO_SURFACE]
     ledge, dropped = reached(robot, make_world(FLOOR, box([0.55, 0, 0.3], [0.3, 2, 0.3])), Limb.LEFT_FOOT)
-    assert dropped[screen.BODY] + dropped[screen.NO_SURFACE] + dropped[screen.LEG] > 0
+    assert dropped[Reason.BODY] + dropped[Reason.NO_SURFACE] + dropped[Reason.LEG_LENGTH] > 0
 
 
 def test_swings_do_not_cross_the_stance_leg():
@@ -47,8 +48,10 @@ def test_swings_do_not_cross_the_stance_leg():
     stand, old = np.array([0.0, -0.1, 0.0]), np.array([-0.3, 0.1, 0.0])
     new = np.array([[0.3, 0.1, 0.0], [0.3, -0.35, 0.0], [-0.29, 0.1, 0.0], [3.0, 0.1, 0.0]])
     codes = np.empty(4, np.int64)
-    screen.screen_swings(new, np.zeros(4), old, 0.0, stand, 0.0, half, 2.0, 0.04, 0.1, codes)
-    assert codes.tolist() == [0, screen.CROSSES, screen.STILL, screen.FAST]
+    turn = np.eye(3)
+    feet = screen.Sole(old, turn, 0.0), screen.Sole(stand, turn, 0.0)
+    screen.screen_swings(new, np.zeros(4), *feet, half, 2.0, 0.04, 0.1, codes)
+    assert codes.tolist() == [0, Reason.CROSSES, Reason.STILL, Reason.FAST]
 
 
 def test_rectangles_overlap_like_polygons():
@@ -77,7 +80,7 @@ def test_palm_screen(robot):
     position = np.array([[0, 0.7, 1.3], [0, 1.2, 1.3], [0.4, 0.1, 1.3], [0, 0.7, 1.3], [0, 0.7, 1.3]])
     normal = np.array([[0, -1.0, 0], [0, -1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0]])
     codes = screen.screen_palms(surface, position, normal, shoulder, centre, 0.0, 1.0, (0.2, 0.6), 0.15, 0.5)
-    assert codes.tolist() == [0, screen.FAR, screen.WRONG_SIDE, screen.FACING, screen.NO_WALL]
+    assert codes.tolist() == [0, Reason.FAR, Reason.WRONG_SIDE, Reason.FACING, Reason.NO_WALL]
 
 
 def test_states_pack_and_unpack():

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from tests.search.worlds import FLOOR, box, make_world
-from toolkit.contacts.reach import ReachMargins, leg_posture
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, rotation_on_surface
+from toolkit.physics.leg import ReachMargins, leg_posture
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.robot.loader import load_robot
-from toolkit.search.moves import screen
-from toolkit.search.moves.legs import legs_of
-from toolkit.search.moves.shanks import ball_free, leg_points, segment_distance, shanks_of
+from toolkit.search.moves.legs import legs_of, reach
+from toolkit.search.moves.occupancy import Occupancy
+from toolkit.search.moves.reasons import Reason
+from toolkit.search.moves.shanks import ball_free, segment_distance, shanks_of
 from toolkit.search.planner import ContactPlanner
 
 ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
@@ -24,7 +25,7 @@ def test_points_and_radii_of_the_legs(name):
     radius = shanks_of(robot).radius
     assert ((radius > 0.01) & (radius < 0.15)).all()
     rng = np.random.default_rng(0)
-    legs, points = legs_of(robot, ReachMargins()), np.empty((3, 3))
+    legs = legs_of(robot, ReachMargins(ankle=-9.0, hip=-9.0))
     for side, limb in enumerate(FEET):
         for _ in range(50):
             com = np.array([0.0, 0.0, robot.com_height - 0.05]) + rng.uniform(-0.1, 0.05, 3)
@@ -33,9 +34,10 @@ def test_points_and_radii_of_the_legs(name):
             turn = rotation_on_surface(normal / np.linalg.norm(normal), yaw)
             place = Pose.from_yaw(np.zeros(3), yaw).rotation @ [0.05, 0.1 - 0.2 * side, 0.0]
             posture = leg_posture(robot.legs[limb], com[None], np.array([yaw]), place[None], turn[None])
-            leg_points(legs, side, com[0], com[1], com[2], yaw, place, turn, points)
-            for point, expected in zip(points, (posture.hip, posture.knee_point, posture.ankle), strict=True):
-                np.testing.assert_allclose(point, expected[0], atol=1e-9)
+            reason, points = reach(legs, side, tuple(com), yaw, place, turn)
+            assert reason == 0
+            expected = (posture.hip_point, posture.knee_point, posture.ankle_point)
+            np.testing.assert_allclose(points, np.array(expected)[..., 0], atol=1e-12)
 
 
 def test_distance_of_segments_is_the_least_over_all_points():
@@ -53,11 +55,11 @@ def test_distance_of_segments_is_the_least_over_all_points():
 def test_ball_on_the_grid():
     below = np.zeros((4, 4, 5), np.int16)
     below[2, 2, 3:] = 1  # one occupied cell, [0.1, 0.15]^3
-    corner, cell = np.zeros(3), 0.05
-    assert not ball_free(corner, cell, below, 0.12, 0.12, 0.12, 0.0)
-    assert not ball_free(corner, cell, below, 0.12, 0.12, 0.08, 0.05)
-    assert ball_free(corner, cell, below, 0.12, 0.12, 0.07, 0.05)
-    assert ball_free(corner, cell, below, 0.12, 0.06, 0.12, 0.05)
+    grid = Occupancy(np.zeros(3), 0.05, below)
+    assert not ball_free(grid, 0.12, 0.12, 0.12, 0.0)
+    assert not ball_free(grid, 0.12, 0.12, 0.08, 0.05)
+    assert ball_free(grid, 0.12, 0.12, 0.07, 0.05)
+    assert ball_free(grid, 0.12, 0.06, 0.12, 0.05)
 
 
 def codes(robot, world, poses, standing):
@@ -75,13 +77,13 @@ def codes(robot, world, poses, standing):
 def test_toes_turned_in_bring_the_knees_together(robot):
     world = make_world(FLOOR)
     assert codes(robot, world, [(0, 0.1, 0), (0, 0.1, 25)], (0, -0.1, 0)) == [0, 0]
-    assert codes(robot, world, [(0, 0.12, -25), (0, 0.13, -10)], (0, -0.12, 25)) == [screen.KNEES, 0]
+    assert codes(robot, world, [(0, 0.12, -25), (0, 0.13, -10)], (0, -0.12, 25)) == [Reason.KNEES, 0]
 
 
 def test_a_beam_beside_the_shin_is_no_place_for_a_leg(robot):
     knee = robot.legs[Limb.LEFT_FOOT].shin
     beam = box([0.05, 0.32, knee * 0.75], [0.3, 0.1, 0.05])  # its near edge 0.22 m to the left, below the knee
     free, hit = (codes(robot, make_world(FLOOR, *geoms), [(0, 0.2, 0)], (0, 0, 0)) for geoms in ((), (beam,)))
-    assert free == [0] and hit == [screen.SHANK]
+    assert free == [0] and hit == [Reason.SHANK]
     far = box([0.05, 0.5, knee * 0.75], [0.3, 0.1, 0.05])
     assert codes(robot, make_world(FLOOR, far), [(0, 0.2, 0)], (0, 0, 0)) == [0]

@@ -3,9 +3,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from toolkit.contacts.reach import leg_posture
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
+from toolkit.physics.leg import leg_posture
 from toolkit.wholebody.swing_planner import plan_swing
 from toolkit.wholebody.swing_task import SwingConfig, SwingTask
 from toolkit.wholebody.toe_pitch import SwingingLeg

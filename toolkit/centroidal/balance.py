@@ -21,6 +21,7 @@ from scipy.optimize import linprog
 from toolkit.centroidal.build import ProblemConfig
 from toolkit.centroidal.problem import GRAVITY, Margins
 from toolkit.contacts.stance import Contact
+from toolkit.geometry.heading import mean_heading
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 
@@ -140,7 +141,7 @@ def _reach(robot: RobotModel, contacts: Sequence[Contact], yaw: float | None) ->
     feet = [contact for contact in contacts if contact.limb.is_foot]
     if yaw is None:
         headings = [contact.pose.yaw for contact in feet or contacts]
-        yaw = float(np.arctan2(np.sin(headings).sum(), np.cos(headings).sum()))
+        yaw = float(mean_heading(headings[0], headings[-1]))
     base = rotation_about_z(yaw)
     centers, radii = [], []
     for contact in contacts:

@@ -1,8 +1,8 @@
 """What the body can do: limits of the legs and arms along a centroidal motion, checked in plain NumPy.
 
-Joint angles of the stance legs follow from the CoM in closed form (`toolkit.contacts.reach`), joint torques from the
-wrench under the sole: tau = a . ((p - o) x f + m) about the axis a through o, the leg's own weight and inertia left
-out. A foot in the air is taken on a smooth path between its two contacts; its hip keeps within a leg's length of it.
+Joint angles of the stance legs follow from the CoM in closed form, joint torques from the wrench under the sole
+(`toolkit.physics.leg`), the leg's own weight and inertia left out. A foot in the air is taken on a smooth path between
+its two contacts; its hip keeps within a leg's length of it.
 """
 
 from __future__ import annotations
@@ -12,18 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
-from toolkit.contacts.reach import LegPosture, ReachMargins, leg_clearances, leg_posture
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
+from toolkit.physics.leg import PLANNED, ReachMargins, leg_clearances, leg_posture, leg_torques
 from toolkit.robot.model import RobotModel
 
-TORQUE_ROLES = ("knee", "hip_pitch", "hip_roll", "ankle_pitch", "ankle_roll")
 SWING_LIFT = 0.06  # m; height of the assumed path of a foot in the air above the line between its contacts
 CROSSING = (0.02, 0.95)  # of a swing, in which the foot crosses from contact to contact
 
 
 @dataclass(frozen=True)
-class BodyMargins:
+class BodyMargins(ReachMargins):
     """How far inside the body's limits a plan stays; the defaults are what no plan may exceed.
 
     Attributes:
@@ -34,9 +33,7 @@ class BodyMargins:
         torque: part of each leg joint's torque that may be used.
     """
 
-    length: float = 0.0
     ankle: float = 0.0
-    hip: float = 0.0
     height: float = 0.0
     torque: float = 1.0
 
@@ -135,32 +132,6 @@ def swing_ankles(
     return knot, delay, limb, np.concatenate(ankles), np.concatenate(tangents)
 
 
-def leg_torques(posture: LegPosture, sole: np.ndarray, rotation: np.ndarray, force: np.ndarray, moment: np.ndarray):
-    """Static torques of stance legs about their joints.
-
-    Args:
-        posture: of n legs.
-        sole: (n, 3) m; centres of the soles.
-        rotation: (n, 3, 3); world_from_sole.
-        force: (n, 3) N on the sole, in the world.
-        moment: (n, 3) N m on the sole about its centre, in the world.
-
-    Returns:
-        Role -> (n,) N m.
-    """
-    w = posture.pitch_axis
-    horizontal = np.stack([w[:, 1], -w[:, 0], np.zeros(len(w))], -1)
-    roll_axis = horizontal / np.linalg.norm(horizontal, axis=-1, keepdims=True)
-    joints = {
-        "knee": (posture.knee_point, w),
-        "hip_pitch": (posture.hip, w),
-        "hip_roll": (posture.hip, roll_axis),
-        "ankle_pitch": (posture.ankle, w),
-        "ankle_roll": (posture.ankle, rotation[..., 0]),
-    }
-    return {role: (axis * (np.cross(sole - origin, force) + moment)).sum(-1) for role, (origin, axis) in joints.items()}
-
-
 def middle_com(motion: CentroidalMotion) -> np.ndarray:
     """(N, 3) m; CoM where the torques of each step are judged: half a step on at the first knot's velocity."""
     half = motion.problem.dt[:, None] / 2
@@ -183,7 +154,6 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
         flat = np.ravel_multi_index((at, np.broadcast_to(limb, at.shape)), table.shape)
         np.maximum.at(table.reshape(-1), flat, np.where(np.isnan(value), np.inf, value))
 
-    reach = ReachMargins(length=margins.length, ankle=margins.ankle, hip=margins.hip)
     knots, limbs, positions, rotations = knot_contacts(p)
     swing_knots, swing_delays, swing_limbs, swing_tips, _ = swing_ankles(p)
     base = rotation_about_z(p.yaw)
@@ -192,9 +162,9 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
         if here.any():
             at = knots[here]
             posture = leg_posture(leg, motion.com[at], p.yaw[at], positions[here], rotations[here])
-            for name, clearance in leg_clearances(leg, posture, reach).items():
-                if name != "hip yaw":  # the base may turn to spare it
-                    enter(name, at, limb, -clearance)
+            clearances = leg_clearances(leg, posture, margins)
+            for limit in PLANNED:
+                enter(limit.name, at, limb, -clearances[limit.name])
         at, later = swing_knots[swing_limbs == limb], swing_delays[swing_limbs == limb, None]
         com = motion.com[at] + later * motion.linear_momentum[at] / p.mass
         hip = com + base[at] @ leg.hip_in_com

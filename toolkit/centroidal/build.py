@@ -16,6 +16,7 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import InputError
+from toolkit.geometry.heading import joint_heading, wrapped
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 
@@ -95,7 +96,7 @@ def transition_problem(
     start, end = _heading(before), _heading(after)
     yaw = np.empty(2 * n + 1)
     yaw[: n + 1] = start
-    yaw[n + 1 :] = start + _wrap(end - start) / n * np.arange(1, n + 1)
+    yaw[n + 1 :] = start + wrapped(end - start) / n * np.arange(1, n + 1)
     arrays = _contact_arrays(2 * n)
     for contact in before:
         moves = contact.limb == transition.limb
@@ -146,7 +147,7 @@ def sequence_problem(
         dt[begin:end] = phase.duration / count
         feet_stay = phase.swing is None or not phase.swing.is_foot
         target = heading if feet_stay else _heading(phases[index + 1].contacts)
-        yaw[begin + 1 : end + 1] = heading + _wrap(target - heading) / count * np.arange(1, count + 1)
+        yaw[begin + 1 : end + 1] = heading + wrapped(target - heading) / count * np.arange(1, count + 1)
         heading = float(yaw[end])
         for contact in phase.contacts:
             _put(arrays, contact, begin, end, total)
@@ -240,16 +241,6 @@ def _problem(
 
 def _heading(contacts: Sequence[Contact]) -> float:
     """Mean heading in rad of the feet among the contacts (the first two where both are there)."""
-    x = y = 0.0
-    for contact in contacts:
-        if contact.limb.is_foot:
-            rotation = contact.pose.rotation
-            dx, dy = float(rotation[0, 0]), float(rotation[1, 0])
-            length = math.hypot(dx, dy) or 1.0
-            x, y = x + dx / length, y + dy / length
+    feet = [contact.pose.rotation for contact in contacts if contact.limb.is_foot]
+    x, y = joint_heading(feet[0], feet[-1])
     return math.atan2(y, x)
-
-
-def _wrap(angle: float) -> float:
-    """The same angle in [-pi, pi]."""
-    return math.remainder(angle, 2 * math.pi)

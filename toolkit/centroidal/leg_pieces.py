@@ -1,30 +1,19 @@
-"""What a leg can do as CasADi pieces: the expressions of `toolkit.contacts.reach` and `toolkit.centroidal.body`."""
+"""What a leg can do as CasADi pieces: the laws of `toolkit.physics.leg` on symbols."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 
 import casadi as ca
+import numpy as np
 
 from toolkit.centroidal.blocks import Parameters, Piece
+from toolkit.physics.leg import PLANNED, LegPosture, ReachMargins, joint_torques, posture_between
+from toolkit.robot.model import LegGeometry
 
 WRENCH = 6
-
-
-@dataclass(frozen=True)
-class Posture:
-    """The leg of `toolkit.contacts.reach.LegPosture` as expressions."""
-
-    length: ca.SX
-    hip_roll: ca.SX
-    hip_pitch: ca.SX
-    ankle_pitch: ca.SX
-    ankle_roll: ca.SX
-    hip: ca.SX
-    knee: ca.SX
-    ankle: ca.SX
-    pitch_axis: ca.SX
+TINY = 1e-12  # m^2; keeps the derivatives of roots finite
+_MARGINS = tuple(dict.fromkeys(limit.margin for limit in PLANNED))
 
 
 def displacement(rotation: ca.SX, offset: ca.SX) -> ca.SX:
@@ -47,62 +36,45 @@ def stretched(multiplier: ca.SX, reach: ca.SX, length: ca.SX, v: ca.SX) -> ca.SX
     return ca.fmax(-multiplier, 0) / length * (across.T @ across)
 
 
-def _posture(com: ca.SX, p: Parameters, offset: ca.SX) -> tuple[Posture, ca.SX]:
-    """Posture of a leg, and world_from_sole.
+def _posture(com: ca.SX, p: Parameters, offset: ca.SX) -> tuple[LegPosture, ca.SX]:
+    """Posture of a leg, its hip's yaw apart, and world_from_sole.
 
     Parameters: hip relative to the CoM in the world (3), ankle in the world (3), R of the sole (9, row-major), thigh,
     shin. The sole is displaced by `offset` (2 or none) along its own axes.
     """
+    if hasattr(ca.GlobalOptions, "setNumpyMode"):  # since CasADi 3.8: let NumPy's functions take symbols, silently
+        ca.GlobalOptions.setNumpyMode(-1)
     hip_offset, ankle, rotation = p(3), p(3), ca.reshape(p(9), 3, 3).T
-    thigh, shin = p(), p()
-    ankle = ankle + displacement(rotation, offset)
-    hip = com + hip_offset
-    h = rotation.T @ (hip - ankle)
-    square = ca.sumsqr(h) + 1e-12
-    length = ca.sqrt(square)
-    roll = ca.atan2(h[1], h[2])
-    cosine = (square + shin**2 - thigh**2) / (2 * shin * length)
-    lean = ca.atan2(h[0], ca.sqrt(h[1] ** 2 + h[2] ** 2 + 1e-12)) + ca.acos(ca.fmin(ca.fmax(cosine, -0.9999), 0.9999))
-    axis = rotation @ ca.vertcat(0, ca.cos(roll), -ca.sin(roll))
-    up = ca.vertcat(ca.sin(lean), ca.sin(roll) * ca.cos(lean), ca.cos(roll) * ca.cos(lean))
-    knee = ankle + shin * (rotation @ up)
-    thigh_z = hip - knee
-    thigh_x = ca.cross(axis, thigh_z)
-    posture = Posture(
-        length=length,
-        hip_roll=ca.asin(ca.fmin(ca.fmax(axis[2], -0.9999), 0.9999)),
-        hip_pitch=ca.atan2(-thigh_x[2], thigh_z[2]),
-        ankle_pitch=-lean,
-        ankle_roll=roll,
-        hip=hip,
-        knee=knee,
-        ankle=ankle,
-        pitch_axis=axis,
-    )
-    return posture, rotation
+    hip, ankle = com + hip_offset, ankle + displacement(rotation, offset)
+    return posture_between(hip, ankle, rotation, (1.0, 0.0), p(), p(), TINY), rotation
 
 
 def leg(moving: bool) -> Piece:
-    """Joint ranges of a leg.
+    """Limits of a leg that motions keep.
 
-    Parameters: of the posture; (2) length, then (2) lower and upper of ankle pitch, ankle roll, hip pitch, hip roll;
-    wanted margins of length, ankle, hip.
+    Parameters: of the posture; then those of `leg_limits`.
     """
     p = Parameters()
     com, slack, offset = ca.SX.sym("c", 3), ca.SX.sym("s"), ca.SX.sym("d", 2 * moving)
     posture, _ = _posture(com, p, offset)
-    values = [posture.length, posture.ankle_pitch, posture.ankle_roll, posture.hip_pitch, posture.hip_roll]
-    ranges = [p(2) for _ in values]
-    length, ankle, hip = p(), p(), p()
+    ranges = [p(2) for _ in PLANNED]
+    margins = {name: p() for name in _MARGINS}
     rows = []
-    for value, limits, margin, scale in zip(
-        values, ranges, (length, ankle, ankle, hip, hip), (5, 1, 1, 1, 1), strict=True
-    ):
-        kept = margin * (1 - slack)
-        rows += [scale * (value - limits[0] - kept), scale * (limits[1] - value - kept)]
+    for limit, (lower, upper) in zip(PLANNED, map(ca.vertsplit, ranges), strict=True):
+        value, kept = getattr(posture, limit.quantity), margins[limit.margin] * (1 - slack)
+        scale = 5 if limit.quantity == "length" else 1
+        rows += [scale * (value - lower - kept), scale * (upper - value - kept)]
     v = ca.vertcat(com, slack, offset)
-    curvature = partial(stretched, reach=posture.hip - posture.ankle, length=posture.length, v=v)
-    return Piece("leg", v, p.vector, rows=ca.vertcat(*rows), curvature=lambda m: 5 * curvature(m[1]))
+    reach = ca.vertcat(*posture.hip_point) - ca.vertcat(*posture.ankle_point)
+    longest = 2 * [limit.quantity for limit in PLANNED].index("length") + 1  # the row of the upper end
+    curvature = partial(stretched, reach=reach, length=posture.length, v=v)
+    return Piece("leg", v, p.vector, rows=ca.vertcat(*rows), curvature=lambda m: 5 * curvature(m[longest]))
+
+
+def leg_limits(leg: LegGeometry, margins: ReachMargins) -> np.ndarray:
+    """Parameters of the limits of `leg`: lower and upper end of each, in order, then the wanted margins."""
+    ranges = [limit.range_of(leg) for limit in PLANNED]
+    return np.concatenate([*ranges, [getattr(margins, name) for name in _MARGINS]])
 
 
 def torque(moving: bool) -> Piece:
@@ -118,20 +90,7 @@ def torque(moving: bool) -> Piece:
     posture, rotation = _posture(middle, p, offset)
     sole, limits, wanted = p(3) + displacement(rotation, offset), p(5), p()
     force, moment = rotation @ wrench[:3], rotation @ wrench[3:]
-
-    def about(point: ca.SX, axis: ca.SX) -> ca.SX:
-        return ca.dot(axis, ca.cross(sole - point, force) + moment)
-
-    w = posture.pitch_axis
-    roll_axis = ca.vertcat(w[1], -w[0], 0) / ca.sqrt(w[0] ** 2 + w[1] ** 2 + 1e-12)
-    torques = ca.vertcat(
-        about(posture.knee, w),
-        about(posture.hip, w),
-        about(posture.hip, roll_axis),
-        about(posture.ankle, w),
-        about(posture.ankle, rotation[:, 0]),
-    )
-    ratio = torques / limits
+    ratio = ca.vertcat(*joint_torques(posture, sole, rotation, force, moment, TINY)) / limits
     reduced = ca.vertcat(middle, wrench, offset)
     slope = ca.jacobian(ratio, reduced)
     by_offset = slope[:, 9:]

@@ -14,17 +14,18 @@ import numpy as np
 
 from toolkit.centroidal.blocks import Assembly, Block, Piece
 from toolkit.centroidal.body import (
-    TORQUE_ROLES,
     BodyMargins,
     knot_contacts,
     lowest_foot,
     swing_ankles,
 )
 from toolkit.centroidal.layout import Layout, indices
+from toolkit.centroidal.leg_pieces import leg_limits
 from toolkit.centroidal.pieces import CONTACT, STATE, WRENCH, G, pieces
 from toolkit.centroidal.problem import CentroidalProblem, Margins
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z, steepness
+from toolkit.physics.leg import TORQUE_ROLES
 from toolkit.robot.model import RobotModel
 
 OPEN = 1e3  # bound of rows that are left free
@@ -208,13 +209,11 @@ class Program:
             here = limbs == limb
             at = knots[here]
             variables = np.concatenate([self._state(at, com), layout.slack[at, 1:], self._moved(at, limb)], 1)
-            ranges = [leg.ranges[role] for role in ("ankle_pitch", "ankle_roll", "hip_pitch", "hip_roll")]
-            fixed = np.concatenate([[leg.min_length, leg.max_length], *ranges, [body.length, body.ankle, body.hip]])
             rotation = rotations[here]
             ankle = positions[here] + rotation @ leg.ankle_in_sole
             links = np.tile([leg.thigh, leg.shin], (len(at), 1))
             posture = (hip[at], ankle, rotation, links)
-            self._add(self._pieces.leg, at, variables, *posture, np.tile(fixed, (len(at), 1)))
+            self._add(self._pieces.leg, at, variables, *posture, np.tile(leg_limits(leg, body), (len(at), 1)))
 
             step = np.flatnonzero(p.active[:, limb])
             wrench = indices(layout.wrench[step, limb], WRENCH)

@@ -7,7 +7,7 @@ import numpy as np
 from toolkit.compiled import compiled
 
 
-@compiled(kept=True)
+@compiled
 def _meets_rectangle(ax, ay, bx, by, hx, hy):
     """Whether the segment a-b meets the rectangle |x| <= hx, |y| <= hy."""
     if min(ax, bx) > hx or max(ax, bx) < -hx or min(ay, by) > hy or max(ay, by) < -hy:
@@ -17,14 +17,14 @@ def _meets_rectangle(ax, ay, bx, by, hx, hy):
     return abs(dx * ay - dy * ax) <= abs(dx) * hy + abs(dy) * hx
 
 
-@compiled(kept=True)
+@compiled
 def plane_height(table, q, x, y):
     """Height of the plane of surface q at (x, y)."""
     origin, normal = table.origin[q], table.rotation[q, :, 2]
     return origin[2] - (normal[0] * (x - origin[0]) + normal[1] * (y - origin[1])) / normal[2]
 
 
-@compiled(kept=True)
+@compiled
 def sole_axis(table, q, c, s):
     """The x axis of a sole on surface q: the heading (c, s) dropped on the plane along the vertical."""
     normal = table.rotation[q, :, 2]
@@ -33,14 +33,14 @@ def sole_axis(table, q, c, s):
     return ax / length, ay / length, az / length
 
 
-@compiled(kept=True)
+@compiled
 def cell_of(table, x, y):
     """Index of the cell of the table's grid at (x, y), -1 outside."""
     i, j = int(np.floor((x - table.corner[0]) / table.cell)), int(np.floor((y - table.corner[1]) / table.cell))
     return i * table.shape[1] + j if 0 <= i < table.shape[0] and 0 <= j < table.shape[1] else -1
 
 
-@compiled(kept=True)
+@compiled
 def sole_fits(table, cell, entry, x, y, c, s, half):
     """Whether a sole with centre above (x, y) and heading (c, s) has room on the surface of an entry of that cell."""
     q = table.entry_surface[entry]
@@ -72,7 +72,7 @@ def sole_fits(table, cell, entry, x, y, c, s, half):
     return inside
 
 
-@compiled(kept=True)
+@compiled
 def _set_frame(frame, ax, ay, az, nx, ny, nz):
     """Write the axes of a contact frame from its x and z."""
     frame[0, 0], frame[1, 0], frame[2, 0] = ax, ay, az

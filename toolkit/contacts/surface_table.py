@@ -85,8 +85,7 @@ def surface_table(surfaces: Sequence[Surface], reach: float, cell: float = 0.1) 
     ends = origin[owner][:, None] + np.einsum("nij,nkj->nki", rotation[owner][:, :, :2], edges.reshape(-1, 2, 2))
     edges_xy = np.ascontiguousarray(ends[..., :2]).reshape(-1, 4)
     near_distance = reach + cell * np.sqrt(0.5)
-    index = _index(edges_xy, start, used, ranges, corner, cell, shape, near_distance)
-    return SurfaceTable(
+    table = SurfaceTable(
         origin=origin,
         rotation=rotation,
         friction=np.array([surface.friction for surface in surfaces]),
@@ -99,11 +98,38 @@ def surface_table(surfaces: Sequence[Surface], reach: float, cell: float = 0.1) 
         corner=corner,
         cell=cell,
         shape=shape,
-        **dict(zip(("entry_start", "entry_surface", "entry_inside", "near_start", "near"), index, strict=True)),
+        **_entries(ranges, shape),
     )
+    _fill(table, edges_xy, used, ranges, near_distance, table.entry_start[:-1].copy())
+    near_start = np.cumsum(table.near_start)
+    table = table._replace(near_start=near_start, near=np.zeros(int(near_start[-1]), np.int64))
+    if len(table.near):
+        _fill(table, edges_xy, used, ranges, near_distance, table.entry_start[:-1].copy())
+    return table
 
 
-@compiled(kept=True)
+def _entries(ranges: np.ndarray, shape: np.ndarray) -> dict[str, np.ndarray]:
+    """The last five fields of `SurfaceTable`, zeros but for how many entries each cell has.
+
+    Args:
+        ranges: (k, 4) int; cells that each surface covers: i from, to, j from, to.
+        shape: (2,) int.
+    """
+    count = np.zeros((shape[0] + 1, shape[1] + 1), np.int64)  # by differences: every range adds a rectangle
+    for low, high, sign in ((0, 2, 1), (1, 3, 1), (0, 3, -1), (1, 2, -1)):
+        np.add.at(count, (ranges[:, low], ranges[:, high]), sign)
+    per_cell = count.cumsum(0).cumsum(1)[: shape[0], : shape[1]].ravel()
+    total = int(per_cell.sum())
+    return {
+        "entry_start": np.concatenate([[0], np.cumsum(per_cell)]),
+        "entry_surface": np.zeros(total, np.int64),
+        "entry_inside": np.zeros(total, bool),
+        "near_start": np.zeros(total + 1, np.int64),
+        "near": np.zeros(0, np.int64),
+    }
+
+
+@compiled
 def _distance_to_segment(x, y, ax, ay, bx, by):
     """Distance from a point to a segment."""
     dx, dy = bx - ax, by - ay
@@ -153,14 +179,21 @@ def _index(
 
 
 @compiled(kept=True)
-def _fill(
-    xy, edge_start, surfaces, ranges, corner, cell, columns, near_distance, fill, entry_surface, entry_inside,
-    near_start, near,
-):  # fmt: skip
-    """Fill the entries; counts the near edges of entry k in near_start[k + 1] while `near` has no room."""
+def _fill(table, xy, surfaces, ranges, near_distance, fill):
+    """Fill the entries; counts the near edges of entry k in near_start[k + 1] while `near` has no room.
+
+    Args:
+        table: `SurfaceTable`; its entries are filled.
+        xy: (E, 4) m; both ends of the edges in the world's XY.
+        surfaces: (k,) int; those that serve feet.
+        ranges: (k, 4) int; cells that each surface covers: i from, to, j from, to.
+        near_distance: m; edges this near to a cell's centre count.
+        fill: (cells,) int; the next entry of each cell, counted up.
+    """
+    near_start, near, corner, cell, columns = table.near_start, table.near, table.corner, table.cell, table.shape[1]
     write = len(near) > 0
     for k in range(len(surfaces)):
-        first, last = edge_start[surfaces[k]], edge_start[surfaces[k] + 1]
+        first, last = table.edge_start[surfaces[k]], table.edge_start[surfaces[k] + 1]
         for i in range(ranges[k, 0], ranges[k, 1]):
             for j in range(ranges[k, 2], ranges[k, 3]):
                 x, y = corner[0] + (i + 0.5) * cell, corner[1] + (j + 0.5) * cell
@@ -180,7 +213,7 @@ def _fill(
                         if write:
                             near[near_start[entry] + written] = e
                         written += 1
-                entry_surface[entry] = surfaces[k]
-                entry_inside[entry] = inside
+                table.entry_surface[entry] = surfaces[k]
+                table.entry_inside[entry] = inside
                 if not write:
                     near_start[entry + 1] = written

@@ -7,6 +7,8 @@ from typing import overload
 
 import numpy as np
 
+from toolkit.geometry.heading import mean_heading
+
 
 def rotation_from_quaternion(quaternion_wxyz: np.ndarray) -> np.ndarray:
     """Rotation matrices of unit quaternions.
@@ -184,5 +186,4 @@ class Pose:
 
 def mean_pose(one: Pose, other: Pose) -> Pose:
     """Upright pose in the middle of two, with the circular mean of their headings."""
-    heading = np.array([np.cos(one.yaw) + np.cos(other.yaw), np.sin(one.yaw) + np.sin(other.yaw)])
-    return Pose.from_yaw((one.position + other.position) / 2, float(np.arctan2(heading[1], heading[0])))
+    return Pose.from_yaw((one.position + other.position) / 2, float(mean_heading(one.yaw, other.yaw)))

@@ -20,6 +20,7 @@ from toolkit.contacts.category import Category, category_of
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.contacts.transition_rows import TransitionRows
+from toolkit.geometry.heading import joint_heading
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
 
@@ -99,11 +100,7 @@ class Canonical:
 def parent_frame(stance: Stance) -> Pose:
     """`stance.mean_feet` in plain floats, which is several times faster: it is needed for every query."""
     left, right = (contact.pose for contact in stance.contacts[:2])
-    x = y = 0.0
-    for pose in (left, right):
-        dx, dy = float(pose.rotation[0, 0]), float(pose.rotation[1, 0])
-        length = math.hypot(dx, dy) or 1.0
-        x, y = x + dx / length, y + dy / length
+    x, y = joint_heading(left.rotation, right.rotation)
     length = math.hypot(x, y)
     c, s = (x / length, y / length) if length > 0.0 else (1.0, 0.0)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

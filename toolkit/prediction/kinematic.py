@@ -9,8 +9,9 @@ import numpy as np
 
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
+from toolkit.geometry.heading import mean_heading, wrapped
 from toolkit.geometry.limb import FEET
-from toolkit.geometry.pose import rotation_about_z
+from toolkit.geometry.pose import rotation_about_z, yaw_of
 from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.robot.model import RobotModel
 
@@ -71,8 +72,8 @@ class KinematicEvaluator:
         position = np.stack([left[0], right[0]], axis=1)
         rotation = np.stack([left[1], right[1]], axis=1)
         friction = np.stack([left[2], right[2]], axis=1)
-        heading = np.arctan2(rotation[:, :, 1, 0], rotation[:, :, 0, 0])
-        yaw = np.arctan2(np.sin(heading).sum(1), np.cos(heading).sum(1))
+        heading = yaw_of(rotation).T
+        yaw = mean_heading(*heading)
 
         normal_z = np.clip(rotation[:, :, 2, 2], 1e-6, 1.0)
         tilt = np.arccos(normal_z)
@@ -82,7 +83,7 @@ class KinematicEvaluator:
         before = stance.mean_feet.position
         apart = position[:, 0] - position[:, 1]
         lateral = -np.sin(yaw) * apart[:, 0] + np.cos(yaw) * apart[:, 1]
-        turn = np.angle(np.exp(1j * (heading[:, 0] - heading[:, 1])))
+        turn = wrapped(heading[0] - heading[1])
         objective = (
             config.stride * (np.hypot(*(mean - before)[:, :2].T) / config.stride_length) ** 2
             + config.rise * (apart[:, 2] / config.rise_height) ** 2

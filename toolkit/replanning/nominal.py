@@ -6,16 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolkit.centroidal.body import TORQUE_ROLES, knot_contacts, leg_torques, swing_ankles
+from toolkit.centroidal.body import knot_contacts, swing_ankles
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion, CentroidalProblem
-from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
 from toolkit.control.reference import Reference, Swing, planned_wrench
 from toolkit.geometry.limb import FEET, PALMS
 from toolkit.geometry.pose import rotation_about_z
+from toolkit.physics.leg import PLANNED, TORQUE_ROLES, leg_clearances, leg_posture, leg_torques
 from toolkit.replanning.config import ReplanConfig
 from toolkit.robot.model import RobotModel
 
-LIMITS = ("leg length", "hip roll", "hip pitch", "ankle pitch", "ankle roll")
 DIFFERENCE = 1e-5  # m; of the CoM, for gradients of clearances
 
 
@@ -193,7 +192,6 @@ def _body_rows(motion: CentroidalMotion, robot: RobotModel, config: ReplanConfig
         gradient = np.stack(slopes, -1).reshape(-1, 3)
         tables.append((np.repeat(at, count), np.full(len(at) * count, limb), value.ravel(), gradient))
 
-    reach = ReachMargins(length=body.length, ankle=body.ankle, hip=body.hip)
     in_air, delays, feet, ankles, _ = swing_ankles(problem)
     swing_knots, swing_limbs, tips = (each[delays == 0.0] for each in (in_air, feet, ankles))
     for limb in FEET:
@@ -201,8 +199,8 @@ def _body_rows(motion: CentroidalMotion, robot: RobotModel, config: ReplanConfig
         at, position, rotation = knots[here], positions[here], rotations[here]
 
         def stance(com, leg=leg, at=at, position=position, rotation=rotation):
-            found = leg_clearances(leg, leg_posture(leg, com, problem.yaw[at], position, rotation), reach)
-            return np.stack([found[name] for name in LIMITS], -1)
+            found = leg_clearances(leg, leg_posture(leg, com, problem.yaw[at], position, rotation), body)
+            return np.stack([found[limit.name] for limit in PLANNED], -1)
 
         enter(at, limb, stance)
         here = swing_limbs == limb

@@ -12,7 +12,7 @@ from typing import Any
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.search.anytime.graph import Edge
 from toolkit.search.costs.cost import CostConfig
-from toolkit.search.moves import screen
+from toolkit.search.moves.reasons import Reason
 from toolkit.search.problem import ContactProblem
 from toolkit.search.states.state import is_pending
 
@@ -47,7 +47,7 @@ class Arrival:
         batch = self._evaluator.evaluate(*problem.origin(states[-1]), [last])
         objective = float(batch.objective[0]) if batch.feasible[0] else self._together(states, payloads, edge)
         if objective is None:
-            problem.rejected[screen.DYNAMICS] += 1
+            problem.rejected[Reason.DYNAMICS] += 1
             return None
         cost = edge.cost + self._cost.dynamics * (objective - edge.payload[0])
         return edge._replace(cost=cost, payload=(objective, edge.payload[1]))

@@ -6,7 +6,7 @@ import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.search.anytime.graph import Path
-from toolkit.search.moves import screen
+from toolkit.search.moves.reasons import Reason
 from toolkit.search.problem import ContactProblem
 from toolkit.search.result import Solution
 from toolkit.search.states.state import COM, VELOCITY, is_pending, unpack
@@ -39,13 +39,13 @@ def reason_of(stopped_by: str, seconds: float, expansions: int, rejected: np.nda
         "expansions": f"the limit of {expansions} expansions was reached; a higher one may help",
         "memory": f"the limit on memory was reached after {expansions} expansions",
     }[stopped_by]
-    rejected = np.where(np.isin(np.arange(len(screen.REASONS)), screen.PALM_REASONS), 0, rejected)
+    rejected = np.where([reason.of_palm for reason in Reason], 0, rejected)
     total = int(rejected.sum())
     if total == 0:
         return f"no contact sequence found: {how}"
     order = np.argsort(-rejected, kind="stable")[:4]
     shares = ", ".join(
-        f"{dynamics if code == screen.DYNAMICS else screen.REASONS[code]} {100 * rejected[code] / total:.0f} %"
+        f"{dynamics if code == Reason.DYNAMICS else Reason(code).words} {100 * rejected[code] / total:.0f} %"
         for code in order
         if rejected[code] > 0
     )

@@ -23,9 +23,9 @@ from toolkit.search.anytime.restart import search_in_turn
 from toolkit.search.arrival import Arrival
 from toolkit.search.costs.heuristic import Distance, EuclideanDistance
 from toolkit.search.costs.terrain_distance import TerrainDistance, resting_surfaces
-from toolkit.search.moves import screen
 from toolkit.search.moves.exclusion import Exclusion
 from toolkit.search.moves.moves import MoveGenerator
+from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.start_palms import with_palms
 from toolkit.search.outcome import reason_of, solution_of
 from toolkit.search.planner_config import PlannerConfig
@@ -114,7 +114,7 @@ class ContactPlanner:
             )
             if code == 0:
                 return with_palms(self.robot, self.world, stance, moves, table)
-            reasons[screen.REASONS[code]] = reasons.get(screen.REASONS[code], 0) + 1
+            reasons[Reason(code).words] = reasons.get(Reason(code).words, 0) + 1
         most = max(reasons, key=lambda reason: reasons[reason])
         raise PlanningError(
             f"{self.world.path}: the robot cannot stand at the start ({most}); move the site 'start' to more even or "
@@ -218,7 +218,7 @@ class ContactPlanner:
         return evaluator, before
 
     def _reason(self, result: AnaStarResult[bytes], problem: ContactProblem) -> str:
-        dynamics = getattr(self._evaluator, "rejection", screen.REASONS[screen.DYNAMICS])
+        dynamics = getattr(self._evaluator, "rejection", Reason.DYNAMICS.words)
         limit = self.config.search.max_expansions  # as it was asked for, whatever the search made of it
         expansions = limit if result.stopped_by == "expansions" and limit is not None else result.expansions
         return reason_of(result.stopped_by, result.seconds, expansions, problem.rejected, dynamics)

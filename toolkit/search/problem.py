@@ -22,12 +22,12 @@ from toolkit.search.anytime.graph import Edge
 from toolkit.search.costs.cost import CostConfig
 from toolkit.search.costs.haste import Haste, HasteConfig
 from toolkit.search.costs.heuristic import Distance
-from toolkit.search.moves import screen
 from toolkit.search.moves.candidates import CandidateGenerator, Candidates, mean_feet
 from toolkit.search.moves.drift import Drift
 from toolkit.search.moves.exclusion import Exclusion
 from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reach_check import ReachCheck, ReachConfig
+from toolkit.search.moves.reasons import Reason
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.state import (
     COM,
@@ -76,7 +76,7 @@ class ContactProblem:
         forced: m/s^2; most that the robot accelerates on the way whatever it does; for `haste`.
 
     Attributes:
-        rejected: (len(REASONS),) int; candidates that fell, by reason.
+        rejected: (len(Reason),) int; candidates that fell, by reason.
         deadline: s on the clock of `time.perf_counter`; no query that would end later is begun.
     """
 
@@ -106,7 +106,7 @@ class ContactProblem:
         self._lazy, self._second = lazy, second
         self._judge_of_pending = evaluator if lazy or second is None else second
         self._timings, self._config, self._longest = timings, config, longest
-        self.rejected = np.zeros(len(screen.REASONS), np.int64)
+        self.rejected = np.zeros(len(Reason), np.int64)
         limbs = [limb for limb in PALMS if palms and limb in robot.arms and moves.has_palm_surfaces]
         self._candidates = CandidateGenerator(
             moves, table, limbs, timings, config.swing_speed, exclusions, self.rejected
@@ -225,7 +225,7 @@ class ContactProblem:
             return []
         h = self._to_go(candidates.centre, candidates.yaw)
         promising = candidates.way + self._config.step + h < slack
-        self.rejected[screen.COSTLY] += len(promising) - int(promising.sum())
+        self.rejected[Reason.COSTLY] += len(promising) - int(promising.sum())
         candidates = self._candidates.timed(contacts, candidates.select(promising))
         if not len(candidates):
             return []
@@ -254,16 +254,16 @@ class ContactProblem:
             return None
         batch = evaluator.evaluate(self._stance(_before(row)), com, velocity, transitions)
         self._pace[id(evaluator)] = (time.perf_counter() - began) / len(transitions)
-        codes = np.where(batch.feasible, 0, screen.DYNAMICS)
+        codes = np.where(batch.feasible, 0, Reason.DYNAMICS)
         rows = np.flatnonzero(batch.feasible)
         if len(rows):
             chosen = candidates.select(rows)
             codes[rows] = self._reach.codes(contacts, com, velocity, chosen, batch.com[rows], batch.com_velocity[rows])
-        self.rejected += np.bincount(codes, minlength=len(screen.REASONS))
+        self.rejected += np.bincount(codes, minlength=len(Reason))
         self.rejected[0] = 0
         later: list[Edge[bytes]] = []
         if self._second is not None and not pending and (self._haste is None or (codes != 0).all()):
-            doubtful = candidates.select(codes == screen.DYNAMICS)
+            doubtful = candidates.select(codes == Reason.DYNAMICS)
             later = self._postpone(row, doubtful, self._config.doubt) if len(doubtful) else []
         kept = np.flatnonzero(codes == 0)
         if not len(kept):

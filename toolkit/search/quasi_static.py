@@ -122,7 +122,7 @@ class QuasiStaticEvaluator:
         for contact in stance.contacts:
             pose = contact.pose
             if contact.limb.is_foot:
-                if violated(self._legs, int(contact.limb), x, y, z, yaw, pose.position, pose.rotation) >= 0:
+                if violated(self._legs, int(contact.limb), x, y, z, yaw, pose.position, pose.rotation):
                     return False
             else:
                 arm = self._robot.arms[contact.limb]

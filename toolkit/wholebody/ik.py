@@ -57,9 +57,8 @@ class WholeBodyIK:
         lower = np.minimum(robot.lower + config.range_margin, np.maximum(robot.lower, robot.home[7:]))
         upper = np.maximum(robot.upper - config.range_margin, np.minimum(robot.upper, robot.home[7:]))
         for foot in FEET:
-            knee = knee_range(robot, foot, config.min_knee)
-            if knee is not None:
-                lower[knee[0]], upper[knee[0]] = max(lower[knee[0]], knee[1]), min(upper[knee[0]], knee[2])
+            knee, least, most = knee_range(robot, foot, config.min_knee)
+            lower[knee], upper[knee] = max(lower[knee], least), min(upper[knee], most)
         self.lower, self.upper = lower, upper
         for index, name in enumerate(robot.joint_names):
             self.wrapper.set_joint_limits(name, float(lower[index]), float(upper[index]))

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.contacts.reach import leg_posture
+from toolkit.geometry.heading import mean_heading
 from toolkit.geometry.pose import yaw_of
+from toolkit.physics.leg import leg_posture
 from toolkit.robot.model import LegGeometry
 from toolkit.wholebody.swing import SwingPath
 
@@ -34,8 +35,7 @@ class SwingingLeg:
         The pitch acts as a bump over the swing: where the bump is small the ankle is left alone.
         """
         rotations = path.rotations(self.u)
-        yaw = yaw_of(rotations)
-        middle = self.other_yaw + 0.5 * np.remainder(yaw - self.other_yaw + np.pi, 2.0 * np.pi) - 0.5 * np.pi
+        middle = mean_heading(self.other_yaw, yaw_of(rotations))
         ankle = leg_posture(self.leg, self.com, middle, path.positions(self.u), rotations).ankle_pitch
         step = path.pitching.value(self.u)
         bump = 4.0 * step * (1.0 - step)

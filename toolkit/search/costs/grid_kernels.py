@@ -11,7 +11,7 @@ from toolkit.search.moves.occupancy import body_free
 LEVELS = 4  # heights kept per cell
 
 
-@compiled(kept=True)
+@compiled
 def _add_level(levels, z, merge):
     """Note a height in a list that falls, -inf where free; of close heights the highest stays."""
     for k in range(len(levels)):
@@ -71,7 +71,7 @@ def spread(levels, disc, merge, result):
 
 
 @compiled(kept=True)
-def number_nodes(levels, corner, cell, body_corner, body_cell, below, box, nodes):
+def number_nodes(levels, corner, cell, occupancy, box, nodes):
     """Number in (nx, ny, 4, yaws) nodes the cells in which the body fits; returns how many there are."""
     count = 0
     yaws = nodes.shape[3]
@@ -83,7 +83,7 @@ def number_nodes(levels, corner, cell, body_corner, body_cell, below, box, nodes
                     break
                 x, y = corner[0] + a * cell, corner[1] + b * cell
                 for k in range(yaws):
-                    if body_free(body_corner, body_cell, below, box, x, y, z, k * np.pi / yaws):
+                    if body_free(occupancy, box, x, y, z, k * np.pi / yaws):
                         nodes[a, b, m, k] = count
                         count += 1
     return count
@@ -126,7 +126,7 @@ def link_nodes(nodes, levels, cell, climb, turn, start, end, weight):
     return used
 
 
-@compiled(kept=True)
+@compiled
 def _cell_value(height, distance, i, j, z, layer, span):
     """Least distance of a cell over the yaw layers around one, at the level nearest to a height."""
     if i < 0 or j < 0 or i >= height.shape[0] or j >= height.shape[1]:

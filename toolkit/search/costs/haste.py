@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.centroidal.problem import GRAVITY
+from toolkit.geometry.heading import wrapped
 from toolkit.search.states.contact_table import ContactTable
 
 
@@ -68,5 +69,5 @@ class Haste:
         foremost = np.maximum(*((position[contacts[:, foot]] * ahead).sum(1) for foot in (0, 1)))
         capture = ((com[:, :2] + self._time * velocity) * ahead).sum(1) - foremost
         turn = self._table.yaw[contacts[:, 0]] - self._table.yaw[contacts[:, 1]]
-        turn = np.abs(np.arctan2(np.sin(turn), np.cos(turn)))
+        turn = np.abs(wrapped(turn))
         return self._capture * np.maximum(capture, 0.0) + self._energy * square + self._turn * turn

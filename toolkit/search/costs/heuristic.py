@@ -98,16 +98,7 @@ class GridDistance:
         levels = self._levels(projector, shape, stride)
         self._height = levels
         nodes = np.full((*levels.shape, config.yaws), -1, np.int32)
-        count = number_nodes(
-            levels,
-            self._corner,
-            cell,
-            occupancy.corner,
-            occupancy.cell,
-            occupancy.below,
-            np.array([box.half_depth, box.half_width, box.bottom, box.top]),
-            nodes,
-        )
+        count = number_nodes(levels, self._corner, cell, occupancy, box, nodes)
         self._distance = np.full(nodes.shape, np.inf, np.float64)
         middle = self._corner + cell * np.stack(np.meshgrid(*(np.arange(k) for k in shape), indexing="ij"), axis=-1)
         inside = np.hypot(*(middle - goal.position[:2]).transpose(2, 0, 1)) <= max(goal.radius, 0.75 * cell)

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.geometry.heading import mean_heading
 from toolkit.geometry.limb import FEET, PALMS, Limb
-from toolkit.search.moves import screen
 from toolkit.search.moves.exclusion import Exclusion, excluded
 from toolkit.search.moves.moves import MoveGenerator
+from toolkit.search.moves.reasons import Reason
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
 
@@ -53,9 +54,7 @@ class Candidates:
 def mean_feet(table: ContactTable, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean of the feet (n, 3) m and its heading (n,) rad of contact numbers (n, 4)."""
     left, right = contacts[:, 0], contacts[:, 1]
-    a, b = table.yaw[left], table.yaw[right]
-    yaw = np.arctan2(np.sin(a) + np.sin(b), np.cos(a) + np.cos(b))
-    return (table.position[left] + table.position[right]) / 2, yaw
+    return (table.position[left] + table.position[right]) / 2, mean_heading(table.yaw[left], table.yaw[right])
 
 
 class CandidateGenerator:
@@ -68,7 +67,7 @@ class CandidateGenerator:
         timings: to choose from.
         swing_speed: m/s; a foot may not have to fly faster on average.
         exclusions: transitions that later stages rejected.
-        rejected: (len(REASONS),) int; candidates that fell, by reason; counted up.
+        rejected: (len(Reason),) int; candidates that fell, by reason; counted up.
     """
 
     def __init__(
@@ -101,7 +100,7 @@ class CandidateGenerator:
             self._rejected += moves.rejected
             if len(moves.numbers):
                 codes = self._moves.swings(foot, moves.numbers, old, standing, self._ways.max())
-                self._rejected += np.bincount(codes, minlength=len(screen.REASONS))
+                self._rejected += np.bincount(codes, minlength=len(Reason))
                 limbs.append(np.full(int((codes == 0).sum()), foot))
                 numbers.append(moves.numbers[codes == 0])
         for palm in self._palms:
@@ -125,7 +124,7 @@ class CandidateGenerator:
         if self._exclusions:
             position = np.vstack([self._table.position, np.full(3, np.nan)])  # number -1: no contact
             allowed = ~excluded(self._exclusions, position[contacts], limb, position[number])
-            self._rejected[screen.EXCLUDED] += n - int(allowed.sum())
+            self._rejected[Reason.EXCLUDED] += n - int(allowed.sum())
             limb, number, after, n = limb[allowed], number[allowed], after[allowed], int(allowed.sum())
             if n == 0:
                 return None

@@ -1,7 +1,4 @@
-"""Compiled leg checks: the closed form of `toolkit.contacts.reach`, one leg at a time, for thousands of candidates.
-
-The tests hold it against `leg_clearances`.
-"""
+"""Compiled leg checks: which stances the legs can take under a CoM, one at a time, for thousands of candidates."""
 
 from __future__ import annotations
 
@@ -10,12 +7,23 @@ from typing import NamedTuple
 import numpy as np
 
 from toolkit.compiled import compiled
-from toolkit.contacts.reach import ReachMargins
 from toolkit.geometry.limb import FEET
+from toolkit.physics.leg import (
+    LIMITS,
+    LegPosture,
+    ReachMargins,
+    ankle_at,
+    distance,
+    hip_at,
+    posture_between,
+    quantities,
+)
 from toolkit.robot.model import RobotModel
+from toolkit.search.moves.reasons import OF_LIMIT, Reason
+from toolkit.search.moves.shanks import legs_apart
 
-LIMITS = ("leg length", "ankle roll", "ankle pitch", "hip yaw", "hip roll", "hip pitch")
-_ROLES = ("ankle_roll", "ankle_pitch", "hip_yaw", "hip_roll", "hip_pitch")
+_FIELD = tuple(LegPosture._fields.index(limit.quantity) for limit in LIMITS)  # of each limit
+_LENGTH = [limit.quantity for limit in LIMITS].index("length")
 
 
 class Legs(NamedTuple):
@@ -25,92 +33,90 @@ class Legs(NamedTuple):
         hip: (2, 3) m; in the CoM's frame with the heading of the base.
         ankle: (2, 3) m; in the sole's frame.
         links: (2, 2) m; thigh and shin.
-        length: (2, 2) m; shortest and longest.
-        ranges: (2, 5, 2) rad; in the order of `LIMITS` after the length.
+        ranges: (2, k, 2) m or rad; in the order of `LIMITS`.
     """
 
     hip: np.ndarray
     ankle: np.ndarray
     links: np.ndarray
-    length: np.ndarray
     ranges: np.ndarray
 
 
 def legs_of(robot: RobotModel, margins: ReachMargins) -> Legs:
     """Arrays of a robot's legs, `margins` inside their limits."""
     legs = [robot.legs[limb] for limb in FEET]
-    inward = np.array([1.0, -1.0])
+    inward = np.array([[getattr(margins, limit.margin)] for limit in LIMITS]) * [1.0, -1.0]
     return Legs(
         hip=np.array([leg.hip_in_com for leg in legs]),
         ankle=np.array([leg.ankle_in_sole for leg in legs]),
         links=np.array([[leg.thigh, leg.shin] for leg in legs]),
-        length=np.array([[leg.min_length, leg.max_length] for leg in legs]) + margins.length * inward,
-        ranges=np.array(
-            [
-                [
-                    np.array(leg.ranges[role]) + (margins.ankle if role.startswith("ankle") else margins.hip) * inward
-                    for role in _ROLES
-                ]
-                for leg in legs
-            ]
-        ),
+        ranges=np.array([[limit.range_of(leg) for limit in LIMITS] + inward for leg in legs]),
     )
 
 
-@compiled(kept=True)
-def _outside(ranges, k, angle):
-    return angle < ranges[k, 0] or angle > ranges[k, 1]
-
-
-@compiled(kept=True)
-def violated(legs, side, cx, cy, cz, yaw, position, rotation):
-    """Index in `LIMITS` of the first limit that a leg breaks, -1 where it reaches.
+@compiled
+def reach(legs, side, com, yaw, position, rotation):
+    """The first limit that a leg breaks, as a `Reason`, and its hip, knee and ankle in m, zeros where it is too long.
 
     Args:
         legs: both legs.
         side: 0 left, 1 right.
-        cx: m; CoM, world.
-        cy: m.
-        cz: m.
+        com: three numbers in m; CoM, world.
         yaw: rad; heading of the base.
         position: (3,) m; centre of the sole.
         rotation: (3, 3); world_from_sole.
     """
-    c, s = np.cos(yaw), np.sin(yaw)
-    hip, tip, r = legs.hip[side], legs.ankle[side], rotation
-    hx, hy, hz = cx + c * hip[0] - s * hip[1], cy + s * hip[0] + c * hip[1], cz + hip[2]
-    ax = position[0] + r[0, 0] * tip[0] + r[0, 1] * tip[1] + r[0, 2] * tip[2]
-    ay = position[1] + r[1, 0] * tip[0] + r[1, 1] * tip[1] + r[1, 2] * tip[2]
-    az = position[2] + r[2, 0] * tip[0] + r[2, 1] * tip[1] + r[2, 2] * tip[2]
-    dx, dy, dz = hx - ax, hy - ay, hz - az
-    length = np.sqrt(dx * dx + dy * dy + dz * dz)
-    if length < legs.length[side, 0] or length > legs.length[side, 1]:
-        return 0
-    ranges = legs.ranges[side]
-    u = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz
-    v = r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
-    w = r[0, 2] * dx + r[1, 2] * dy + r[2, 2] * dz
-    roll = np.arctan2(v, w)
-    if _outside(ranges, 0, roll):
-        return 1
-    thigh, shin = legs.links[side, 0], legs.links[side, 1]
-    span = min(max(length, abs(thigh - shin) + 1e-9), thigh + shin - 1e-9)
-    cosine = (span * span + shin * shin - thigh * thigh) / (2.0 * shin * span)
-    lean = np.arctan2(u, np.sqrt(v * v + w * w)) + np.arccos(min(max(cosine, -1.0), 1.0))
-    if _outside(ranges, 1, -lean):
-        return 2
-    cr, sr, cl, sl = np.cos(roll), np.sin(roll), np.cos(lean), np.sin(lean)
-    # Axis of the pitch joints, and the shin's direction, in the world.
-    yx, yy, yz = r[0, 1] * cr - r[0, 2] * sr, r[1, 1] * cr - r[1, 2] * sr, r[2, 1] * cr - r[2, 2] * sr
-    tx = dx - shin * (r[0, 0] * sl + r[0, 1] * sr * cl + r[0, 2] * cr * cl)
-    ty = dy - shin * (r[1, 0] * sl + r[1, 1] * sr * cl + r[1, 2] * cr * cl)
-    tz = dz - shin * (r[2, 0] * sl + r[2, 1] * sr * cl + r[2, 2] * cr * cl)
-    norm = np.sqrt(tx * tx + ty * ty + tz * tz)
-    xz = (yx * ty - yy * tx) / norm  # z of axis x thigh
-    if _outside(ranges, 2, np.arctan2(-(c * yx + s * yy), -s * yx + c * yy)):
-        return 3
-    if _outside(ranges, 3, np.arcsin(min(max(yz, -1.0), 1.0))):
-        return 4
-    if _outside(ranges, 4, np.arctan2(-xz, tz / norm)):
-        return 5
-    return -1
+    heading, ranges = (np.cos(yaw), np.sin(yaw)), legs.ranges[side]
+    hip, ankle = hip_at(com, heading, legs.hip[side]), ankle_at(position, rotation, legs.ankle[side])
+    length, nowhere = distance(hip, ankle), (0.0, 0.0, 0.0)
+    if length < ranges[_LENGTH, 0] or length > ranges[_LENGTH, 1]:
+        return OF_LIMIT[_LENGTH], (nowhere, nowhere, nowhere)
+    posture = posture_between(hip, ankle, rotation, heading, legs.links[side, 0], legs.links[side, 1])
+    points = (posture.hip_point, posture.knee_point, posture.ankle_point)
+    values = quantities(posture)
+    for k in range(len(OF_LIMIT)):
+        value = values[_FIELD[k]]
+        if value < ranges[k, 0] or value > ranges[k, 1]:
+            return OF_LIMIT[k], points
+    return 0, points
+
+
+@compiled(kept=True)
+def violated(legs, side, x, y, z, yaw, position, rotation):
+    """The first limit that a leg breaks with its CoM at x, y, z m, as a `Reason`; see `reach`."""
+    return reach(legs, side, (x, y, z), yaw, position, rotation)[0]
+
+
+@compiled(kept=True)
+def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, right_rotation):
+    """Per stance why the legs cannot take it, with no drop of the CoM.
+
+    Args:
+        legs: both legs.
+        shanks: capsules inside them.
+        com: (n, 3) m.
+        drops: (k,) m; the CoM may be lower by any of these.
+        yaw: (n,) rad.
+        left: (n, 3) m; sole centres.
+        left_rotation: (n, 3, 3).
+        right: (n, 3) m.
+        right_rotation: (n, 3, 3).
+
+    Returns:
+        (n,) int; the `Reason` with the first drop, 0 where both legs reach with some drop.
+    """
+    result = np.zeros(len(com), np.int64)
+    for row in range(len(com)):
+        for k in range(len(drops)):
+            place = (com[row, 0], com[row, 1], com[row, 2] - drops[k])
+            reason, a = reach(legs, 0, place, yaw[row], left[row], left_rotation[row])
+            if reason == 0:
+                reason, b = reach(legs, 1, place, yaw[row], right[row], right_rotation[row])
+                if reason == 0 and not legs_apart(shanks, a, b):
+                    reason = Reason.KNEES
+            if reason == 0:
+                result[row] = 0
+                break
+            if k == 0:
+                result[row] = reason
+    return result

@@ -13,16 +13,17 @@ import numpy as np
 
 from toolkit.contacts.arm_map import ArmMap
 from toolkit.contacts.projection import Projected, Projector
-from toolkit.contacts.reach import ReachMargins
 from toolkit.contacts.transition_model import TransitionModel
+from toolkit.geometry.heading import mean_heading
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
+from toolkit.physics.leg import ReachMargins
 from toolkit.robot.model import RobotModel
-from toolkit.search.moves import screen
-from toolkit.search.moves.legs import legs_of
+from toolkit.search.moves.legs import legs_of, stances_violated
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
+from toolkit.search.moves.reasons import Reason
+from toolkit.search.moves.screen import Body, Sole, Soles, StepLimits, screen_palms, screen_steps, screen_swings
 from toolkit.search.moves.shanks import shanks_of
-from toolkit.search.moves.stances import stances_violated
 from toolkit.search.states.contact_table import ContactTable
 
 _KEPT = 20_000  # entries of each memory
@@ -60,7 +61,7 @@ class Moves:
 
     Attributes:
         numbers: (n,) int; in the contact table.
-        rejected: (len(REASONS),) int.
+        rejected: (len(Reason),) int.
     """
 
     numbers: np.ndarray
@@ -98,15 +99,19 @@ class MoveGenerator:
         arms: Mapping[Limb, ArmMap],
     ):
         self._robot, self._projector, self._table, self._model = robot, projector, table, model
-        self._occupancy, self._config, self.arms = occupancy, config, arms
+        self._config, self.arms = config, arms
         leg = robot.legs[Limb.LEFT_FOOT]
         self._climb = config.climb * (leg.thigh + leg.shin)
         self.legs, self.shanks = legs_of(robot, config.margins), shanks_of(robot)
         self.has_palm_surfaces = bool(projector.table.palm.any())
-        self._box = np.array([box.half_depth, box.half_width, box.bottom, box.top])
-        self._half = robot.half_sizes[Limb.LEFT_FOOT] + config.apart / 2
-        self._drops = np.linspace(0.0, config.drop, 7) * robot.com_height
-        self._shifts = np.array([0.0, -0.25, 0.25])
+        self._body = Body(self.legs, self.shanks, box, occupancy)
+        self._limits = StepLimits(
+            half=robot.half_sizes[Limb.LEFT_FOOT] + config.apart / 2,
+            climb=self._climb,
+            com_height=robot.com_height,
+            drops=np.linspace(0.0, config.drop, 7) * robot.com_height,
+            shifts=np.array([0.0, -0.25, 0.25]),
+        )
         self._steps: dict[tuple[int, int], Moves] = {}
         self._palms: dict[tuple[int, int, int], Moves] = {}
 
@@ -145,49 +150,22 @@ class MoveGenerator:
         standing: int,
     ) -> np.ndarray:
         """Codes (n,) of soles beside a standing foot; see `screen_steps`."""
-        table, occupancy = self._table, self._occupancy
+        arrays = (np.ascontiguousarray(array) for array in (position, rotation, yaw))
+        soles = Soles(np.asarray(surface, np.int64), *arrays)
         codes = np.empty(len(surface), np.int64)
-        screen.screen_steps(
-            np.asarray(surface, np.int64),
-            np.ascontiguousarray(position),
-            np.ascontiguousarray(rotation),
-            np.ascontiguousarray(yaw),
-            int(limb),
-            table.position[standing],
-            table.rotation[standing],
-            float(table.yaw[standing]),
-            self._half,
-            self._climb,
-            self._robot.com_height,
-            self._drops,
-            self._shifts,
-            self.legs,
-            self.shanks,
-            self._box,
-            occupancy.corner,
-            occupancy.cell,
-            occupancy.below,
-            codes,
-        )
+        screen_steps(soles, int(limb), self._sole(standing), self._limits, self._body, codes)
         return codes
+
+    def _sole(self, number: int) -> Sole:
+        table = self._table
+        return Sole(table.position[number], table.rotation[number], float(table.yaw[number]))
 
     def swings(self, limb: Limb, numbers: np.ndarray, old: int, standing: int, longest: float) -> np.ndarray:
         """Codes (n,) of the ways of a foot from `old` to each new place; see `screen_swings`."""
-        table, config = self._table, self._config
+        table, config, half = self._table, self._config, self._limits.half
         codes = np.empty(len(numbers), np.int64)
-        screen.screen_swings(
-            table.position[numbers],
-            table.yaw[numbers],
-            table.position[old],
-            float(table.yaw[old]),
-            table.position[standing],
-            float(table.yaw[standing]),
-            self._half,
-            longest,
-            config.still,
-            config.still_yaw,
-            codes,
-        )
+        places, feet = (table.position[numbers], table.yaw[numbers]), (self._sole(old), self._sole(standing))
+        screen_swings(*places, *feet, half, longest, config.still, config.still_yaw, codes)
         return codes
 
     def palms(self, limb: Limb, left: int, right: int) -> Moves:
@@ -206,7 +184,7 @@ class MoveGenerator:
         self.swings(Limb.LEFT_FOOT, one, standing, standing, 1.0)
         table = self._table
         place, turn = table.position[one], table.rotation[one]
-        stances_violated(self.legs, self.shanks, place, self._drops, table.yaw[one], place, turn, place, turn)
+        stances_violated(self.legs, self.shanks, place, self._limits.drops, table.yaw[one], place, turn, place, turn)
         if self.has_palm_surfaces and self._robot.arms:
             limb = next(iter(self._robot.arms))
             self._projector.project_palms(limb, place[0], np.array([[0.0, 1.0, 0.0]]), 0.0, 1e6)
@@ -231,7 +209,7 @@ class MoveGenerator:
         centre, yaw = self._stand(left, right)
         shoulder, turn = self.shoulder(limb, left, right), rotation_about_z(yaw)
         palms = self._projector.project_palms(limb, shoulder, rays, yaw, arm.max_reach)
-        codes = screen.screen_palms(
+        codes = screen_palms(
             palms.surface,
             palms.position,
             palms.rotation[:, :, 2],
@@ -246,19 +224,18 @@ class MoveGenerator:
         relative, normals = (palms.position - shoulder) @ turn, palms.rotation[:, :, 2] @ turn
         open_palms = np.flatnonzero(codes == 0)
         served = self.arms[limb].serves(relative[open_palms], normals[open_palms])
-        codes[open_palms[~served]] = screen.POSTURE
+        codes[open_palms[~served]] = Reason.POSTURE
         return palms, codes
 
     def _stand(self, left: int, right: int) -> tuple[np.ndarray, float]:
         """(3,) m; mean of two feet, and its heading in rad."""
         table = self._table
-        return (table.position[left] + table.position[right]) / 2, float(
-            screen.mean_yaw(table.yaw[left], table.yaw[right])
-        )
+        yaw = float(mean_heading(table.yaw[left], table.yaw[right]))
+        return (table.position[left] + table.position[right]) / 2, yaw
 
 
 def _count(codes: np.ndarray) -> np.ndarray:
-    """(len(REASONS),) int; how often each code occurs, passed ones left out."""
-    counts = np.bincount(codes, minlength=len(screen.REASONS))
+    """(len(Reason),) int; how often each code occurs, passed ones left out."""
+    counts = np.bincount(codes, minlength=len(Reason))
     counts[0] = 0
     return counts

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,8 +15,7 @@ from toolkit.search.moves.obstacles import world_triangles
 _MAX_CELLS = 20_000_000
 
 
-@dataclass(frozen=True)
-class BodyBox:
+class BodyBox(NamedTuple):
     """The body from the knees up as an upright box over the mean of the feet.
 
     Attributes:
@@ -76,8 +75,7 @@ def _arm_bodies(robot: RobotModel) -> set[int]:
     return arms
 
 
-@dataclass(frozen=True)
-class Occupancy:
+class Occupancy(NamedTuple):
     """Occupied cells of a box of the world.
 
     Attributes:
@@ -104,39 +102,18 @@ class Occupancy:
         np.cumsum(occupied, axis=2, out=below[:, :, 1:])
         return cls(np.asarray(lower, float), cell, below)
 
-    def free(self, box: BodyBox, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """Whether the body stands free.
 
-        Args:
-            box: the body.
-            position: (n, 3) m; between the soles.
-            yaw: (n,) rad.
-
-        Returns:
-            (n,) bool; what lies outside the grid counts as free.
-        """
-        result = np.empty(len(position), bool)
-        _free(
-            self.corner,
-            self.cell,
-            self.below,
-            np.array([box.half_depth, box.half_width, box.bottom, box.top]),
-            np.ascontiguousarray(position, dtype=float),
-            np.ascontiguousarray(yaw, dtype=float),
-            result,
-        )
-        return result
-
-
-@compiled(kept=True)
-def body_free(corner, cell, below, box, x, y, z, yaw):
-    """Whether the box (half depth, half width, bottom, top) at a pose meets no occupied cell."""
-    first = min(max(int(np.floor((z + box[2] - corner[2]) / cell)), 0), below.shape[2] - 1)
-    last = min(max(int(np.ceil((z + box[3] - corner[2]) / cell)), 0), below.shape[2] - 1)
+@compiled
+def body_free(occupancy, box, x, y, z, yaw):
+    """Whether a `BodyBox` over a place between the soles meets no occupied cell; outside the grid all is free."""
+    corner, cell, below = occupancy.corner, occupancy.cell, occupancy.below
+    depth, width = box.half_depth, box.half_width
+    first = min(max(int(np.floor((z + box.bottom - corner[2]) / cell)), 0), below.shape[2] - 1)
+    last = min(max(int(np.ceil((z + box.top - corner[2]) / cell)), 0), below.shape[2] - 1)
     if last <= first:
         return True
     c, s = np.cos(yaw), np.sin(yaw)
-    ex, ey = abs(c) * box[0] + abs(s) * box[1], abs(s) * box[0] + abs(c) * box[1]
+    ex, ey = abs(c) * depth + abs(s) * width, abs(s) * depth + abs(c) * width
     i0, i1 = int(np.floor((x - ex - corner[0]) / cell)), int(np.floor((x + ex - corner[0]) / cell))
     j0, j1 = int(np.floor((y - ey - corner[1]) / cell)), int(np.floor((y + ey - corner[1]) / cell))
     for i in range(max(i0, 0), min(i1, below.shape[0] - 1) + 1):
@@ -144,19 +121,12 @@ def body_free(corner, cell, below, box, x, y, z, yaw):
             if below[i, j, last] == below[i, j, first]:
                 continue
             dx, dy = corner[0] + (i + 0.5) * cell - x, corner[1] + (j + 0.5) * cell - y
-            if abs(c * dx + s * dy) <= box[0] and abs(-s * dx + c * dy) <= box[1]:
+            if abs(c * dx + s * dy) <= depth and abs(-s * dx + c * dy) <= width:
                 return False
     return True
 
 
-@compiled(kept=True)
-def _free(corner, cell, below, box, position, yaw, result):
-    for row in range(len(position)):
-        x, y, z = position[row, 0], position[row, 1], position[row, 2]
-        result[row] = body_free(corner, cell, below, box, x, y, z, yaw[row])
-
-
-@compiled(kept=True)
+@compiled
 def _clip(points, count, out, axis, bound, sign):
     """Polygon cut by sign * point[axis] <= sign * bound (Sutherland and Hodgman); returns the number of corners."""
     kept = 0
@@ -175,7 +145,7 @@ def _clip(points, count, out, axis, bound, sign):
     return kept
 
 
-@compiled(kept=True)
+@compiled
 def _cells(points, count, axis, most):
     """First and last cell, within 0 and `most`, that a polygon meets along an axis."""
     low, high = points[0, axis], points[0, axis]

@@ -10,11 +10,10 @@ import numpy as np
 from toolkit.contacts.arm_map import ArmMap
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
-from toolkit.search.moves import screen
 from toolkit.search.moves.candidates import Candidates, mean_feet
-from toolkit.search.moves.legs import Legs
+from toolkit.search.moves.legs import Legs, stances_violated
+from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.shanks import Shanks
-from toolkit.search.moves.stances import ENTANGLED, stances_violated
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
 
@@ -90,10 +89,8 @@ class ReachCheck:
         """
         table, after = self._table, candidates.contacts
         n = len(candidates)
-        codes = np.zeros(n, np.int64)
         # Touch-down: the new stance under the predicted CoM.
-        broken = self._violated(end, candidates.yaw, after[:, 0], after[:, 1])
-        _enter(codes, broken)
+        codes = self._violated(end, candidates.yaw, after[:, 0], after[:, 1])
         # Lift-off: the old stance under the CoM at the end of the shift, on the cubic between the known ends.
         shift, total = self._shift[candidates.timing], self._total[candidates.timing]
         yaw = np.full(n, mean_feet(table, contacts[None])[1][0])
@@ -104,8 +101,8 @@ class ReachCheck:
                 part, time = lag * shift[rows] / total[rows], total[rows]
                 lift = _cubic(com, velocity, end[rows], end_velocity[rows], part, time)
                 broken[rows] = self._violated(lift, yaw[rows], left[rows], right[rows])
-                rows = rows[broken[rows] >= 0]
-        _enter(codes, broken)
+                rows = rows[broken[rows] > 0]
+        codes = np.where(broken > 0, broken, codes)
         for palm in self._palms:
             held = np.flatnonzero(after[:, palm] >= 0)
             if len(held):
@@ -126,7 +123,7 @@ class ReachCheck:
                 aside[:, 2] = 0.0
                 stretched = np.linalg.norm(reach - aside, axis=1) > arm.max_reach + self._config.arm_sway
                 within &= ~(stretched & (limb < len(FEET)))
-                codes[held[~(within & self._arms[palm].serves(*local))]] = screen.ARM
+                codes[held[~(within & self._arms[palm].serves(*local))]] = Reason.ARM
         return codes
 
     def _violated(self, com: np.ndarray, yaw: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -142,12 +139,6 @@ class ReachCheck:
             table.position[right],
             table.rotation[right],
         )
-
-
-def _enter(codes: np.ndarray, broken: np.ndarray) -> None:
-    """Enter what `stances_violated` found."""
-    rows = broken >= 0
-    codes[rows] = np.where(broken[rows] == ENTANGLED, screen.KNEES, screen.LEG + broken[rows])
 
 
 def _cubic(

@@ -1,6 +1,6 @@
 """Compiled checks of thighs and shins as capsules: against the world and against each other.
 
-The closed form of `toolkit.contacts.reach` gives hip, knee and ankle of a leg that reaches; capsules lie between them.
+Capsules lie between the hip, the knee and the ankle of a leg that reaches (`toolkit.search.moves.legs.reach`).
 Against the world a capsule is a row of balls on the occupancy grid. Half a cell is taken off their radius, since cells
 count as occupied that are only touched; inverse kinematics has the last word.
 """
@@ -14,6 +14,7 @@ import numpy as np
 
 from toolkit.compiled import compiled
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.physics.leg import distance
 from toolkit.robot.model import RobotModel
 
 
@@ -56,34 +57,10 @@ def _radii(robot: RobotModel, limb: Limb) -> np.ndarray:
     return radius
 
 
-@compiled(kept=True)
-def leg_points(legs, side, cx, cy, cz, yaw, position, rotation, points):
-    """Fill points (3, 3) with hip, knee and ankle in m of a leg that reaches; arguments as in `legs.violated`."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    hip, tip, r = legs.hip[side], legs.ankle[side], rotation
-    points[0, 0], points[0, 1] = cx + c * hip[0] - s * hip[1], cy + s * hip[0] + c * hip[1]
-    points[0, 2] = cz + hip[2]
-    square = 0.0
-    for k in range(3):
-        points[2, k] = position[k] + r[k, 0] * tip[0] + r[k, 1] * tip[1] + r[k, 2] * tip[2]
-        square += (points[0, k] - points[2, k]) ** 2
-    dx, dy, dz = points[0, 0] - points[2, 0], points[0, 1] - points[2, 1], points[0, 2] - points[2, 2]
-    u = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz
-    v = r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
-    w = r[0, 2] * dx + r[1, 2] * dy + r[2, 2] * dz
-    thigh, shin = legs.links[side, 0], legs.links[side, 1]
-    span = min(max(np.sqrt(square), abs(thigh - shin) + 1e-9), thigh + shin - 1e-9)
-    cosine = (span * span + shin * shin - thigh * thigh) / (2.0 * shin * span)
-    lean = np.arctan2(u, np.sqrt(v * v + w * w)) + np.arccos(min(max(cosine, -1.0), 1.0))
-    roll = np.arctan2(v, w)
-    x, y, z = np.sin(lean), np.sin(roll) * np.cos(lean), np.cos(roll) * np.cos(lean)
-    for k in range(3):
-        points[1, k] = points[2, k] + shin * (r[k, 0] * x + r[k, 1] * y + r[k, 2] * z)
-
-
-@compiled(kept=True)
-def ball_free(corner, cell, below, x, y, z, radius):
+@compiled
+def ball_free(occupancy, x, y, z, radius):
     """Whether a ball meets no occupied cell, half a cell taken off its radius."""
+    corner, cell, below = occupancy.corner, occupancy.cell, occupancy.below
     high = radius - cell / 2 if radius > cell / 2 else 0.0
     first = min(max(int(np.floor((z - high - corner[2]) / cell)), 0), below.shape[2] - 1)
     last = min(max(int(np.floor((z + high - corner[2]) / cell)) + 1, 0), below.shape[2] - 1)
@@ -98,28 +75,35 @@ def ball_free(corner, cell, below, x, y, z, radius):
     return True
 
 
-@compiled(kept=True)
-def leg_free(corner, cell, below, shanks, points):
-    """Whether the checked parts of both links, from the knee on, meet no occupied cell."""
+@compiled
+def _between(a, b, t):
+    """The point at the part t of the way from a to b."""
+    return a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
+
+
+@compiled
+def leg_free(occupancy, shanks, points):
+    """Whether the checked parts of both links, from the knee on, meet no occupied cell.
+
+    Args:
+        occupancy: of the world.
+        shanks: capsules.
+        points: hip, knee and ankle, three numbers in m each.
+    """
+    knee = points[1]
     for link in range(2):
-        end = 0 if link == 0 else 2
-        length = 0.0
-        for k in range(3):
-            length += (points[end, k] - points[1, k]) ** 2
-        balls = int(np.ceil(np.sqrt(length) * shanks.free[link] / cell)) + 1
+        end = points[2 * link]
+        balls = int(np.ceil(distance(end, knee) * shanks.free[link] / occupancy.cell)) + 1
         for b in range(balls):
-            t = shanks.free[link] * b / (balls - 1)
-            x = points[1, 0] + t * (points[end, 0] - points[1, 0])
-            y = points[1, 1] + t * (points[end, 1] - points[1, 1])
-            z = points[1, 2] + t * (points[end, 2] - points[1, 2])
-            if not ball_free(corner, cell, below, x, y, z, shanks.radius[link]):
+            x, y, z = _between(knee, end, shanks.free[link] * b / (balls - 1))
+            if not ball_free(occupancy, x, y, z, shanks.radius[link]):
                 return False
     return True
 
 
-@compiled(kept=True)
+@compiled
 def segment_distance(a, b, p, q):
-    """Distance between the segments a-b and p-q, points (3,)."""
+    """Distance between the segments a-b and p-q, points of three numbers."""
     aa = ap = pp = ar = pr = 0.0
     for k in range(3):
         u, v, r = b[k] - a[k], q[k] - p[k], a[k] - p[k]
@@ -137,18 +121,14 @@ def segment_distance(a, b, p, q):
     return np.sqrt(square)
 
 
-@compiled(kept=True)
+@compiled
 def legs_apart(shanks, left, right):
-    """Whether two legs, (3, 3) points each, keep their links apart: knees, shins and the lower thighs."""
-    parts = np.empty((2, 2, 3))
-    for k in range(3):
-        parts[0, 0, k] = left[1, k] + shanks.free[0] * (left[0, k] - left[1, k])
-        parts[0, 1, k] = left[2, k]
-        parts[1, 0, k] = right[1, k] + shanks.free[0] * (right[0, k] - right[1, k])
-        parts[1, 1, k] = right[2, k]
+    """Whether two legs, hip, knee and ankle each, keep their links apart: knees, shins and the lower thighs."""
+    ends_left = (_between(left[1], left[0], shanks.free[0]), left[2])
+    ends_right = (_between(right[1], right[0], shanks.free[0]), right[2])
     for i in range(2):
         for j in range(2):
             least = shanks.radius[i] + shanks.radius[j] - shanks.slack
-            if segment_distance(left[1], parts[0, i], right[1], parts[1, j]) < least:
+            if segment_distance(left[1], ends_left[i], right[1], ends_right[j]) < least:
                 return False
     return True

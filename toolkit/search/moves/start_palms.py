@@ -9,8 +9,8 @@ from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import WorldError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
-from toolkit.search.moves import screen
 from toolkit.search.moves.moves import MoveGenerator
+from toolkit.search.moves.reasons import Reason
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.polygon import nearest_point
 from toolkit.world.world import PALM_SITE_REACH, PALM_SITES, World
@@ -59,15 +59,15 @@ def _placed(
     rays = _points(world, site) - shoulder
     distance = np.maximum(np.linalg.norm(rays, axis=1), 1e-9)
     palms, codes = moves.aimed(limb, left, right, rays / distance[:, None])
-    codes[(codes == screen.NO_WALL) & (distance > reach)] = screen.FAR
+    codes[(codes == Reason.NO_WALL) & (distance > reach)] = Reason.FAR
     far = np.linalg.norm(palms.position - site, axis=1)  # what is hit before the point may be elsewhere
-    codes[(codes == 0) & (far > PALM_SITE_REACH + _SEARCH)] = screen.NO_WALL
+    codes[(codes == 0) & (far > PALM_SITE_REACH + _SEARCH)] = Reason.NO_WALL
     if not (codes == 0).any():
-        code = screen.POSTURE if (codes == screen.POSTURE).any() else codes[0]  # how far any came, or the nearest point
+        code = Reason.POSTURE if (codes == Reason.POSTURE).any() else codes[0]  # how far any came, or the nearest point
         at, above = (f"({x:.3g}, {y:.3g}, {z:.3g})" for x, y, z in (site, shoulder))
         raise WorldError(
             f"{world.path}: the {limb.label.replace('_', ' ')} cannot start at site '{PALM_SITES[limb]}' {at}, from "
-            f"the shoulder at {above}: {screen.REASONS[code]}; move the site along the wall, move the start nearer to "
+            f"the shoulder at {above}: {Reason(code).words}; move the site along the wall, move the start nearer to "
             "the wall or away from it, or remove the site"
         )
     row = int(np.argmin(np.where(codes == 0, far, np.inf)))

@@ -1,11 +1,15 @@
-"""Leg postures in closed form against MuJoCo's forward kinematics."""
+"""Leg postures in closed form against MuJoCo's forward kinematics and against a chain of rotations."""
 
+import casadi as ca
 import mujoco
 import numpy as np
 import pytest
 
-from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
+from tests.oracles.leg import angles_of, chain, torques
+from toolkit.centroidal.pieces import pieces
+from toolkit.compiled import compiled
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.physics.leg import ReachMargins, leg_clearances, leg_posture, leg_torques, posture_between
 from toolkit.robot.loader import find_robots, load_robot
 
 
@@ -87,7 +91,7 @@ def test_posture_turns_and_shifts_with_the_world(robot, limb):
 def leg_feasible(leg, com, yaw, position, rotation):
     """(n,) bool; whether legs reach their soles within every joint range."""
     posture = leg_posture(leg, com, yaw, position, rotation)
-    return np.all([value >= 0.0 for value in leg_clearances(leg, posture).values()], axis=0)
+    return np.all([value >= 0.0 for value in leg_clearances(leg, posture, ReachMargins()).values()], axis=0)
 
 
 def test_home_posture_is_feasible_and_broken_ones_are_not(robot):
@@ -118,3 +122,82 @@ def test_margins_tighten_every_limit(robot):
     tight = leg_clearances(leg, posture, ReachMargins(0.01, 0.1, 0.05))
     for name, taken in [("leg length", 0.01), ("ankle pitch", 0.1), ("ankle roll", 0.1), ("hip pitch", 0.05)]:
         np.testing.assert_allclose(loose[name] - tight[name], taken, atol=1e-12)
+
+
+def placed(leg, com, heading, angles):
+    """The posture that the law finds for a sole that the chain of rotations places, and the chain's points and sole."""
+    *points, sole, rotation = chain(leg, com, heading, angles)
+    return leg_posture(leg, com[None], np.array([heading]), sole[None], rotation[None]), points, sole, rotation
+
+
+@pytest.mark.parametrize("limb", FEET)
+def test_the_law_undoes_the_chain_of_rotations(robot, limb):
+    rng, leg = np.random.default_rng(4), robot.legs[limb]
+    for _ in range(300):
+        com, heading = rng.normal(size=3), rng.uniform(-3, 3)
+        angles = rng.uniform([-1.5, -1.3, -1.4, 0.05, -1.4, -1.4], [1.5, 1.3, 1.4, 2.6, 1.4, 1.4])
+        posture, points, sole, rotation = placed(leg, com, heading, angles)
+        if (points[0] - points[2]) @ rotation[:, 2] < 0.02:
+            continue  # the hip below the sole: the ankle would have rolled over
+        np.testing.assert_allclose(angles_of(posture), angles, atol=1e-9)
+        found = (posture.hip_point, posture.knee_point, posture.ankle_point)
+        np.testing.assert_allclose(np.squeeze(found), points, atol=1e-9)
+        force, moment = rng.normal(size=3) * [50, 50, 300], rng.normal(size=3) * 20
+        ours = leg_torques(posture, sole[None], rotation[None], force[None], moment[None])
+        expected = torques(leg, com, heading, angles, force, moment)
+        for role, torque in ours.items():
+            np.testing.assert_allclose(torque[0], expected[role], atol=1e-5, err_msg=role)  # differences of 1e-6 rad
+
+
+@pytest.mark.parametrize("limb", FEET)
+@pytest.mark.parametrize("singular", ["straight", "folded", "hip on its side", "ankle on its side"])
+def test_the_law_near_its_singularities(robot, limb, singular):
+    rng, leg = np.random.default_rng(5), robot.legs[limb]
+    for off in (0.0, 1e-9, 1e-6, 1e-3, 0.05):
+        angles = np.array([0.3, 0.1, -0.5, 0.9, -0.5, 0.1]) + 0.05 * rng.normal(size=6)
+        k, value = {
+            "straight": (3, off),
+            "folded": (3, np.pi - 0.05 - off),
+            "hip on its side": (1, np.pi / 2 - off),
+            "ankle on its side": (5, np.pi / 2 - off),
+        }[singular]
+        angles[k] = value
+        com = rng.normal(size=3)
+        posture, points, sole, rotation = placed(leg, com, 0.4, angles)
+        assert all(np.isfinite(np.squeeze(value)).all() for value in posture)
+        found = np.squeeze((posture.hip_point, posture.knee_point, posture.ankle_point))
+        near = off < 0.05 and singular in ("straight", "hip on its side")
+        if near:  # angles nearer to these than 0.0142 rad are taken as that near; the hip's yaw may then be any
+            np.testing.assert_allclose(angles_of(posture)[k], value, atol=0.0142)
+            np.testing.assert_allclose(found, points, atol=0.0142 * leg.shin if singular == "straight" else 1e-9)
+        else:
+            np.testing.assert_allclose(angles_of(posture), angles, atol=1e-6)
+            np.testing.assert_allclose(found, points, atol=1e-8)
+
+
+def test_a_leg_that_is_too_long_points_at_its_hip(robot):
+    leg = robot.legs[Limb.LEFT_FOOT]
+    position = ((leg.hip_in_com - leg.ankle_in_sole) * [1, 1, 0])[None]
+    com = np.array([[0.0, 0.0, 2.0 * robot.com_height]])
+    posture = leg_posture(leg, com, np.zeros(1), position, np.eye(3)[None])
+    assert posture.length[0] > leg.max_length and posture.knee[0] < 0.0142
+    up = np.squeeze(posture.knee_point) - np.squeeze(posture.ankle_point)
+    np.testing.assert_allclose(up / np.linalg.norm(up), [0.0, 0.0, 1.0], atol=0.0142)
+    assert leg_clearances(leg, posture, ReachMargins())["leg length"][0] < 0.0
+
+
+def test_numbers_arrays_and_symbols_take_the_same_law(robot):
+    rng, leg = np.random.default_rng(6), robot.legs[Limb.RIGHT_FOOT]
+    compile_once = compiled(posture_between)
+    pieces()  # CasADi takes NumPy's functions from here on
+    for _, _, _, com, position, rotation in random_legs(robot, Limb.RIGHT_FOOT, rng, 5):
+        heading = (np.cos(0.3), np.sin(0.3))
+        hip, ankle = com + leg.hip_in_com, position + rotation @ leg.ankle_in_sole
+        column = heading[0][None], heading[1][None]
+        arrays = posture_between(hip[:, None], ankle[:, None], rotation[:, :, None], column, leg.thigh, leg.shin)
+        numbers = compile_once(tuple(hip), tuple(ankle), rotation, heading, leg.thigh, leg.shin)
+        given = ca.SX.sym("h", 3), ca.SX.sym("a", 3), ca.SX.sym("r", 3, 3)
+        symbols = posture_between(*given, heading, leg.thigh, leg.shin)
+        values = ca.Function("f", list(given), [ca.vertcat(*symbols[:7])])(hip, ankle, rotation)
+        np.testing.assert_allclose(numbers[:7], np.squeeze(arrays[:7]), rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(np.array(values).ravel(), np.squeeze(arrays[:7]), rtol=0.0, atol=1e-12)

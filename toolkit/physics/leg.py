@@ -1,0 +1,285 @@
+"""A leg of two links in closed form: joint angles, points and torques from the CoM, the base's heading and the sole.
+
+The base stands upright at the heading psi and its CoM c where the home posture has it; the hip is a ball joint of yaw,
+roll and pitch, the ankle one of pitch and roll (the usual humanoid leg). With
+
+    h = R_sole^T (c + Rz(psi) hip_in_com - p) - ankle_in_sole        hip seen from the ankle, in the sole frame
+
+all six joint angles follow: the ankle rolls until h lies in the plane of the leg, the cosine rule gives the knee and
+the shin, and the thigh's frame seen from the base gives the hip.
+
+The laws are written once, for numbers in compiled code, for arrays and for CasADi's symbols. A vector is anything whose
+components are v[0], v[1], v[2], and a rotation has the components r[i, j]; each component is a number, an array (n,) or
+a symbol.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from toolkit.compiled import law
+from toolkit.robot.model import LegGeometry
+
+_STRAIGHT = 0.9999  # largest |cosine| or |sine| whose angle is taken, so that derivatives stay finite
+
+
+@dataclass(frozen=True)
+class ReachMargins:
+    """How far inside its limits a leg must stay.
+
+    Attributes:
+        length: m, off both ends of the hip-ankle distance.
+        ankle: rad, off both ends of ankle pitch and roll.
+        hip: rad, off both ends of hip yaw, roll and pitch; negative where the base may turn or lean to help.
+    """
+
+    length: float = 0.0
+    ankle: float = 0.1
+    hip: float = 0.0
+
+
+class LegLimit(NamedTuple):
+    """A limit of legs.
+
+    Attributes:
+        name: in reports.
+        quantity: what is limited: a field of `LegPosture`, and of `LegGeometry.ranges` where it is an angle.
+        margin: the field of `ReachMargins` that is taken off both ends.
+        planned: whether centroidal motions keep it; the base may turn to spare the hip's yaw.
+    """
+
+    name: str
+    quantity: str
+    margin: str
+    planned: bool = True
+
+    def range_of(self, leg: LegGeometry) -> tuple[float, float]:
+        """Lower and upper end in m or rad."""
+        return (leg.min_length, leg.max_length) if self.quantity == "length" else leg.ranges[self.quantity]
+
+
+LIMITS = (
+    LegLimit("leg length", "length", "length"),
+    LegLimit("ankle pitch", "ankle_pitch", "ankle"),
+    LegLimit("ankle roll", "ankle_roll", "ankle"),
+    LegLimit("hip pitch", "hip_pitch", "hip"),
+    LegLimit("hip roll", "hip_roll", "hip"),
+    LegLimit("hip yaw", "hip_yaw", "hip", planned=False),
+)
+"""All limits of a leg; the screens, the optimiser and the checks keep those that stand here."""
+PLANNED = tuple(limit for limit in LIMITS if limit.planned)
+TORQUE_ROLES = ("knee", "hip_pitch", "hip_roll", "ankle_pitch", "ankle_roll")
+
+
+class LegPosture(NamedTuple):
+    """Joint angles in rad, signs as in `LegGeometry.ranges`, and points in m in the world, three components each.
+
+    Attributes:
+        length: m; hip to ankle. Beyond what the two links can span the angles are those of a nearly straight leg.
+        ankle_pitch, ankle_roll, hip_pitch, hip_roll, hip_yaw, knee: rad.
+        pitch_axis: unit vector; axis of hip pitch, knee and ankle pitch in the world.
+        hip_point, knee_point, ankle_point: m.
+    """
+
+    length: Any
+    ankle_pitch: Any
+    ankle_roll: Any
+    hip_pitch: Any
+    hip_roll: Any
+    hip_yaw: Any
+    knee: Any
+    pitch_axis: tuple
+    hip_point: tuple
+    knee_point: tuple
+    ankle_point: tuple
+
+
+@law
+def quantities(posture):
+    """What can be limited: the fields of a `LegPosture` that are no vectors."""
+    return posture[:7]
+
+
+@law
+def turned(rotation, v):
+    """A vector of a frame in the world; `rotation` is world_from_frame."""
+    r = rotation
+    return (
+        r[0, 0] * v[0] + r[0, 1] * v[1] + r[0, 2] * v[2],
+        r[1, 0] * v[0] + r[1, 1] * v[1] + r[1, 2] * v[2],
+        r[2, 0] * v[0] + r[2, 1] * v[1] + r[2, 2] * v[2],
+    )
+
+
+@law
+def hip_at(com, heading, hip_in_com):
+    """Hip in m in the world.
+
+    Args:
+        com: m in the world.
+        heading: cosine and sine of the base's heading.
+        hip_in_com: m; in the base's frame.
+    """
+    c, s = heading[0], heading[1]
+    x, y = c * hip_in_com[0] - s * hip_in_com[1], s * hip_in_com[0] + c * hip_in_com[1]
+    return com[0] + x, com[1] + y, com[2] + hip_in_com[2]
+
+
+@law
+def ankle_at(position, rotation, ankle_in_sole):
+    """Ankle in m in the world, of a sole with its centre at `position` m."""
+    x, y, z = turned(rotation, ankle_in_sole)
+    return position[0] + x, position[1] + y, position[2] + z
+
+
+@law
+def distance(a, b):
+    """Distance between two points."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return np.sqrt(x * x + y * y + z * z)
+
+
+@law
+def _kept(cosine):
+    """A sine or cosine, kept away from where its angle's derivative is infinite."""
+    return np.fmin(np.fmax(cosine, -_STRAIGHT), _STRAIGHT)
+
+
+@law
+def posture_between(hip, ankle, rotation, heading, thigh, shin, tiny=0.0):
+    """Posture of a leg between two points.
+
+    Args:
+        hip: m in the world.
+        ankle: m in the world.
+        rotation: world_from_sole.
+        heading: cosine and sine of the base's heading.
+        thigh: m.
+        shin: m.
+        tiny: m^2; added to squares under roots where derivatives are wanted, so that they stay finite.
+    """
+    r = rotation
+    dx, dy, dz = hip[0] - ankle[0], hip[1] - ankle[1], hip[2] - ankle[2]
+    x = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz
+    y = r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
+    z = r[0, 2] * dx + r[1, 2] * dy + r[2, 2] * dz
+    square = x * x + y * y + z * z + tiny
+    length = np.sqrt(square)
+    roll = np.arctan2(y, z)
+    at_ankle = np.arccos(_kept((square + shin * shin - thigh * thigh) / (2.0 * shin * length)))
+    at_knee = np.arccos(_kept((thigh * thigh + shin * shin - square) / (2.0 * thigh * shin)))
+    lean = np.arctan2(x, np.sqrt(y * y + z * z + tiny)) + at_ankle  # of the shin, towards the toes
+    axis = turned(r, (0.0, np.cos(roll), -np.sin(roll)))
+    ux, uy, uz = turned(r, (np.sin(lean), np.sin(roll) * np.cos(lean), np.cos(roll) * np.cos(lean)))
+    knee = (ankle[0] + shin * ux, ankle[1] + shin * uy, ankle[2] + shin * uz)
+    tx, ty, tz = hip[0] - knee[0], hip[1] - knee[1], hip[2] - knee[2]
+    c, s = heading[0], heading[1]
+    return LegPosture(
+        length,
+        -lean,
+        roll,
+        np.arctan2(axis[1] * tx - axis[0] * ty, tz),
+        np.arcsin(_kept(axis[2])),
+        np.arctan2(-c * axis[0] - s * axis[1], c * axis[1] - s * axis[0]),
+        np.pi - at_knee,
+        axis,
+        (hip[0], hip[1], hip[2]),
+        knee,
+        (ankle[0], ankle[1], ankle[2]),
+    )
+
+
+@law
+def _torque_about(axis, origin, point, force, moment):
+    """Torque tau = a . ((p - o) x f + m) about a joint's axis a through o."""
+    x, y, z = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
+    return (
+        axis[0] * (y * force[2] - z * force[1] + moment[0])
+        + axis[1] * (z * force[0] - x * force[2] + moment[1])
+        + axis[2] * (x * force[1] - y * force[0] + moment[2])
+    )
+
+
+@law
+def joint_torques(posture, sole, rotation, force, moment, tiny=0.0):
+    """Static torques of a stance leg about its joints, its own weight left out, in the order of `TORQUE_ROLES`.
+
+    Args:
+        posture: of the leg.
+        sole: m in the world; centre of the sole.
+        rotation: world_from_sole.
+        force: N on the sole, in the world.
+        moment: N m on the sole about its centre, in the world.
+        tiny: as in `posture_between`.
+    """
+    w = posture.pitch_axis
+    flat = np.sqrt(w[0] * w[0] + w[1] * w[1] + tiny)
+    hip_roll, ankle_roll = (w[1] / flat, -w[0] / flat, 0.0), (rotation[0, 0], rotation[1, 0], rotation[2, 0])
+    return (
+        _torque_about(w, posture.knee_point, sole, force, moment),
+        _torque_about(w, posture.hip_point, sole, force, moment),
+        _torque_about(hip_roll, posture.hip_point, sole, force, moment),
+        _torque_about(w, posture.ankle_point, sole, force, moment),
+        _torque_about(ankle_roll, posture.ankle_point, sole, force, moment),
+    )
+
+
+def leg_posture(
+    leg: LegGeometry, com: np.ndarray, yaw: np.ndarray, position: np.ndarray, rotation: np.ndarray
+) -> LegPosture:
+    """Postures of n legs whose soles are placed.
+
+    Args:
+        leg: geometry of the leg.
+        com: (n, 3) m; CoM in the world.
+        yaw: (n,) rad; heading of the base.
+        position: (n, 3) m; centre of the sole in the world.
+        rotation: (n, 3, 3); world_from_sole.
+
+    Returns:
+        The postures; each component (n,).
+    """
+    heading, r = (np.cos(yaw), np.sin(yaw)), np.moveaxis(rotation, 0, -1)
+    hip, ankle = hip_at(com.T, heading, leg.hip_in_com), ankle_at(position.T, r, leg.ankle_in_sole)
+    return posture_between(hip, ankle, r, heading, leg.thigh, leg.shin)
+
+
+def leg_clearances(leg: LegGeometry, posture: LegPosture, margins: ReachMargins) -> dict[str, np.ndarray]:
+    """Distance of each leg to each of its limits; negative where the limit, less its margin, is exceeded.
+
+    Args:
+        leg: geometry of the leg.
+        posture: of n legs.
+        margins: taken off each limit.
+
+    Returns:
+        Name of the limit -> (n,) m or rad: the smaller distance to the two ends of the range.
+    """
+    clearances = {}
+    for limit in LIMITS:
+        lower, upper = limit.range_of(leg)
+        value = getattr(posture, limit.quantity)
+        clearances[limit.name] = np.minimum(value - lower, upper - value) - getattr(margins, limit.margin)
+    return clearances
+
+
+def leg_torques(
+    posture: LegPosture, sole: np.ndarray, rotation: np.ndarray, force: np.ndarray, moment: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Static torques of n stance legs; see `joint_torques`.
+
+    Args:
+        posture: of n legs.
+        sole: (n, 3) m; centres of the soles.
+        rotation: (n, 3, 3); world_from_sole.
+        force: (n, 3) N on the sole, in the world.
+        moment: (n, 3) N m on the sole about its centre, in the world.
+
+    Returns:
+        Role -> (n,) N m.
+    """
+    torques = joint_torques(posture, sole.T, np.moveaxis(rotation, 0, -1), force.T, moment.T)
+    return dict(zip(TORQUE_ROLES, torques, strict=True))
