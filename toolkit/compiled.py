@@ -6,7 +6,8 @@ the next call compile again; an edit of a comment, or of a function that is not 
 
 A function that only other compiled functions call is decorated with `@compiled`. One that Python calls is decorated
 with `@compiled(kept=True)`, and what was compiled is kept on disk: beside the source, or, where that folder cannot be
-written, in numba's folder of the user. Where neither can be written, it is compiled anew in each process.
+written, in numba's folder of the user. Where neither can be written, it is compiled anew in each process. A law of plain
+arithmetic that Python and CasADi call as it stands, and compiled functions too, is decorated with `@shared`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.dispatcher import Dispatcher
+from numba.extending import register_jitable
 
 REORDERED = frozenset({"reassoc", "contract", "arcp", "nsz"})
 """What LLVM may do to floating-point sums where a kernel allows it; nan and inf keep their meaning."""
@@ -48,6 +50,11 @@ def compiled(function: Callable | None = None, *, kept: bool = False, reordered:
         except RuntimeError:  # numba found no folder to write to
             pass
     return dispatcher
+
+
+def shared(function: Callable) -> Callable:
+    """The function itself, which compiled functions may call from now on, under their own rules of arithmetic."""
+    return register_jitable(function)
 
 
 def digest(function: Callable) -> str:

@@ -29,6 +29,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from toolkit.physics.momentum import ballistic
+
 STANDARD_GRAVITY = 9.81  # m/s^2
 GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 
@@ -60,6 +62,10 @@ class Margins:
     friction: float = 1.0
     cop: tuple[float, float] = (0.0, 0.0)
     yaw: float = 1.0
+
+    def within(self, half_size: np.ndarray) -> np.ndarray:
+        """(..., 2) m; the half extents of patches with the CoP margin taken off, at most half of each."""
+        return half_size - np.minimum(self.cop, half_size / 2)
 
 
 @dataclass(frozen=True)
@@ -126,7 +132,7 @@ class CentroidalProblem:
     @property
     def reduced_half_size(self) -> np.ndarray:
         """(4, 2) m; half extents that bound the CoP and the yaw moment: the CoP margin taken off, at most half."""
-        return self.half_size - np.minimum(self.margins.cop, self.half_size / 2)
+        return self.margins.within(self.half_size)
 
     @property
     def times(self) -> np.ndarray:
@@ -176,5 +182,5 @@ class CentroidalMotion:
         tau = time - times[step]
         acceleration = self.force[step].sum(0) / problem.mass + GRAVITY
         velocity = self.linear_momentum[step] / problem.mass
-        position = self.com[step] + tau * velocity + 0.5 * tau**2 * acceleration
+        position = ballistic(tau, self.com[step], velocity, acceleration)
         return position, velocity + tau * acceleration, acceleration
