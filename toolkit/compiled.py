@@ -6,8 +6,10 @@ the next call compile again; an edit of a comment, or of a function that is not 
 
 A function that only other compiled functions call is decorated with `@compiled`. One that Python calls is decorated
 with `@compiled(kept=True)`, and what was compiled is kept on disk: beside the source, or, where that folder cannot be
-written, in numba's folder of the user. Where neither can be written, it is compiled anew in each process. A law of plain
-arithmetic that Python and CasADi call as it stands, and compiled functions too, is decorated with `@shared`.
+written, in numba's folder of the user. Where neither can be written, it is compiled anew in each process.
+
+A law of plain arithmetic that Python and CasADi call as it stands, and compiled functions too, is decorated with
+`@shared`.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ which r counts too; k = L - r x v is the angular momentum about the CoM. Gravity
     L' = L + dt M + (dt r + dt^2/2 v + dt^3/6 a) x g     M: the moment of the contact wrenches about the point
     k' = k + dt (M - rbar x F)        rbar = r + dt/2 v + dt^2/6 g; the mean of r, less a part along F
 
-The functions use nothing but arithmetic on entries: NumPy (entries may be arrays), numba functions
+The functions use nothing but arithmetic on entries: NumPy (entries may be arrays), compiled functions
 and CasADi call the same ones.
 """
 
@@ -99,8 +99,7 @@ def fill_wrench_map(rotation, lever, out):
         out: (6, 6); its upper right block is left as it is.
     """
     for b in range(3):
-        turned = cross(lever, rotation[:, b])
-        for a in range(3):
-            out[a, b] = rotation[a, b]
-            out[3 + a, 3 + b] = rotation[a, b]
-            out[3 + a, b] = turned[a]
+        axis = rotation[0, b], rotation[1, b], rotation[2, b]
+        out[0, b], out[1, b], out[2, b] = axis
+        out[3, 3 + b], out[4, 3 + b], out[5, 3 + b] = axis
+        out[3, b], out[4, b], out[5, b] = cross(lever, axis)

@@ -5,9 +5,9 @@ surface's normal. A patch carries it where
 
     friction   |(fx, fy)| <= mu fz,
     pressure   |mx| <= Y fz,  |my| <= X fz:  the centre of pressure is inside the half extents X and Y,
-    yaw        -mu (X + Y) fz + |Y fx - mu mx| + |X fy - mu my| <= mz <= mu (X + Y) fz - |Y fx + mu mx| - |X fy + mu my|.
+    yaw        |Y fx - mu mx| + |X fy - mu my| - mu (X + Y) fz <= mz <= mu (X + Y) fz - |Y fx + mu mx| - |X fy + mu my|.
 
-`pressure_rows`, `yaw_row` and `pressure` use nothing but arithmetic: NumPy, numba functions and
+`pressure_rows`, `yaw_row` and `pressure` use nothing but arithmetic: NumPy, compiled functions and
 CasADi call the same functions.
 
 Reference:
