@@ -2,15 +2,8 @@
 
 Both solvers, the residual check and the training data speak of a motion in these terms. Time is cut into N intervals
 ("steps") with constant contact wrenches; knots 0..N bound them. Since the wrench is constant on an interval, the
-linear dynamics and the moment about the world origin integrate exactly:
-
-    l_{t+1} = l_t + dt (sum f + m g)
-    r_{t+1} = r_t + dt l_t / m + dt^2 / (2 m) (sum f + m g)
-    L_{t+1} = L_t + dt sum (p x f + tau) + (dt r_t + dt^2 l_t / (2 m) + dt^3 / (6 m) (sum f + m g)) x m g
-    k_t     = L_t - r_t x l_t
-
-with L the angular momentum about the world origin, linear in the wrenches, and k the one about the CoM: the paper's
-Eq. 3 without discretisation error. (p, tau): wrench at the centre of the patch, tau = R (z x R^T f) + tau_n n.
+paper's Eq. 3 integrates without discretisation error: see `toolkit.physics.momentum`. At a contact act a force f at the
+centre of pressure z, and a torque tau_n about the normal there; `toolkit.physics.wrench` says within which bounds.
 
 The objective is the paper's weighted sum of squares (Sec. IV), each step weighted by dt / 0.2 s, so that it is an
 integral over time and equals the paper's sum at the paper's step:

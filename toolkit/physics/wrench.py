@@ -7,8 +7,8 @@ surface's normal. A patch carries it where
     pressure   |mx| <= Y fz,  |my| <= X fz:  the centre of pressure is inside the half extents X and Y,
     yaw        |Y fx - mu mx| + |X fy - mu my| - mu (X + Y) fz <= mz <= mu (X + Y) fz - |Y fx + mu mx| - |X fy + mu my|.
 
-`pressure_rows`, `yaw_row` and `pressure` use nothing but arithmetic: NumPy, compiled functions and
-CasADi call the same functions.
+`pressure_rows`, `yaw_row` and `pressure` use nothing but arithmetic: NumPy, compiled functions and CasADi call the same
+ones.
 
 Reference:
     Caron, Pham, Nakamura, "Stability of surface contacts for humanoid robots", ICRA 2015, Eqs. 17-19.
