@@ -84,7 +84,7 @@ class ProblemArrays(NamedTuple):
 
     def copy(self) -> ProblemArrays:
         """The same with arrays of its own."""
-        return ProblemArrays(*(item.copy() if isinstance(item, np.ndarray) else item for item in self))
+        return ProblemArrays._make(item.copy() if isinstance(item, np.ndarray) else item for item in self)
 
 
 class MotionArrays(NamedTuple):
