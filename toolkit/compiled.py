@@ -8,7 +8,7 @@ A function that only other compiled functions call is decorated with `@compiled`
 with `@compiled(kept=True)`, and what was compiled is kept on disk: beside the source, or, where that folder cannot be
 written, in numba's folder of the user. Where neither can be written, it is compiled anew in each process.
 
-A formula that serves compiled code, NumPy arrays and CasADi's symbols alike is decorated with `@law`.
+A formula that Python, NumPy arrays, CasADi's symbols and compiled functions share is decorated with `@law`.
 """
 
 from __future__ import annotations
@@ -54,11 +54,11 @@ def compiled(function: Callable | None = None, *, kept: bool = False, reordered:
 
 
 def law(function: Callable) -> Callable:
-    """Leave a function as it is for Python, and let compiled functions call it too.
+    """Leave a function as it is for Python, and let compiled functions call it under their own rules of arithmetic.
 
     Written with operators and NumPy's functions of one element, it takes numbers, arrays and CasADi's symbols.
     """
-    return register_jitable(error_model="numpy", nogil=True)(function)
+    return register_jitable(function)
 
 
 def digest(function: Callable) -> str:

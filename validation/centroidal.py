@@ -19,20 +19,20 @@ import numpy as np
 from rich.progress import Progress
 
 from toolkit import cli
-from toolkit.centroidal import fast, reference
+from toolkit.centroidal import fast
 from toolkit.centroidal.build import initial_com, sequence_problem, transition_problem
 from toolkit.centroidal.residual import check
-from toolkit.centroidal.sampling import SamplingConfig, sample_transition, sample_walk
 from toolkit.contacts.category import Category
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.report.console import make_console
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.train import progress_bar
-from validation import goals
+from validation import goals, reference_solver
 from validation.goals import Goal
 from validation.growth import exponent
 from validation.machine import ROOT
+from validation.random_contacts import SamplingConfig, sample_transition, sample_walk
 from validation.tables import largest, markdown_table, number, write_results
 
 SETTINGS = {
@@ -40,7 +40,7 @@ SETTINGS = {
     "any timing and friction": SamplingConfig(friction=(0.3, 0.9), shift=(0.05, 1.0), swing=(0.3, 1.0)),
 }
 LENGTHS = (6, 9, 12, 18, 24, 31, 40, 50, 60)
-DECIDED = (*reference.SOLVED, "Infeasible_Problem_Detected")
+DECIDED = (*reference_solver.SOLVED, "Infeasible_Problem_Detected")
 OBJECTIVE_TOLERANCE = 0.01
 
 
@@ -48,7 +48,7 @@ def compare(robot: RobotModel, category: Category, index: int, seed: int, config
     """One random transition with both solvers."""
     sample = sample_transition(robot, category, np.random.default_rng([seed, category, index]), config)
     record: dict[str, Any] = {"category": int(category), "index": index}
-    for name, solver in (("fast", fast), ("reference", reference)):
+    for name, solver in (("fast", fast), ("reference", reference_solver)):
         start = process_time()
         problem = transition_problem(robot, sample.stance, sample.com, sample.com_velocity, sample.transition)
         motion = solver.solve(problem)

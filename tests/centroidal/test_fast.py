@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from toolkit.centroidal import fast, reference
+from toolkit.centroidal import fast
 from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_problem, transition_problem
 from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.residual import check
-from toolkit.centroidal.sampling import SamplingConfig, TransitionSample, sample_transition, sample_walk
 from toolkit.contacts.category import Category
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
@@ -19,6 +18,8 @@ from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, rotation_on_surface
 from toolkit.world.timing import Timing
+from validation import reference_solver
+from validation.random_contacts import SamplingConfig, TransitionSample, sample_transition, sample_walk
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
@@ -273,7 +274,7 @@ def compare(robot, items):
     same, close = [], []
     for sample in items:
         problem = transition_problem(robot, sample.stance, sample.com, sample.com_velocity, sample.transition)
-        quick, slow = fast.solve(problem), reference.solve(problem)
+        quick, slow = fast.solve(problem), reference_solver.solve(problem)
         same.append(quick.feasible == slow.feasible)
         if quick.feasible and slow.feasible:
             close.append(abs(quick.objective / slow.objective - 1) < 0.01)
@@ -285,7 +286,7 @@ def test_a_walk_agrees_with_the_reference(robot):
     problem = sequence_problem(
         robot, ContactSchedule.of(sequence, final_rest=1.0), initial_com(robot, sequence.start), np.zeros(3)
     )
-    quick, slow = fast.solve(problem), reference.solve(problem)
+    quick, slow = fast.solve(problem), reference_solver.solve(problem)
     assert quick.feasible and slow.feasible
     np.testing.assert_allclose(quick.objective, slow.objective, rtol=1e-3)
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from toolkit.centroidal.arrays import ProblemArrays
 from toolkit.centroidal.build import transition_problem
-from toolkit.centroidal.fast import pack
-from toolkit.centroidal.kernels import cone, constraints, elimination, objective, riccati
-from toolkit.centroidal.sampling import sample_transition
+from toolkit.centroidal.kernels import cone, constraints, elimination, objective, riccati, setup
 from toolkit.contacts.category import Category
+from validation.random_contacts import sample_transition
 
 
 @pytest.fixture(scope="module")
@@ -15,7 +15,7 @@ def data(robot):
     """A transition with both palms, so that every kind of contact is there."""
     sample = sample_transition(robot, Category.MOVE_FOOT_WITH_PALMS, np.random.default_rng(1))
     problem = transition_problem(robot, sample.stance, sample.com, sample.com_velocity, sample.transition)
-    return pack(problem)[0]
+    return setup.pack(ProblemArrays.of(problem))[0]
 
 
 @pytest.fixture

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from toolkit.centroidal import fast
+from toolkit.centroidal.arrays import ProblemArrays
 from toolkit.centroidal.build import transition_problem
-from toolkit.centroidal.bulk_check import residual_and_objective
-from toolkit.centroidal.sampling import SamplingConfig, sample_transition
+from toolkit.centroidal.residual import evaluate
 from toolkit.contacts.category import Category
 from toolkit.contacts.stance import Stance
 from toolkit.robot.loader import load_robot
 from toolkit.world.timing import Timing
+from validation.random_contacts import SamplingConfig, sample_transition
 
 EXACT = fast.FastConfig(tolerance=1e-9, max_iterations=200)
 STEP = 1e-4  # of the differences: the least objective has edges, where constraints come and go
@@ -31,7 +32,7 @@ def problem_of(robot, case):
 def objective(robot, case):
     problem = problem_of(robot, case)
     motion = fast.wrenches(problem, config=EXACT)
-    return np.nan if motion is None else residual_and_objective(problem, motion)[1]
+    return np.nan if motion is None else evaluate(ProblemArrays.of(problem), motion)[1]
 
 
 def moved(contact, axis, step):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from toolkit.centroidal.sampling import SamplingConfig, sample_transition
 from toolkit.contacts.category import Category
 from toolkit.learning.label import label
 from toolkit.prediction.optimiser import OptimiserEvaluator
 from toolkit.robot.loader import load_robot
+from validation.random_contacts import SamplingConfig, sample_transition
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ import pytest
 from tests.centroidal.test_sensitivity import varied
 from tests.prediction.test_features import mirrored, moved, random_case
 from toolkit.centroidal.fast import Sensitivity
-from toolkit.centroidal.sampling import SamplingConfig, sample_transition
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
 from toolkit.geometry.pose import Pose, rotation_about_z
@@ -19,6 +18,7 @@ from toolkit.learning.label import label
 from toolkit.learning.sensitivity import canonical, decode, sensitivity_size
 from toolkit.prediction.features import TARGETS, encode, feature_size
 from toolkit.robot.loader import load_robot
+from validation.random_contacts import SamplingConfig, sample_transition
 
 STEP = 1e-6
 

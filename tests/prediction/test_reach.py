@@ -5,13 +5,13 @@ import pytest
 
 from toolkit.centroidal import fast
 from toolkit.centroidal.build import ProblemConfig, transition_problem
-from toolkit.centroidal.sampling import SamplingConfig, sample_transition
 from toolkit.contacts.category import Category
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.prediction.optimiser import OptimiserEvaluator
 from toolkit.prediction.reach import SLACK, within_reach
 from toolkit.robot.loader import load_robot
+from validation.random_contacts import SamplingConfig, sample_transition
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,7 @@ from toolkit.centroidal.problem import GRAVITY, Margins
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.heading import mean_heading
 from toolkit.geometry.pose import rotation_about_z
+from toolkit.physics.wrench import corner_rays
 from toolkit.robot.model import RobotModel
 
 SIDES = 16
@@ -109,15 +110,9 @@ def statically_balanced(
 
 def _generators(robot: RobotModel, contact: Contact, margins: Margins) -> tuple[np.ndarray, np.ndarray]:
     """Unit-normal corner forces along the edges of the friction polygon, and where they act, in the world."""
-    half = robot.limbs[contact.limb].half_size
-    half = half - np.minimum(margins.cop, half / 2)
-    angle = np.arange(SIDES) * (2 * np.pi / SIDES)
-    mu = contact.friction * margins.friction
-    edges = np.stack([mu * np.cos(angle), mu * np.sin(angle), np.ones(SIDES)], 1)
-    corners = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]]) * [half[0], half[1], 0.0]
-    force = np.tile(edges @ contact.pose.rotation.T, (4, 1))
-    point = np.repeat(corners @ contact.pose.rotation.T + contact.pose.position, SIDES, 0)
-    return force, point
+    half_size = margins.within(robot.limbs[contact.limb].half_size)
+    force, point = corner_rays(contact.friction * margins.friction, half_size, SIDES)
+    return force @ contact.pose.rotation.T, contact.pose @ point
 
 
 def _normal_bounds(robot: RobotModel, contacts: Sequence[Contact], patches: list, columns: int, weight: float):

@@ -3,9 +3,7 @@
 Scaled variables of a stage: x = [CoM r (m), velocity v (m/s), kappa = k / m (m^2/s), acceleration a of the step before
 (m/s^2)] and u = [per contact: force and moment at the patch centre, in the contact frame, in weights (and weights
 times 1 m), slacks of friction and CoP (weights); per step: excess (weights) and the body's slack]. The angular momentum
-is about the CoM, and its exact integral under constant wrenches is a sum over the contacts:
-
-    kappa+ = kappa + dt g sum_i [ (p_i - r - dt v / 2 - dt^2 g_vec / 6) x f_i + tau_i ]
+is about the CoM. The dynamics are those of `toolkit.physics.momentum`, the cones those of `toolkit.physics.wrench`.
 
 Slacks take back the wanted margins, at a price and down to the least margins; what goes beyond those and beyond the
 physical limit, the excess of a step, costs much more, and so does a body's slack above 1. So the program always has a
@@ -22,6 +20,8 @@ import casadi as ca
 from toolkit.centroidal.blocks import Parameters, Piece
 from toolkit.centroidal.leg_pieces import WRENCH, displacement, leg, stretched, torque
 from toolkit.centroidal.problem import GRAVITY, STANDARD_GRAVITY
+from toolkit.physics.momentum import advanced, spin_rate
+from toolkit.physics.wrench import SIGNS, pressure, pressure_rows, yaw_row
 
 STATE = 12
 CONTACT = WRENCH + 2
@@ -98,26 +98,24 @@ def _stage(contacts: int, moving: bool) -> Piece:
     wrenches, offsets = ca.SX.sym("w", WRENCH * contacts), ca.SX.sym("d", 2 * contacts * moving)
     dt = p()
     r, v, kappa, before = ca.vertsplit(x, 3)
-    gravity = ca.DM(GRAVITY)
-    total, moment = ca.SX.zeros(3), ca.SX.zeros(3)
-    middle = r + dt / 2 * v + dt**2 / 6 * gravity
+    total, moment = ca.SX.zeros(3), ca.SX.zeros(3)  # about the CoM at the knot
     for i in range(contacts):
         rotation, position = ca.reshape(p(9), 3, 3).T, p(3)
         if moving:
             position += p() * displacement(rotation, offsets[2 * i : 2 * i + 2])
         force = rotation @ wrenches[WRENCH * i : WRENCH * i + 3]
         total += force
-        moment += ca.cross(position - middle, force) + rotation @ wrenches[WRENCH * i + 3 : WRENCH * i + 6]
-    acceleration = G * total + gravity
-    following = ca.vertcat(
-        r + dt * v + dt**2 / 2 * acceleration, v + dt * acceleration, kappa + dt * G * moment, acceleration
-    )
+        moment += ca.cross(position - r, force) + rotation @ wrenches[WRENCH * i + 3 : WRENCH * i + 6]
+    acceleration = G * total + ca.DM(GRAVITY)
+    rate = ca.vertcat(*spin_rate(dt, G, ca.vertcat(ca.DM.zeros(3), v), G * total, G * moment))
+    moved = ca.vertcat(*advanced(dt, G, x, acceleration, G * moment)[:6])
+    following = ca.vertcat(moved, kappa + dt * rate, acceleration)
     weights, height = p(6), p()
     rho = ca.vertcat(
         weights[0] * after[3:6],
         weights[1] * after[9:12],
         weights[2] * after[6:9],
-        weights[3] * G * moment,
+        weights[3] * rate,
         weights[4] * (acceleration - before),
         weights[5] * (after[2] - height),
     )
@@ -137,11 +135,13 @@ def _contact() -> Piece:
     wrench, slack, excess = ca.SX.sym("w", WRENCH), ca.SX.sym("s", 2), ca.SX.sym("e")
     mu, half, wanted, cop_margin, yaw_factor = p(), p(2), p(), p(2), p()
     least, least_cop, least_yaw, weights, load, price = p(), p(2), p(), p(6), p(), p()
-    fx, fy, fz, tx, ty, tz = ca.vertsplit(wrench)
+    fx, fy, fz = ca.vertsplit(wrench[:3])
     held = mu * (wanted * fz + (least - wanted) * slack[0] + excess) + 1e-7
     cone = held - (fx**2 + fy**2) / held  # smooth at rest, unlike the square root
-    x, y = ca.vertsplit((half - cop_margin) * fz + (cop_margin - least_cop) * slack[1] + half * excess)
-    rows = [cone, x - ty, x + ty, y - tx, y + tx, fz - slack[0], fz - slack[1]]
+    wider_x, wider_y = ca.vertsplit((cop_margin - least_cop) * slack[1] + half * excess)
+    inside = [-ca.dot(ca.vertcat(*row), wrench) for row in pressure_rows(*ca.vertsplit(half - cop_margin))]
+    rows = [cone, inside[0] + wider_y, inside[1] + wider_y, inside[2] + wider_x, inside[3] + wider_x]
+    rows += [fz - slack[0], fz - slack[1]]
     # Yaw: the wanted part of the range under the margins, and the whole physical range: a moment of the wrong sign can
     # be within a part of the range but not in the range itself.
     most = 2 * mu * (half[0] + half[1])
@@ -150,12 +150,9 @@ def _contact() -> Piece:
         (least_yaw, mu * least, half - least_cop, most * excess),
     ]
     for factor, friction, (hx, hy), more in ((a, b, ca.vertsplit(c), d) for a, b, c, d in ranges):
-        room = friction * (hx + hy) * fz
-        for s in (-1, 1):
-            for q in (-1, 1):
-                low = room + s * (hy * fx - friction * tx) + q * (hx * fy - friction * ty)
-                high = room + s * (hy * fx + friction * tx) + q * (hx * fy + friction * ty)
-                rows += [factor * low + more + tz, factor * high + more - tz]
+        for signs in SIGNS:
+            row = ca.vertcat(*yaw_row(friction, hx, hy, *signs))
+            rows.append(more - factor * ca.dot(row[:5], wrench[:5]) - row[5] * wrench[5])
     v = ca.vertcat(wrench, slack, excess)
     tilt = ca.jacobian(wrench[:2], v) - ca.vertcat(fx, fy) / held @ ca.jacobian(held, v)
 
@@ -163,16 +160,14 @@ def _contact() -> Piece:
         return (20 * ca.fmax(-multiplier[0], 0) / held) * (tilt.T @ tilt)
 
     pressed = fz + 0.01  # an unloaded contact has no CoP: keeps the objective smooth there
-    cop = ca.vertcat(-ty, tx) / pressed
-    off_centre = weights[3] * cop / (2 * half)
-    leverage = cop[1] * fx - cop[0] * fy
-    spin = weights[2] * (tz + leverage)
+    *cop, twist = pressure(wrench, pressed)
+    off_centre, spin = weights[3] * ca.vertcat(*cop) / (2 * half), weights[2] * twist
     rho = ca.vertcat(
         weights[0] * wrench[:3],
         weights[1] * wrench[:2],
         spin,
         off_centre,
-        weights[4] * ca.vertcat(-ty, tx) / (2 * half),
+        weights[4] * pressed * ca.vertcat(*cop) / (2 * half),
         weights[5] * (fz - load),
         ca.sqrt(EVEN * price) * slack,
     )
@@ -180,7 +175,7 @@ def _contact() -> Piece:
     # The square of a ratio t / f bends three times as much along f as Gauss-Newton knows: where a contact is lightly
     # loaded, steps would swing ever farther around the solution.
     bend = ca.SX(CONTACT + 1, CONTACT + 1)
-    bend[2, 2] = 4 * (ca.sumsqr(off_centre) + ca.fmax(spin * weights[2] * leverage, 0)) / pressed**2
+    bend[2, 2] = 4 * (ca.sumsqr(off_centre) + ca.fmax(spin * weights[2] * (twist - wrench[5]), 0)) / pressed**2
     rows = 10 * ca.vertcat(*rows)
     return Piece("contact", v, p.vector, rho=rho, linear=linear, rows=rows, bend=bend, curvature=curvature)
 

@@ -2,15 +2,8 @@
 
 Both solvers, the residual check and the training data speak of a motion in these terms. Time is cut into N intervals
 ("steps") with constant contact wrenches; knots 0..N bound them. Since the wrench is constant on an interval, the
-linear dynamics and the moment about the world origin integrate exactly:
-
-    l_{t+1} = l_t + dt (sum f + m g)
-    r_{t+1} = r_t + dt l_t / m + dt^2 / (2 m) (sum f + m g)
-    L_{t+1} = L_t + dt sum (p x f + tau) + (dt r_t + dt^2 l_t / (2 m) + dt^3 / (6 m) (sum f + m g)) x m g
-    k_t     = L_t - r_t x l_t
-
-with L the angular momentum about the world origin, linear in the wrenches, and k the one about the CoM: the paper's
-Eq. 3 without discretisation error. (p, tau): wrench at the centre of the patch, tau = R (z x R^T f) + tau_n n.
+paper's Eq. 3 integrates without discretisation error: see `toolkit.physics.momentum`. At a contact act a force f at the
+centre of pressure z, and a torque tau_n about the normal there; `toolkit.physics.wrench` says within which bounds.
 
 The objective is the paper's weighted sum of squares (Sec. IV), each step weighted by dt / 0.2 s, so that it is an
 integral over time and equals the paper's sum at the paper's step:
@@ -28,6 +21,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from toolkit.physics.momentum import ballistic
 
 STANDARD_GRAVITY = 9.81  # m/s^2
 GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
@@ -60,6 +55,10 @@ class Margins:
     friction: float = 1.0
     cop: tuple[float, float] = (0.0, 0.0)
     yaw: float = 1.0
+
+    def within(self, half_size: np.ndarray) -> np.ndarray:
+        """(..., 2) m; the half extents of patches with the CoP margin taken off, at most half of each."""
+        return half_size - np.minimum(self.cop, half_size / 2)
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,7 @@ class CentroidalProblem:
     @property
     def reduced_half_size(self) -> np.ndarray:
         """(4, 2) m; half extents that bound the CoP and the yaw moment: the CoP margin taken off, at most half."""
-        return self.half_size - np.minimum(self.margins.cop, self.half_size / 2)
+        return self.margins.within(self.half_size)
 
     @property
     def times(self) -> np.ndarray:
@@ -176,5 +175,5 @@ class CentroidalMotion:
         tau = time - times[step]
         acceleration = self.force[step].sum(0) / problem.mass + GRAVITY
         velocity = self.linear_momentum[step] / problem.mass
-        position = self.com[step] + tau * velocity + 0.5 * tau**2 * acceleration
+        position = ballistic(tau, self.com[step], velocity, acceleration)
         return position, velocity + tau * acceleration, acceleration

@@ -24,6 +24,7 @@ from toolkit.centroidal.verdict import judged
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.errors import InputError
 from toolkit.geometry.limb import FEET
+from toolkit.physics.wrench import pressure
 from toolkit.robot.model import RobotModel
 
 WANTED = Margins(friction=0.66, cop=(0.055, 0.045), yaw=0.6)
@@ -216,11 +217,8 @@ def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
     step, limb = np.nonzero(p.active)
     local[step, limb] = weight * x[indices(layout.wrench[step, limb], 3)]
     moment[step, limb] = weight * x[indices(layout.wrench[step, limb] + 3, 3)]
-    normal = local[..., 2]
-    loaded = normal > 1e-7 * weight
-    scale = np.where(loaded, normal, 1.0)
-    cop = np.where(loaded[..., None], np.stack([-moment[..., 1], moment[..., 0]], -1) / scale[..., None], 0.0)
-    torque = moment[..., 2] - cop[..., 0] * local[..., 1] + cop[..., 1] * local[..., 0]
+    load = np.where(local[..., 2] > 1e-7 * weight, local[..., 2], np.inf)
+    *cop, torque = pressure((*np.moveaxis(local, -1, 0), *np.moveaxis(moment, -1, 0)), load)
     state = x[layout.offset[:, None] + np.arange(9)]
     return CentroidalMotion(
         problem=p,
@@ -230,7 +228,7 @@ def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
         linear_momentum=p.mass * state[:, 3:6],
         angular_momentum=p.mass * state[:, 6:9],
         force=np.einsum("tlij,tlj->tli", p.rotation, local),
-        cop=cop,
+        cop=np.stack(cop, -1),
         yaw_torque=torque,
         objective=np.inf,
         seconds=0.0,

@@ -6,7 +6,7 @@ import daqp
 import numpy as np
 
 from toolkit.geometry.limb import Limb
-from toolkit.physics.cone import foot_rows, friction_rows
+from toolkit.physics.wrench import foot_rows, friction_rows
 
 UNBOUNDED = 1e30
 FORCE_UNIT = 100.0  # N or N m per unit of the solver's variables: keeps the Hessian's entries alike

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.centroidal import fast
+from toolkit.centroidal.arrays import ProblemArrays
 from toolkit.centroidal.build import ProblemConfig, transition_problem
-from toolkit.centroidal.bulk_check import residual_and_objective
-from toolkit.centroidal.residual import TOLERANCE
+from toolkit.centroidal.residual import evaluate
 from toolkit.contacts.category import category_of
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
@@ -65,10 +65,10 @@ def label(
         if found is None:
             continue
         motion, derivatives = found
-        worst, value = residual_and_objective(problem, motion)
-        if worst <= TOLERANCE:
+        residuals, value = evaluate(ProblemArrays.of(problem), motion)
+        if residuals.within():
             feasible[row], objective[row] = True, value
-            final_com[row], velocity[row] = motion[0][-1], motion[1][-1] / problem.mass
+            final_com[row], velocity[row] = motion.com[-1], motion.linear_momentum[-1] / problem.mass
             if (start[row] == com[row]).all():
                 sensitivity[row] = derivatives
     return Labels(feasible, objective, final_com, velocity, tuple(sensitivity))

@@ -8,6 +8,7 @@ import numpy as np
 
 from toolkit.centroidal.problem import STANDARD_GRAVITY
 from toolkit.geometry.limb import FEET
+from toolkit.physics.momentum import advanced, ballistic, fill_wrench_map
 from toolkit.replanning.contacts import ContactTable, Situation
 from toolkit.replanning.kernel import GIVEN
 from toolkit.replanning.nominal import Nominal
@@ -45,7 +46,7 @@ class Window:
         spin, made = nominal.spin[knots].copy(), nominal.wrench_spin[knots].copy()
         inside = time - nominal.times[first]
         times[0] = time
-        com[0] += inside * (velocity[0] + 0.5 * inside * nominal.acceleration[first])
+        com[0] = ballistic(inside, com[0], velocity[0], nominal.acceleration[first])
         velocity[0] += inside * nominal.acceleration[first]
         for each in (spin, made):
             each[0] += inside / (nominal.times[first + 1] - nominal.times[first]) * (each[1] - each[0])
@@ -174,20 +175,16 @@ class Dynamics:
         turn, wrench = contacts.rotation[step, limb], planned[step, limb]
         lever = contacts.position[step, limb] + contacts.shift[step, limb] - origin
         spread = np.zeros((len(step), 6, 6))
-        spread[:, :3, :3] = spread[:, 3:, 3:] = G * turn
-        spread[:, 3:, :3] = G * np.cross(lever[:, None], turn.swapaxes(1, 2)).swapaxes(1, 2)
+        fill_wrench_map(G * np.moveaxis(turn, 0, 2), lever.T, np.moveaxis(spread, 0, 2))
         pull = np.einsum("cij,cj->ci", spread, wrench)
         pulls = np.zeros((steps, 6))
         np.add.at(pulls, step, pull)
         pulls[:, 2] -= G
 
         a, b = np.tile(np.eye(size), (steps, 1, 1)), np.zeros((steps, size, 6))
-        axis = np.arange(3)
-        half, cube = dt**2 / 2, dt**3 / 6
-        a[:, axis, 3 + axis] = dt[:, None]
-        a[:, 6, 1], a[:, 6, 4], a[:, 7, 0], a[:, 7, 3] = -G * dt, -G * half, G * dt, G * half
-        b[:, axis, axis], b[:, 3 + axis, axis], b[:, 6 + axis, 3 + axis] = half[:, None], dt[:, None], dt[:, None]
-        b[:, 6, 1], b[:, 7, 0] = -G * cube, G * cube
+        unit = np.eye(15)[:, None]  # of state, acceleration and moment
+        moved = np.broadcast_arrays(*advanced(dt[:, None], G, unit[:9], unit[9:12], unit[12:]))
+        a[:, :9, :9], b[:, :9] = np.split(np.stack(moved, 1), [9], 2)
         column = landings.column[step, limb]
         for c in np.flatnonzero(column >= 0):
             t, plane = step[c], landings.planes[column[c]]
@@ -206,10 +203,10 @@ def _planned_rates(window: Window) -> np.ndarray:
     about = window.wrench_spin + np.cross(window.com - origin, window.velocity)
     rates = np.zeros((window.steps, 6))
     rates[:, :3] = np.diff(window.velocity, axis=0) / dt[:, None]
-    weight_moment = np.zeros((window.steps, 3))
-    mean = window.com[:-1] + dt[:, None] * (window.velocity[:-1] / 2 + dt[:, None] * rates[:, :3] / 6) - origin
-    weight_moment[:, 0], weight_moment[:, 1] = -G * mean[:, 1], G * mean[:, 0]
-    rates[:, 3:] = np.diff(about, axis=0) / dt[:, None] - weight_moment
+    state = np.concatenate([window.com - origin, window.velocity, about], 1)
+    # The moment is what is missing to the angular momentum of the next knot without one.
+    without = np.stack(advanced(dt, G, state[:-1].T, rates[:, :3].T, np.zeros((3, 1))), 1)
+    rates[:, 3:] = (about[1:] - without[:, 6:]) / dt[:, None]
     return rates
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from toolkit.contacts.stance import Contact
 from toolkit.control.target import Cones
 from toolkit.geometry.pose import Pose
-from toolkit.physics.cone import friction_rows, sole_rows
+from toolkit.physics.wrench import friction_rows, sole_rows
 from toolkit.replanning.config import ReplanConfig
 from toolkit.replanning.contacts import ContactTable, Situation
 from toolkit.replanning.dynamics import Dynamics, FreeLandings, Window

@@ -93,6 +93,15 @@ def slope(data, model, du, dx):
     return total
 
 
+class Change(NamedTuple):
+    """Change of the wrenches (C, 6), the states (N + 1, 9), the slacks and the multipliers."""
+
+    wrenches: np.ndarray
+    states: np.ndarray
+    slacks: constraints.Point
+    multipliers: constraints.Point
+
+
 class Scaling(NamedTuple):
     """Nesterov-Todd scaling: W^-2 of the half lines; w, eta and lambda of the cones (see `cone`)."""
 
@@ -130,8 +139,8 @@ def enter_cones(residual, s):
 
 
 @compiled(reordered=True)
-def direction(data, model, sweep, scaling, residual, s, z, gap, correct, targets, scratch, du, dx, ds, dz):
-    """Fill the step that aims at complementarity `gap`.
+def direction(data, model, sweep, scaling, residual, s, z, gap, correct, targets, scratch, change):
+    """Fill the change that aims at complementarity `gap`.
 
     Args:
         data: the problem.
@@ -142,14 +151,12 @@ def direction(data, model, sweep, scaling, residual, s, z, gap, correct, targets
         s: slacks, and
         z: multipliers.
         gap: sigma mu.
-        correct: whether (ds, dz) hold the predictor, whose second-order term is then corrected.
+        correct: whether the change holds the predictor, whose second-order term is then corrected.
         targets: room for a point.
         scratch: room for the gradients of the contacts and of the knots.
-        du: filled; with
-        dx: and
-        ds: and
-        dz: the step.
+        change: filled.
     """
+    du, dx, ds, dz = change
     p, q = np.empty(4), np.empty(4)
     # The multipliers that the step leads to, before the change of the slacks is known.
     for i in range(s.line.shape[0]):
@@ -220,6 +227,7 @@ def solve(data, tolerance, max_iterations, u, x, w, z):
     sweep = riccati.allocate(n, contacts)
     scratch = (np.empty((contacts, 6)), np.empty((n + 1, 9)))
     du, dx, u_trial = np.empty((contacts, 6)), np.empty((n + 1, 9)), np.empty((contacts, 6))
+    change = Change(du, dx, ds, dz)
     y_rest, velocity, y_refuting = np.zeros(3), np.zeros(3), np.zeros(3)
 
     constraints.constants(data, constant)
@@ -252,7 +260,7 @@ def solve(data, tolerance, max_iterations, u, x, w, z):
         goal, before, step = 0.0, 0.0, 0.0
         for phase in range(3):
             correct = phase == 1
-            direction(data, model, sweep, scaling, residual, s, z, goal, correct, targets, scratch, du, dx, ds, dz)
+            direction(data, model, sweep, scaling, residual, s, z, goal, correct, targets, scratch, change)
             if phase == 0:
                 if worst < FEASIBLE and gap < accepted and abs(slope(data, model, du, dx)) < accepted:
                     return SOLVED, iteration

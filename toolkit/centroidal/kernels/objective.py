@@ -8,14 +8,16 @@ import numpy as np
 
 from toolkit.centroidal.kernels import riccati
 from toolkit.compiled import compiled
+from toolkit.physics.momentum import advanced, mean_com, spin, spin_rate
+from toolkit.physics.wrench import pressure
 
 
 @compiled(reordered=True)
 def advance(h, x, w, out):
     """Fill the knot `out` (9,) after a step of length h from x (9,) under the total wrench w (6,)."""
-    riccati.forward(h, x, w, out)
-    out[2] -= 0.5 * h * h
-    out[5] -= h
+    state = advanced(h, 1.0, x, (w[0], w[1], w[2] - 1.0), w[3:])
+    for a in range(9):
+        out[a] = state[a]
 
 
 @compiled(reordered=True)
@@ -34,8 +36,7 @@ def contact_terms(omega, weights, cop_weight, u, gradient, hessian):
     weight_f, weight_lateral, weight_torque = omega * weights[4], omega * weights[6], omega * weights[5]
     weight_x, weight_y = omega * cop_weight[0], omega * cop_weight[1]
     inverse = 1.0 / u[2]
-    cop_x, cop_y = -u[4] * inverse, u[3] * inverse
-    twist = u[5] + (u[4] * u[1] + u[3] * u[0]) * inverse
+    cop_x, cop_y, twist = pressure(u, u[2])
     # Row of the twist: d tau_n / d (fx, fy, fz, tx, ty, tz).
     row = np.empty(6)
     row[0], row[1], row[2] = u[3] * inverse, u[4] * inverse, -(twist - u[5]) * inverse
@@ -68,11 +69,8 @@ def contact_terms(omega, weights, cop_weight, u, gradient, hessian):
 def knot_terms(omega, weights, x, gradient, hessian):
     """Add to gradient (9,) and Hessian (9, 9) the terms |l|^2 and |k|^2 of a knot x, k = L - r x v; returns them."""
     wl, wk = omega * weights[0], omega * weights[2]
-    k = np.empty(3)
+    k = spin(x)
     jacobian = np.zeros((3, 9))
-    k[0] = x[6] - (x[1] * x[5] - x[2] * x[4])
-    k[1] = x[7] - (x[2] * x[3] - x[0] * x[5])
-    k[2] = x[8] - (x[0] * x[4] - x[1] * x[3])
     # dk = dL + v x dr - r x dv
     for c in range(2):
         base, sign = (0, 1.0) if c == 0 else (3, -1.0)
@@ -98,14 +96,7 @@ def knot_terms(omega, weights, x, gradient, hessian):
 def step_terms(h, omega, weights, x, w, gradient, hessian):
     """Gradient (15,) and Hessian (15, 15) in (x, w) of the terms |l'|^2 and |k'|^2 of a step; returns their value."""
     wl, wk = omega * weights[1], omega * weights[3]
-    mean = np.empty(3)
-    for a in range(3):
-        mean[a] = x[a] + 0.5 * h * x[3 + a]
-    mean[2] -= h * h / 6
-    rate = np.empty(3)
-    rate[0] = w[3] - (mean[1] * w[2] - mean[2] * w[1])
-    rate[1] = w[4] - (mean[2] * w[0] - mean[0] * w[2])
-    rate[2] = w[5] - (mean[0] * w[1] - mean[1] * w[0])
+    mean, rate = mean_com(h, 1.0, x), spin_rate(h, 1.0, x, w, w[3:])
     # d rate = dM - mean x dF + F x (dr + h/2 dv)
     jacobian = np.zeros((3, 15))
     jacobian[0, 1], jacobian[0, 2] = -w[2], w[1]
@@ -141,20 +132,15 @@ def value(data, u, x, w):
     for t in range(data.h.shape[0]):
         step = 0.0
         for j in range(data.first[t], data.first[t + 1]):
-            fx, fy, fz, tx, ty, tz = u[j, 0], u[j, 1], u[j, 2], u[j, 3], u[j, 4], u[j, 5]
-            twist = tz + (ty * fy + tx * fx) / fz
+            fx, fy, fz = u[j, 0], u[j, 1], u[j, 2]
+            cop_x, cop_y, twist = pressure(u[j], fz)
             step += weights[4] * (fx * fx + fy * fy + fz * fz) + weights[6] * (fx * fx + fy * fy)
             step += weights[5] * twist * twist
-            step += (data.cop_weight[j, 0] * ty * ty + data.cop_weight[j, 1] * tx * tx) / (fz * fz)
-        h, after = data.h[t], x[t + 1]
+            step += data.cop_weight[j, 0] * cop_x * cop_x + data.cop_weight[j, 1] * cop_y * cop_y
+        k, rate = spin(x[t + 1]), spin_rate(data.h[t], 1.0, x[t], w[t], w[t, 3:])
         for a in range(3):
-            b, c = (a + 1) % 3, (a + 2) % 3
-            mean_b = x[t, b] + 0.5 * h * x[t, 3 + b] - (h * h / 6 if b == 2 else 0.0)
-            mean_c = x[t, c] + 0.5 * h * x[t, 3 + c] - (h * h / 6 if c == 2 else 0.0)
-            rate = w[t, 3 + a] - (mean_b * w[t, c] - mean_c * w[t, b])
-            linear = w[t, a] - (1.0 if a == 2 else 0.0)
-            k = after[6 + a] - (after[b] * after[3 + c] - after[c] * after[3 + b])
-            step += weights[0] * after[3 + a] * after[3 + a] + weights[1] * linear * linear
-            step += weights[2] * k * k + weights[3] * rate * rate
+            v, linear = x[t + 1, 3 + a], w[t, a] - (1.0 if a == 2 else 0.0)
+            step += weights[0] * v * v + weights[1] * linear * linear
+            step += weights[2] * k[a] * k[a] + weights[3] * rate[a] * rate[a]
         total += 0.5 * data.omega[t] * step
     return total

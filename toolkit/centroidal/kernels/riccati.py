@@ -12,6 +12,7 @@ import numpy as np
 
 from toolkit.centroidal.kernels.elimination import cholesky, solve_lower, solve_upper
 from toolkit.compiled import compiled
+from toolkit.physics.momentum import advanced
 
 
 class Sweep(NamedTuple):
@@ -53,12 +54,9 @@ def allocate(n, contacts):
 @compiled(reordered=True)
 def forward(h, x, w, out):
     """Out = A x + B w: the dynamics' linear part, gravity's constant left out."""
-    for a in range(3):
-        out[a] = x[a] + h * x[3 + a] + 0.5 * h * h * w[a]
-        out[3 + a] = x[3 + a] + h * w[a]
-        out[6 + a] = x[6 + a] + h * w[3 + a]
-    out[6] -= h * x[1] + h * h / 2 * x[4] + h**3 / 6 * w[1]
-    out[7] += h * x[0] + h * h / 2 * x[3] + h**3 / 6 * w[0]
+    state = advanced(h, 1.0, x, w[:3], w[3:])
+    for a in range(9):
+        out[a] = state[a]
 
 
 @compiled(reordered=True)

@@ -54,76 +54,73 @@ def heading(left, right):
 
 
 @compiled(reordered=True)
-def vary(kind, row, axis, step, arguments):
-    """The arguments of `setup.pack` with one thing changed by a step, and what follows from it.
+def restore(problem, varied):
+    """Make equal again what `vary` changes."""
+    varied.dt[:], varied.yaw[:], varied.com[:] = problem.dt, problem.yaw, problem.com
+    varied.position[:], varied.rotation[:], varied.friction[:] = problem.position, problem.rotation, problem.friction
+    varied.com_velocity[:], varied.final_center[:] = problem.com_velocity, problem.final_center
+    varied.landing_position[:], varied.landing_rotation[:] = problem.landing_position, problem.landing_rotation
+
+
+@compiled(reordered=True)
+def vary(kind, row, axis, step, p):
+    """Change one thing of a problem by a step, and what follows from it.
 
     Args:
         kind: PLACE or ROTATION of the contact `row`, COM, VELOCITY, DURATION of the phase `axis`, or FRICTION.
         row: limb, or NEW.
         axis: of the world.
         step: how much.
-        arguments: of a problem from `build.transition_problem`.
+        p: `ProblemArrays` from `build.transition_problem`; changed.
     """
-    (mass, dt, active, position, rotation, friction, half_size, reduced, force, yaw, com, velocity, angular, root, tip,
-     reach, height, center, box, rest, weights, grip, yaw_margin, limb, place, frame) = arguments  # fmt: skip
-    n = dt.shape[0]
+    n, limb = p.dt.shape[0], p.landing_limb
     half = n // 2
     if kind == PLACE:
         if row == NEW:
-            place = place.copy()
-            place[axis] += step
+            p.landing_position[axis] += step
         else:
-            position = position.copy()
             for t in range(n):
-                position[t, row, axis] += step
+                p.position[t, row, axis] += step
         # The final box stands over the mean of the feet after the transition.
         if (row == NEW and limb < 2) or (row < 2 and row != limb):
-            center = center.copy()
-            center[axis] += 0.5 * step
+            p.final_center[axis] += 0.5 * step
     elif kind == ROTATION:
         if row == NEW:
-            frame = frame.copy()
-            turn(frame, axis, step)
+            turn(p.landing_rotation, axis, step)
         else:
-            rotation = rotation.copy()
             for t in range(n):
-                turn(rotation[t, row], axis, step)
-        left, right = rotation[0, 0], rotation[0, 1]
+                turn(p.rotation[t, row], axis, step)
+        left, right = p.rotation[0, 0], p.rotation[0, 1]
         begin = heading(left, right)
-        change = heading(frame if limb == 0 else left, frame if limb == 1 else right) - begin
+        change = heading(p.landing_rotation if limb == 0 else left, p.landing_rotation if limb == 1 else right) - begin
         change -= 2.0 * math.pi * round(change / (2.0 * math.pi))
-        yaw = yaw.copy()
         for t in range(n + 1):
-            yaw[t] = begin + change * max(t - half, 0) / half
+            p.yaw[t] = begin + change * max(t - half, 0) / half
     elif kind == COM:
-        com = com.copy()
-        com[axis] += step
+        p.com[axis] += step
     elif kind == VELOCITY:
-        velocity = velocity.copy()
-        velocity[axis] += step
+        p.com_velocity[axis] += step
     elif kind == DURATION:
-        dt = dt.copy()
         for t in range(half):
-            dt[t + half * axis] += step / half
+            p.dt[t + half * axis] += step / half
     else:
-        friction = friction + step
-    return (mass, dt, active, position, rotation, friction, half_size, reduced, force, yaw, com, velocity, angular,
-            root, tip, reach, height, center, box, rest, weights, grip, yaw_margin, limb, place, frame)  # fmt: skip
+        p.friction[:] += step
 
 
 @compiled(reordered=True)
-def derivatives(u, z, arguments):
+def derivatives(u, z, problem, varied):
     """Derivatives of the least objective of a transition.
 
     Args:
         u: (C, 6) wrenches, and
         z: multipliers of the solution.
-        arguments: of `setup.pack`, of a problem from `build.transition_problem`.
+        problem: `ProblemArrays` from `build.transition_problem`.
+        varied: a copy, which is changed.
 
     Returns:
         (5, 6) and (9,), as in `fast.Sensitivity`.
     """
-    active, limb, n = arguments[2], arguments[23], arguments[1].shape[0]
+    n = problem.dt.shape[0]
     contacts, others = np.zeros((5, 6)), np.zeros(9)
     x, w = np.zeros((n + 1, 9)), np.zeros((n, 6))
     slack = constraints.room(z.line.shape[0], z.round.shape[0])
@@ -134,11 +131,13 @@ def derivatives(u, z, arguments):
             kind = COM + (k - 30) // 3
         if k == 38:
             kind = FRICTION
-        if (row < NEW and not active[0, row]) or (row == NEW and limb < 0):
+        if (row < NEW and not problem.active[0, row]) or (row == NEW and problem.landing_limb < 0):
             continue
         change = 0.0
         for sign in (-1.0, 1.0):
-            data, _ = setup.pack(*vary(kind, row, axis, sign * STEP, arguments))
+            restore(problem, varied)
+            vary(kind, row, axis, sign * STEP, varied)
+            data, _ = setup.pack(varied)
             change += sign * lagrangian(data, u, z, x, w, slack, constant)
         change /= 2.0 * STEP * setup.SCALE
         if k < 30:

@@ -3,11 +3,8 @@
 Mass, g, 1 m and the weight are the units, so time is counted in sqrt(1 m / g) = 0.32 s; positions count from the
 initial CoM. The state x = (r, v, L) has the angular momentum L about that origin; w = (F, M) is the total force and its
 moment about the origin; u = (f, tau) is a contact's wrench at the centre of its patch in the contact frame,
-w = sum B u. Then
-
-    r' = r + h v + h^2/2 (F + g),   v' = v + h (F + g),   L' = L + h M + (h r + h^2/2 v + h^3/6 F) x g
-
-is linear and every constraint is convex: slack s = offset + rows u >= 0 (force bound, CoP, yaw moment), the friction
+w = sum B u. The dynamics (`toolkit.physics.momentum`) are linear in them
+and every constraint is convex: slack s = offset + rows u >= 0 (force bound, CoP, yaw moment), the friction
 cone (mu f_z, f_x, f_y), balls (radius, r - centre) for reach and planes offset + normal r >= 0 for height and final
 box.
 """
@@ -17,9 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from toolkit.centroidal.arrays import MotionArrays
 from toolkit.centroidal.kernels import knots
 from toolkit.centroidal.problem import STANDARD_GRAVITY
 from toolkit.compiled import compiled
+from toolkit.physics.momentum import fill_wrench_map, spin
+from toolkit.physics.wrench import pressure, pressure_rows, yaw_row
 
 ROWS = 13
 """Linear constraints of a contact."""
@@ -73,135 +73,84 @@ class Data(NamedTuple):
 
 
 @compiled(reordered=True)
-def contact_rows(mu, x, y, bound, yaw, rows):
-    """Fill the 13 rows of a contact: force bound, 4 of the CoP, 8 of the yaw moment (Caron et al. 2015)."""
-    rows[:] = 0.0
-    rows[0, 2] = -1.0 / bound
-    for i in range(4):
-        rows[1 + i, 2] = 1.0
-    rows[1, 3], rows[2, 3] = 1.0 / y, -1.0 / y
-    rows[3, 4], rows[4, 4] = 1.0 / x, -1.0 / x
-    scale = 1.0 / (mu * (x + y))
-    for i in range(8):
-        sign = 1.0 if i & 4 else -1.0
-        a = 1.0 if i & 1 else -1.0
-        b = 1.0 if i & 2 else -1.0
-        rows[5 + i, 0], rows[5 + i, 1], rows[5 + i, 2] = -a * y * scale, -b * x * scale, 1.0
-        rows[5 + i, 3], rows[5 + i, 4] = -a * sign * mu * scale, -b * sign * mu * scale
-        rows[5 + i, 5] = -sign * scale / yaw
+def fill_row(row, out):
+    """Fill a row (6,) of the constraints, in parts of what fz allows."""
+    part = 1.0 / row[2]
+    out[0], out[1], out[2] = part * row[0], part * row[1], 1.0
+    out[3], out[4], out[5] = part * row[3], part * row[4], part * row[5]
 
 
 @compiled(reordered=True)
-def pack(
-    mass,
-    dt,
-    active,
-    position,
-    rotation,
-    friction,
-    half_size,
-    reduced_half_size,
-    max_normal_force,
-    yaw,
-    com,
-    com_velocity,
-    angular_momentum,
-    root_in_com,
-    tip_in_contact,
-    max_reach,
-    min_height,
-    final_center,
-    final_half_size,
-    rest,
-    weights,
-    friction_margin,
-    yaw_margin,
-    landing_limb,
-    landing_position,
-    landing_rotation,
-):
-    """The problem's arrays (see `CentroidalProblem`) as `Data`; also the largest violation of the first knot, in m."""
-    n, total = dt.shape[0], 0
+def contact_rows(mu, x, y, bound, yaw, rows):
+    """Fill the 13 rows of a contact: force bound, 4 of the CoP, 8 of the yaw moment."""
+    rows[0] = 0.0
+    rows[0, 2] = -1.0 / bound
+    pressing = pressure_rows(x, y)
+    fill_row(pressing[0], rows[1])
+    fill_row(pressing[1], rows[2])
+    fill_row(pressing[2], rows[3])
+    fill_row(pressing[3], rows[4])
+    for i in range(8):
+        row = yaw_row(mu, x, y, 1.0 if i & 1 else -1.0, 1.0 if i & 2 else -1.0, 1.0 if i & 4 else -1.0)
+        fill_row(row, rows[5 + i])
+        rows[5 + i, 5] /= yaw
+
+
+@compiled(reordered=True)
+def pack(p):
+    """A problem (`ProblemArrays`) as `Data`; also the largest violation of the first knot, in m."""
+    n, total = p.dt.shape[0], 0
     for t in range(n):
         for i in range(4):
-            total += active[t, i]
-    unit = math.sqrt(STANDARD_GRAVITY)
+            total += p.active[t, i]
+    unit, weight = math.sqrt(STANDARD_GRAVITY), p.mass * STANDARD_GRAVITY
     h, omega, w = np.empty(n), np.empty(n), np.empty(8)
     first, frames, wrench = np.zeros(n + 1, np.int64), np.empty((total, 3, 3)), np.zeros((total, 6, 6))
     mu, bound, lever = np.empty(total), np.empty(total), np.empty(3)
     rows, offset, cop_weight = np.empty((total, ROWS, 6)), np.zeros((total, ROWS)), np.zeros((total, 2))
     for i in range(8):
-        w[i] = 2.0 * SCALE * weights[i]
+        w[i] = 2.0 * SCALE * p.weights[i]
         if i == 0 or i == 2:
-            w[i] *= mass * mass * STANDARD_GRAVITY
+            w[i] *= p.mass * p.mass * STANDARD_GRAVITY
         elif i == 1 or i == 3 or i == 5:
-            w[i] *= (mass * STANDARD_GRAVITY) ** 2
+            w[i] *= weight**2
     j = 0
     for t in range(n):
-        h[t], omega[t] = dt[t] * unit, dt[t] / 0.2
+        h[t], omega[t] = p.dt[t] * unit, p.dt[t] / 0.2
         first[t] = j
         for i in range(4):
-            if not active[t, i]:
+            if not p.active[t, i]:
                 continue
             for a in range(3):
-                lever[a] = position[t, i, a] - com[a]
+                lever[a] = p.position[t, i, a] - p.com[a]
                 for b in range(3):
-                    frames[j, a, b] = rotation[t, i, a, b]
-            for b in range(3):
-                for a in range(3):
-                    c, e = (a + 1) % 3, (a + 2) % 3
-                    wrench[j, a, b] = wrench[j, 3 + a, 3 + b] = frames[j, a, b]
-                    wrench[j, 3 + a, b] = lever[c] * frames[j, e, b] - lever[e] * frames[j, c, b]
-            mu[j] = max(friction[t, i] * friction_margin, SMALLEST)
-            bound[j] = min(max_normal_force[i] / (mass * STANDARD_GRAVITY), UNBOUNDED_FORCE)
-            x, y = max(reduced_half_size[i, 0], SMALLEST), max(reduced_half_size[i, 1], SMALLEST)
-            contact_rows(mu[j], x, y, bound[j], max(yaw_margin, SMALLEST), rows[j])
+                    frames[j, a, b] = p.rotation[t, i, a, b]
+            fill_wrench_map(frames[j], lever, wrench[j])
+            mu[j] = max(p.friction[t, i] * p.friction_margin, SMALLEST)
+            bound[j] = min(p.max_normal_force[i] / weight, UNBOUNDED_FORCE)
+            x, y = max(p.reduced_half_size[i, 0], SMALLEST), max(p.reduced_half_size[i, 1], SMALLEST)
+            contact_rows(mu[j], x, y, bound[j], max(p.yaw_margin, SMALLEST), rows[j])
             offset[j, 0] = 1.0
             for a in range(2):
-                if half_size[i, a] > 0.0:
-                    cop_weight[j, a] = w[7] / (2.0 * half_size[i, a]) ** 2
+                if p.half_size[i, a] > 0.0:
+                    cop_weight[j, a] = w[7] / (2.0 * p.half_size[i, a]) ** 2
             j += 1
     first[n] = j
 
-    ball_first, ball_center, ball_radius = (
-        np.zeros(n + 2, np.int64),
-        np.empty((2 * total + 1, 3)),
-        np.empty(2 * total + 1),
-    )
-    plane_first, plane_normal, plane_offset = np.zeros(n + 2, np.int64), np.zeros((n + 7, 3)), np.empty(n + 7)
-    lowest = np.full(n + 1, np.inf)
-    knots.reach(
-        active,
-        position,
-        rotation,
-        yaw,
-        com,
-        root_in_com,
-        tip_in_contact,
-        max_reach,
-        landing_limb,
-        landing_position,
-        landing_rotation,
-        ball_first,
-        ball_center,
-        ball_radius,
-        lowest,
-    )
+    ball_first, ball_center, ball_radius, lowest = knots.balls(p, 2 * total + 1)
     # The initial CoM is the origin: what it violates is no constraint of the program.
-    violation = max(0.0, lowest[0] + min_height - com[2]) if lowest[0] < np.inf else 0.0
+    violation = max(0.0, lowest[0] + p.min_height - p.com[2]) if lowest[0] < np.inf else 0.0
     for k in range(ball_first[1]):
         c = ball_center[k]
         violation = max(violation, math.sqrt(c[0] ** 2 + c[1] ** 2 + c[2] ** 2) - ball_radius[k])
     skipped = ball_first[1]
     for knot in range(n + 2):
         ball_first[knot] = max(ball_first[knot] - skipped, 0)
-    knots.planes(
-        lowest, min_height, yaw[n], com, final_center, final_half_size, plane_first, plane_normal, plane_offset
-    )
+    plane_first, plane_normal, plane_offset = knots.planes(p, lowest)
     x0 = np.zeros(9)
     for a in range(3):
-        x0[3 + a] = com_velocity[a] / unit
-        x0[6 + a] = angular_momentum[a] / (mass * unit)
+        x0[3 + a] = p.com_velocity[a] / unit
+        x0[6 + a] = p.angular_momentum[a] / (p.mass * unit)
     data = Data(
         h,
         omega,
@@ -220,37 +169,35 @@ def pack(
         plane_normal[: plane_first[n + 1]],
         plane_offset[: plane_first[n + 1]],
         x0,
-        knots.guess(active, position, com, final_center),
-        rest,
+        knots.guess(p),
+        p.final_at_rest,
         w,
     )
     return data, violation
 
 
 @compiled(reordered=True)
-def unpack(data, active, mass, com, u, x):
-    """Knots and contact forces in SI units, as in `CentroidalMotion`: com, linear, angular, force, cop, yaw torque."""
+def unpack(p, data, u, x):
+    """Knots (N + 1, 9) and contact wrenches (C, 6) of a problem in SI units, as `MotionArrays`."""
     n = data.h.shape[0]
-    unit, weight = math.sqrt(STANDARD_GRAVITY), mass * STANDARD_GRAVITY
-    place, linear, angular = np.empty((n + 1, 3)), np.empty((n + 1, 3)), np.empty((n + 1, 3))
+    unit, weight = math.sqrt(STANDARD_GRAVITY), p.mass * STANDARD_GRAVITY
+    com, linear, angular = np.empty((n + 1, 3)), np.empty((n + 1, 3)), np.empty((n + 1, 3))
     for t in range(n + 1):
-        r, v = x[t, :3], x[t, 3:6]
+        k = spin(x[t])
         for a in range(3):
-            b, c = (a + 1) % 3, (a + 2) % 3
-            place[t, a] = r[a] + com[a]
-            linear[t, a] = mass * unit * v[a]
-            angular[t, a] = mass * unit * (x[t, 6 + a] - (r[b] * v[c] - r[c] * v[b]))
+            com[t, a] = x[t, a] + p.com[a]
+            linear[t, a] = p.mass * unit * x[t, 3 + a]
+            angular[t, a] = p.mass * unit * k[a]
     force, cop, torque = np.zeros((n, 4, 3)), np.zeros((n, 4, 2)), np.zeros((n, 4))
     j = 0
     for t in range(n):
         for i in range(4):
-            if not active[t, i]:
+            if not p.active[t, i]:
                 continue
             r = data.rotation[j]
             for a in range(3):
                 force[t, i, a] = weight * (r[a, 0] * u[j, 0] + r[a, 1] * u[j, 1] + r[a, 2] * u[j, 2])
-            inverse = 1.0 / u[j, 2] if u[j, 2] > 0.0 else 0.0
-            cop[t, i, 0], cop[t, i, 1] = -u[j, 4] * inverse, u[j, 3] * inverse
-            torque[t, i] = weight * (u[j, 5] + (u[j, 4] * u[j, 1] + u[j, 3] * u[j, 0]) * inverse)
+            cop_x, cop_y, twist = pressure(u[j], u[j, 2] if u[j, 2] > 0.0 else np.inf)
+            cop[t, i, 0], cop[t, i, 1], torque[t, i] = cop_x, cop_y, weight * twist
             j += 1
-    return place, linear, angular, force, cop, torque
+    return MotionArrays(com, linear, angular, force, cop, torque)

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import linprog
 
-from toolkit.physics.cone import foot_rows, friction_rows, sole_rows, turning_rows
+from toolkit.physics.wrench import foot_rows, friction_rows, sole_rows, turning_rows
 
 HALF, FRICTION = np.array([0.11, 0.065]), 0.5
 CORNERS = np.array([[a * HALF[0], b * HALF[1], 0.0] for a in (-1, 1) for b in (-1, 1)])

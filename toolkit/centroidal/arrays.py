@@ -1,0 +1,109 @@
+"""A centroidal problem and its motion as compiled functions take them: named tuples of arrays of exact types."""
+
+from __future__ import annotations
+
+from dataclasses import astuple
+from typing import NamedTuple
+
+import numpy as np
+
+from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
+
+
+class ProblemArrays(NamedTuple):
+    """A `CentroidalProblem`, field by field, with its margins applied where that is possible.
+
+    Attributes:
+        reduced_half_size: (4, 2) m; half extents with the CoP margin taken off.
+        weights: (8,) in the order of `Weights`.
+        friction_margin: Factor on the friction.
+        yaw_margin: Factor of the yaw margin.
+        landing_position, landing_rotation: Zero and the identity where no limb lands.
+    """
+
+    mass: float
+    dt: np.ndarray
+    active: np.ndarray
+    position: np.ndarray
+    rotation: np.ndarray
+    friction: np.ndarray
+    half_size: np.ndarray
+    reduced_half_size: np.ndarray
+    max_normal_force: np.ndarray
+    yaw: np.ndarray
+    com: np.ndarray
+    com_velocity: np.ndarray
+    angular_momentum: np.ndarray
+    root_in_com: np.ndarray
+    tip_in_contact: np.ndarray
+    max_reach: np.ndarray
+    min_height: float
+    final_center: np.ndarray
+    final_half_size: np.ndarray
+    final_at_rest: bool
+    weights: np.ndarray
+    friction_margin: float
+    yaw_margin: float
+    landing_limb: int
+    landing_position: np.ndarray
+    landing_rotation: np.ndarray
+
+    @classmethod
+    def of(cls, problem: CentroidalProblem) -> ProblemArrays:
+        """The arrays of a problem."""
+        p = problem
+        landing = p.landing_limb >= 0
+        return cls(
+            mass=float(p.mass),
+            dt=_plain(p.dt),
+            active=_plain(p.active, bool),
+            position=_plain(p.position),
+            rotation=_plain(p.rotation),
+            friction=_plain(p.friction),
+            half_size=_plain(p.half_size),
+            reduced_half_size=_plain(p.reduced_half_size),
+            max_normal_force=_plain(p.max_normal_force),
+            yaw=_plain(p.yaw),
+            com=_plain(p.com),
+            com_velocity=_plain(p.com_velocity),
+            angular_momentum=_plain(p.angular_momentum),
+            root_in_com=_plain(p.root_in_com),
+            tip_in_contact=_plain(p.tip_in_contact),
+            max_reach=_plain(p.max_reach),
+            min_height=float(p.min_height),
+            final_center=_plain(p.final_center),
+            final_half_size=_plain(p.final_half_size),
+            final_at_rest=bool(p.final_at_rest),
+            weights=np.array(astuple(p.weights), float),
+            friction_margin=float(p.margins.friction),
+            yaw_margin=float(p.margins.yaw),
+            landing_limb=int(p.landing_limb),
+            landing_position=_plain(p.landing_position) if landing else np.zeros(3),
+            landing_rotation=_plain(p.landing_rotation) if landing else np.eye(3),
+        )
+
+    def copy(self) -> ProblemArrays:
+        """The same with arrays of its own."""
+        return ProblemArrays._make(item.copy() if isinstance(item, np.ndarray) else item for item in self)
+
+
+class MotionArrays(NamedTuple):
+    """A motion of N steps at its N + 1 knots; fields as in `CentroidalMotion`."""
+
+    com: np.ndarray
+    linear_momentum: np.ndarray
+    angular_momentum: np.ndarray
+    force: np.ndarray
+    cop: np.ndarray
+    yaw_torque: np.ndarray
+
+    @classmethod
+    def of(cls, motion: CentroidalMotion) -> MotionArrays:
+        """The arrays of a motion."""
+        return cls(*(_plain(getattr(motion, name)) for name in cls._fields))
+
+
+def _plain(array: np.ndarray | None, dtype: type = float) -> np.ndarray:
+    """The array, contiguous and writable: any other kind would be compiled for anew."""
+    array = np.ascontiguousarray(array, dtype)
+    return array if array.flags.writeable else array.copy()
