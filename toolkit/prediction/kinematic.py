@@ -11,7 +11,7 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z
-from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.robot.model import RobotModel
 
 
@@ -44,15 +44,12 @@ class KinematicConfig:
     length_margin: float = 0.01
 
 
-class KinematicEvaluator:
+class KinematicEvaluator(TransitionEvaluator):
     """Judges without dynamics: the CoM rests above the mean of the feet, and surfaces within their friction angle hold.
 
     Args:
         robot: the robot.
         config: settings.
-
-    Attributes:
-        rejection: what it means where this evaluator finds a transition infeasible, for messages.
     """
 
     rejection = "ground too steep for a foot to rest on with its friction"

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from toolkit.contacts.projection import ProjectionConfig
 from toolkit.errors import InputError
 from toolkit.search.anytime.ana_star import AnaStarConfig
-from toolkit.search.costs.cost import CostConfig
-from toolkit.search.costs.haste import HasteConfig
+from toolkit.search.costs.delay import HasteConfig
+from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.heuristic import GridConfig
 from toolkit.search.moves.moves import MoveConfig
 from toolkit.search.moves.reach_check import ReachConfig

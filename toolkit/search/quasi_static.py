@@ -22,7 +22,7 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z, steepness
-from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.legs import legs_of, violated
 from toolkit.search.moves.moves import MoveConfig
@@ -50,16 +50,13 @@ class QuasiStaticConfig:
     drops: tuple[float, ...] = (0.0, 0.06, 0.12, 0.18)
 
 
-class QuasiStaticEvaluator:
+class QuasiStaticEvaluator(TransitionEvaluator):
     """Judges by static balance at take-off and touch-down.
 
     Args:
         robot: the robot.
         moves: kinematic limits, those of the search.
         config: settings.
-
-    Attributes:
-        rejection: what it means where a transition is infeasible, for messages.
     """
 
     rejection = "no statically balanced posture at take-off or touch-down"

@@ -11,7 +11,7 @@ from toolkit.search.moves.occupancy import body_free
 LEVELS = 4  # heights kept per cell
 
 
-@compiled(kept=True)
+@compiled
 def _add_level(levels, z, merge):
     """Note a height in a list that falls, -inf where free; of close heights the highest stays."""
     for k in range(len(levels)):
@@ -126,7 +126,7 @@ def link_nodes(nodes, levels, cell, climb, turn, start, end, weight):
     return used
 
 
-@compiled(kept=True)
+@compiled
 def _cell_value(height, distance, i, j, z, layer, span):
     """Least distance of a cell over the yaw layers around one, at the level nearest to a height."""
     if i < 0 or j < 0 or i >= height.shape[0] or j >= height.shape[1]:

@@ -1,4 +1,4 @@
-"""How far it is to the goal for a floating box on an SE(2) grid (paper, Sec. V), and the search's heuristic from it.
+"""How far it is to the goal for a floating box on an SE(2) grid (paper, Sec. V).
 
 Cells are 8-connected in XY with free turning in place. A cell counts where a sole finds a surface within half a stride
 (so that gaps up to the longest stride can be crossed, wider ones not) and the body fits above it. Since ground can
