@@ -163,4 +163,4 @@ class Ground:
         return Projector(self._robot, surfaces, self._world.mujoco_model, self._config.projection)
 
     def _distances(self, projector: Projector) -> TerrainDistance:
-        return TerrainDistance(self._robot, self._world, projector, self._config.grid)
+        return TerrainDistance(self._robot, self._world, projector)
