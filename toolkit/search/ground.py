@@ -63,8 +63,9 @@ class Ground:
         walls = config.palms and bool(self._projector.table.palm.any())
         self._arms = {limb: ArmMap.of(robot, limb) for limb in robot.arms if walls}
         self._models = {wide: self._model(wide) for wide in (False, True)}
+        self._warm_up()
 
-    def warm_up(self) -> None:
+    def _warm_up(self) -> None:
         """Compile or load what is compiled."""
         moves, table = self.moves(wide=False)
         ground, surface = self._projector.table, np.zeros(1, int)

@@ -28,21 +28,6 @@ class Tally:
     untrained: int = 0
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """What was said of n candidates.
-
-    Attributes:
-        batch: Of the judge.
-        passed: (k,) int; rows that the judge and the reach of the limbs allow.
-        doubtful: (m,) int; rows that the judge rejected.
-    """
-
-    batch: TransitionBatch
-    passed: np.ndarray
-    doubtful: np.ndarray
-
-
 class Judging:
     """Asks one judge on behalf of one search.
 
@@ -61,8 +46,16 @@ class Judging:
         self._tally, self._deadline = tally, deadline
         self._pace = 0.0  # s per transition of the last query
 
-    def __call__(self, row: np.ndarray, candidates: Candidates) -> Judgement | None:
-        """Judge candidates out of a state, or that of a pending state, given by its row; None where time is up."""
+    def __call__(self, row: np.ndarray, candidates: Candidates) -> tuple[TransitionBatch, np.ndarray] | None:
+        """Judge candidates out of a state, or that of a pending state.
+
+        Args:
+            row: Of the state.
+            candidates: n of them.
+
+        Returns:
+            What the judge says, and codes (n,), 0 where the limbs reach as well; None where there is no time left.
+        """
         contacts, com, velocity = origin_of(row)[CONTACTS], row[COM] / 1000.0, row[VELOCITY] / 1000.0
         transitions = self._reader.transitions(candidates.limb, candidates.number, candidates.timing)
         began = time.perf_counter()
@@ -78,4 +71,4 @@ class Judging:
         self._tally.rejected += np.bincount(codes, minlength=len(screen.REASONS))
         self._tally.rejected[0] = 0
         self._tally.untrained += batch.untrained
-        return Judgement(batch, np.flatnonzero(codes == 0), np.flatnonzero(codes == screen.DYNAMICS))
+        return batch, codes

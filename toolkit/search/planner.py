@@ -65,7 +65,6 @@ class ContactPlanner:
         self._evaluator, self._goal_evaluator = evaluator, goal_evaluator
         self.ground = Ground(robot, world, self.config)
         self._timings = self.config.timings or (world.timing,)
-        self.ground.warm_up()
 
     def search(
         self,

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.search.anytime.graph import Edge
 from toolkit.search.costs.delay import Delay
 from toolkit.search.costs.edge_cost import EdgeCost
-from toolkit.search.judging import Judgement, Judging, Tally
+from toolkit.search.judging import Judging, Tally
 from toolkit.search.moves import screen
 from toolkit.search.moves.candidates import CandidateGenerator, Candidates, mean_feet
 from toolkit.search.states.contact_table import ContactTable
@@ -109,8 +110,8 @@ class ContactProblem:
         if is_pending(state):
             assert parts.waiting is not None
             candidate = self._pending(row)
-            judgement = parts.waiting(row, candidate)
-            return None if judgement is None else self._edges(candidate, judgement, pending=True)
+            judged = parts.waiting(row, candidate)
+            return None if judged is None else self._edges(candidate, *judged, pending=True)
         candidates = parts.candidates.out_of(row[CONTACTS], int(row[LAST]))
         if candidates is None:
             return []
@@ -122,16 +123,19 @@ class ContactProblem:
             return []
         if parts.at_once is None:
             return self._postponed(row, candidates, doubted=False)
-        judgement = parts.at_once(row, candidates)
-        if judgement is None:
+        judged = parts.at_once(row, candidates)
+        if judged is None:
             return None
-        if parts.waiting is not None and len(judgement.doubtful) and not len(judgement.passed):
-            return self._postponed(row, candidates.select(judgement.doubtful), doubted=True)
-        return self._edges(candidates, judgement, pending=False)
+        doubtful = judged[1] == screen.DYNAMICS
+        if parts.waiting is not None and doubtful.any() and (judged[1] != 0).all():
+            return self._postponed(row, candidates.select(doubtful), doubted=True)
+        return self._edges(candidates, *judged, pending=False)
 
-    def _edges(self, candidates: Candidates, judgement: Judgement, *, pending: bool) -> list[Edge[bytes]]:
+    def _edges(
+        self, candidates: Candidates, batch: TransitionBatch, codes: np.ndarray, *, pending: bool
+    ) -> list[Edge[bytes]]:
         """Edges of the candidates that passed; of pending ones the known part of the cost is already paid."""
-        kept, batch = judgement.passed, judgement.batch
+        kept = np.flatnonzero(codes == 0)
         if not len(kept):
             return []
         candidates, objective = candidates.select(kept), batch.objective[kept]
