@@ -1,1 +1,1 @@
-"""Anytime contact search: ANA*, heuristic, planner, baselines."""
+"""Contact search: `anytime` graph search, `states`, `moves` between them, their `costs`; then strategies and planner."""
