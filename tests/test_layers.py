@@ -25,6 +25,9 @@ LAYERS = [
     "pipeline",
     "report",
 ]
+WITHIN = {
+    "toolkit.search": ["anytime", "states", "moves", "costs"]
+}  # packages in their order, then modules beside them
 MODULES = sorted((ROOT / "toolkit").rglob("*.py"))
 
 
@@ -32,6 +35,12 @@ def layer_of(module: str) -> int:
     """Rank of a dotted toolkit module; command lines and anything new at the top level come last."""
     name = module.split(".")[1] if "." in module else ""
     return LAYERS.index(name) if name in LAYERS else len(LAYERS)
+
+
+def room_of(package: str, module: str) -> int:
+    """Rank of a dotted module within its package."""
+    rooms, name = WITHIN[package], module.removeprefix(package + ".").split(".")[0]
+    return rooms.index(name) if name in rooms else len(rooms)
 
 
 def module_name(path: Path) -> str:
@@ -62,6 +71,15 @@ def test_a_module_imports_only_its_own_layer_and_those_above(path):
             assert here.startswith("toolkit.report"), f"{here} imports rerun; only report may"
         if name.split(".")[0] == "torch":
             assert here.startswith("toolkit.learning") or here == "toolkit.train"
+
+
+@pytest.mark.parametrize("package", WITHIN)
+def test_packages_within_a_package_keep_their_order(package):
+    for path in (ROOT / package.replace(".", "/")).rglob("*.py"):
+        here = module_name(path)
+        for name in imported(path):
+            if here != package and name.startswith(package + "."):
+                assert room_of(package, name) <= room_of(package, here), f"{here} must not import {name}"
 
 
 def test_no_import_cycle():

@@ -8,8 +8,9 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_about_z
-from toolkit.prediction.features import LAYOUT, MIRROR, encode, feature_size, tait_bryan
+from toolkit.prediction.features import LAYOUT, MIRROR, encode, feature_size
 from toolkit.world.timing import Timing
+from validation.encodings import tait_bryan
 
 REFLECT = np.diag(MIRROR)
 

@@ -5,14 +5,14 @@ import pytest
 from tests.search.worlds import FLOOR, box, make_world
 from toolkit.contacts.projection import Projector
 from toolkit.geometry.pose import Pose
-from toolkit.search.costs.heuristic import EuclideanDistance, GridConfig
+from toolkit.search.costs.heuristic import EuclideanDistance
 from toolkit.search.costs.terrain_distance import TerrainDistance
 from toolkit.search.moves.obstacles import world_triangles
 from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
 
 
 def terrain(robot, world):
-    return TerrainDistance(robot, world, Projector(robot, world.surfaces, world.mujoco_model), GridConfig())
+    return TerrainDistance(robot, world, Projector(robot, world.surfaces, world.mujoco_model))
 
 
 def at(distance, x, y, z=0.0, yaw=0.0):

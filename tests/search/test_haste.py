@@ -7,7 +7,7 @@ from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.search.anytime.open_list import OpenList
-from toolkit.search.costs.haste import Haste, HasteConfig
+from toolkit.search.costs.delay import Haste, HasteConfig
 from toolkit.search.states.contact_table import ContactTable
 
 

@@ -100,8 +100,8 @@ def test_same_seed_same_plan(robot):
 def standing(robot, mjcf, timings):
     """Drift in a world, its table, and the numbers of the feet side by side at the start."""
     planner = ContactPlanner(robot, make_world(mjcf, goal=(0.6, 0, 0)), KinematicEvaluator(robot))
-    _, table = planner._generator(wide=False)
-    numbers = np.array([*(table.add_contact(c) for c in planner.start_stance().contacts), -1, -1])
+    _, table = planner.ground.moves(wide=False)
+    numbers = np.array([*(table.add_contact(c) for c in planner.ground.start_stance().contacts), -1, -1])
     return Drift(robot, table, timings), table, numbers
 
 
@@ -151,9 +151,9 @@ def test_a_second_evaluator_has_its_say_where_the_way_is_slippery(robot):
     class Timid(Counting):
         """Believes in nothing beyond x = 0.3 m."""
 
-        def __init__(self, robot, config, outside):
+        def __init__(self, robot, config, stand_in):
             super().__init__(robot, config)
-            self.outside = outside
+            self.stand_in = stand_in
 
         def evaluate(self, stance, com, com_velocity, transitions):
             batch = super().evaluate(stance, com, com_velocity, transitions)
@@ -174,15 +174,13 @@ def test_the_stand_in_judges_timings_that_were_not_trained(robot):
     class Trained(Counting):
         """Hands on what swings faster than 0.5 s, as networks do."""
 
-        outside_count = 0
-
-        def __init__(self, robot, outside):
+        def __init__(self, robot, stand_in):
             super().__init__(robot)
-            self.outside = outside
+            self.stand_in = stand_in
 
         def evaluate(self, stance, com, com_velocity, transitions):
-            self.outside_count += sum(item.timing.swing < 0.5 for item in transitions)
-            return super().evaluate(stance, com, com_velocity, transitions)
+            batch = super().evaluate(stance, com, com_velocity, transitions)
+            return replace(batch, untrained=sum(item.timing.swing < 0.5 for item in transitions))
 
     for timing, strange in (("0.3 0.6", False), ("0.3 0.4", True)):
         stand_in = Costly(robot)

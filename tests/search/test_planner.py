@@ -8,9 +8,9 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.moves.reach_check import ReachConfig
 from toolkit.search.planner import ContactPlanner, PlannerConfig
-from toolkit.search.problem import CostConfig
 from toolkit.world.timing import Timing
 
 QUICK = PlannerConfig(search=AnaStarConfig(max_expansions=150))
@@ -73,7 +73,7 @@ def test_walks_on_flat_ground(robot):
 
 def test_start_stance_is_the_home_stance(robot):
     world = make_world(FLOOR, start=(0.3, -0.2, 0.1), goal=(1.5, 0, 0))
-    stance = ContactPlanner(robot, world, KinematicEvaluator(robot)).start_stance()
+    stance = ContactPlanner(robot, world, KinematicEvaluator(robot)).ground.start_stance()
     np.testing.assert_allclose(stance.mean_feet.position[1:], [-0.2, 0], atol=1e-6)
     width = stance[Limb.LEFT_FOOT].pose.position[1] - stance[Limb.RIGHT_FOOT].pose.position[1]
     assert 0.1 < width < 0.4

@@ -56,7 +56,7 @@ def test_a_gentle_slope_has_a_plan_and_a_steep_one_says_why_not(robot):
 def test_long_strides_are_not_quasi_static(robot):
     world = make_world(FLOOR, goal=(2.0, 0, 0))
     planner = quasi_static_planner(robot, world, QUICK)
-    stance = planner.start_stance()
+    stance = planner.ground.start_stance()
     evaluator = QuasiStaticEvaluator(robot, MoveConfig())
 
     def judged(x):
@@ -75,7 +75,7 @@ def test_a_palm_holds_the_robot_where_a_foot_cannot(robot):
     world = slope(30, 0.5)
     on_slope = [surface for surface in world.surfaces if surface.serves_foot and surface.normal[2] < 0.9][0]
     planner = quasi_static_planner(robot, make_world(FLOOR), QUICK)
-    stance = planner.start_stance()
+    stance = planner.ground.start_stance()
     tilted = [
         type(stance[limb])(
             limb, type(on_slope.pose)(on_slope.pose.rotation, stance[limb].pose.position), 0.5, on_slope.index

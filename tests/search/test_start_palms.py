@@ -49,7 +49,7 @@ def planner(robot, world, config=QUICK):
 @pytest.mark.parametrize("euler", [0.0, 12.0, -12.0])
 def test_palms_lie_whole_on_their_walls(robot, place, euler):
     world = walled(place, both=True, euler=euler)
-    stance = planner(robot, world).start_stance()
+    stance = planner(robot, world).ground.start_stance()
     assert stance.limbs == (*FEET, LEFT, RIGHT)
     square = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
     for limb in (LEFT, RIGHT):
@@ -70,14 +70,14 @@ def test_palms_lie_whole_on_their_walls(robot, place, euler):
 
 
 def test_the_palm_turns_and_moves_with_the_start(robot, place):
-    at = planner(robot, walled(place)).start_stance()[LEFT].pose
+    at = planner(robot, walled(place)).ground.start_stance()[LEFT].pose
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     shift = np.array([0.4, -0.3, 0.0])
     wall = box(turn @ (place + [0, 0.05, 0]) + shift, [0.8, 0.05, 0.6], [0, 0, np.degrees(0.7)], 0.6)
     palm = site(LEFT, *(turn @ place + shift))
     world = make_world(FLOOR, wall, palm, start=shift, goal=(1.5, 0.5, 0), heading=np.degrees(0.7))
-    moved = planner(robot, world).start_stance()[LEFT].pose
+    moved = planner(robot, world).ground.start_stance()[LEFT].pose
     np.testing.assert_allclose(moved.position, turn @ at.position + shift, atol=2e-3)
     np.testing.assert_allclose(moved.rotation, turn @ at.rotation, atol=1e-6)
 
@@ -87,7 +87,7 @@ def test_the_site_need_not_lie_on_the_wall(robot, place, offset):
     """In front of it or inside it: the palm goes to the side that the arm can touch."""
     world = walled(place)
     world = replace(world, start_palms={LEFT: world.start_palms[LEFT] + offset})
-    contact = planner(robot, world).start_stance()[LEFT]
+    contact = planner(robot, world).ground.start_stance()[LEFT]
     assert contact.pose.position[1] == pytest.approx(place[1], abs=1e-6) and contact.pose.normal[1] < -0.99
     assert np.hypot(*(contact.pose.position - world.start_palms[LEFT])[[0, 2]]) <= 0.1 + 1e-6
 
@@ -146,8 +146,8 @@ def test_something_between_the_shoulder_and_the_wall(robot, place):
     plate = box(place - [0, 0.06, 0], [0.3, 0.005, 0.3], [20, 0, 0])
     world = walled(place)
     blocked = walled(place, plate)
-    assert planner(robot, world).start_stance().palms == (LEFT,)
-    contact = planner(robot, blocked).start_stance()[LEFT]  # on what is in the way: it serves palms, and is near
+    assert planner(robot, world).ground.start_stance().palms == (LEFT,)
+    contact = planner(robot, blocked).ground.start_stance()[LEFT]  # on what is in the way: it serves palms, and is near
     assert abs(contact.pose.normal[2]) > 0.1
 
 

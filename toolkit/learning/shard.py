@@ -27,12 +27,12 @@ from toolkit.geometry.limb import PALMS
 from toolkit.learning.dataset import Samples, join, no_samples
 from toolkit.learning.label import label, samples_of
 from toolkit.learning.terrain import SlopeConfig, TerrainConfig, random_slope, random_terrain
-from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.prediction.features import LAYOUT
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import AnaStarConfig
-from toolkit.search.costs.cost import CostConfig
+from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.world.loader import load_world
 from toolkit.world.timing import Timing
@@ -179,7 +179,7 @@ class _Balance:
         pair[1] += len(feasible)
 
 
-class _Recorder:
+class _Recorder(TransitionEvaluator):
     """A judge that labels some of the transitions it is asked for, keeps them, and calls the others infeasible."""
 
     def __init__(

@@ -1,10 +1,10 @@
-"""The place where transitions are judged: by networks, by the optimiser, or not at all."""
+"""The place where transitions are judged: by networks, by the optimiser, by static balance, or on kinematics alone."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,19 +21,54 @@ class TransitionBatch:
         objective: (n,) dynamics objective, >= 0.
         com: (n, 3) m, world frame, after the transition.
         com_velocity: (n, 3) m/s.
+        untrained: How many of the transitions lay outside what the judge was trained for.
     """
 
     feasible: np.ndarray
     objective: np.ndarray
     com: np.ndarray
     com_velocity: np.ndarray
+    untrained: int = field(default=0, kw_only=True)
 
 
-class TransitionEvaluator(Protocol):
-    """Judges all candidate transitions of one parent state together."""
+class TransitionEvaluator(ABC):
+    """Judges all candidate transitions of one parent state together; this is all that a judge can be asked.
 
+    Attributes:
+        costly: Whether a search had better ask about one transition at a time, since each takes about a millisecond.
+        rejection: What it means where a transition is infeasible, for messages.
+        stand_in: The judge of what this one was not trained for. It also has a say on ground that holds no resting
+            foot, where the last bit of feasibility counts. None where there is no such judge.
+    """
+
+    costly: bool = False
+    rejection: str = "dynamics"
+    stand_in: TransitionEvaluator | None = None
+
+    @abstractmethod
     def evaluate(
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
     ) -> TransitionBatch:
         """Judge transitions from a stance with CoM (3,) m and CoM velocity (3,) m/s in the world frame."""
-        ...
+
+    def halt(
+        self,
+        stance: Stance,
+        com: np.ndarray,
+        com_velocity: np.ndarray,
+        transitions: Sequence[ContactTransition],
+        rest: float,
+    ) -> float | None:
+        """Objective of coming to rest by several transitions in a row.
+
+        Args:
+            stance: The stance before the first transition.
+            com: (3,) m, world; the CoM before the first transition.
+            com_velocity: (3,) m/s, world; its velocity.
+            transitions: In their order.
+            rest: Seconds on the last stance, at whose end the CoM is at rest.
+
+        Returns:
+            The objective; None where that is infeasible, and from a judge that only judges single transitions.
+        """
+        return None

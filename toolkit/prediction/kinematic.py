@@ -8,12 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.contacts.sequence import ContactTransition
-from toolkit.contacts.stance import Contact, Stance
+from toolkit.contacts.stance import Stance
+from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.geometry.heading import mean_heading, wrapped
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z, yaw_of
-from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.robot.model import RobotModel
+
+_LENGTH_MARGIN = 0.01  # m; the CoM is low enough for legs this much shorter than their longest
 
 
 @dataclass(frozen=True)
@@ -21,39 +24,28 @@ class KinematicConfig:
     """Settings; the objective is a stand-in for the dynamics objective, of its order of magnitude.
 
     Attributes:
-        friction: part of the friction coefficient that a sole at rest may need; steeper surfaces hold no foot.
-        stride: objective of moving the mean of the feet by `stride_length`; it grows with the square.
-        stride_length: m.
-        rise: objective of a step `rise_height` up or down, with the square.
-        rise_height: m.
-        tilt: objective of a foot on a tilt of 0.2 rad, with the square.
-        spread: objective of feet `spread_width` wider or narrower than at home, or turned 0.3 rad apart, squared.
-        spread_width: m.
-        palm_relief: factor on the objective of a foot move for each palm in contact; 1: palms do not help.
-        length_margin: m; the CoM is low enough for legs this much shorter than their longest.
+        friction: The part of the friction coefficient that a sole at rest may need; steeper surfaces hold no foot.
+        stride: Objective of moving the mean of the feet by 0.3 m; it grows with the square, as all of these do.
+        rise: Objective of a step 0.1 m up or down.
+        tilt: Objective of a foot on a tilt of 0.2 rad.
+        spread: Objective of feet 0.1 m wider or narrower than at home, or turned 0.3 rad apart.
+        palm_relief: Factor on the objective of a foot move for each palm in contact; 1: palms do not help.
     """
 
     friction: float = 0.9
     stride: float = 30.0
-    stride_length: float = 0.3
     rise: float = 10.0
-    rise_height: float = 0.1
     tilt: float = 10.0
     spread: float = 10.0
-    spread_width: float = 0.1
     palm_relief: float = 1.0
-    length_margin: float = 0.01
 
 
-class KinematicEvaluator:
+class KinematicEvaluator(TransitionEvaluator):
     """Judges without dynamics: the CoM rests above the mean of the feet, and surfaces within their friction angle hold.
 
     Args:
         robot: the robot.
         config: settings.
-
-    Attributes:
-        rejection: what it means where this evaluator finds a transition infeasible, for messages.
     """
 
     rejection = "ground too steep for a foot to rest on with its friction"
@@ -67,11 +59,15 @@ class KinematicEvaluator:
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
     ) -> TransitionBatch:
         """Judge transitions; see `TransitionEvaluator`."""
-        config, n = self._config, len(transitions)
-        left, right = (self._feet(stance, transitions, limb) for limb in FEET)
-        position = np.stack([left[0], right[0]], axis=1)
-        rotation = np.stack([left[1], right[1]], axis=1)
-        friction = np.stack([left[2], right[2]], axis=1)
+        config, rows, n = self._config, TransitionRows.of(transitions), len(transitions)
+        feet = [stance[limb] for limb in FEET]
+        position = np.tile([foot.pose.position for foot in feet], (n, 1, 1))
+        rotation = np.tile([foot.pose.rotation for foot in feet], (n, 1, 1, 1))
+        friction = np.tile([foot.friction for foot in feet], (n, 1))
+        moved = np.flatnonzero(rows.limb < len(FEET))
+        foot = moved, rows.limb[moved]
+        position[foot], rotation[foot] = rows.position[moved], rows.rotation[moved]
+        friction[foot] = rows.friction[moved]
         heading = yaw_of(rotation).T
         yaw = mean_heading(*heading)
 
@@ -85,14 +81,13 @@ class KinematicEvaluator:
         lateral = -np.sin(yaw) * apart[:, 0] + np.cos(yaw) * apart[:, 1]
         turn = wrapped(heading[0] - heading[1])
         objective = (
-            config.stride * (np.hypot(*(mean - before)[:, :2].T) / config.stride_length) ** 2
-            + config.rise * (apart[:, 2] / config.rise_height) ** 2
+            config.stride * (np.hypot(*(mean - before)[:, :2].T) / 0.3) ** 2
+            + config.rise * (apart[:, 2] / 0.1) ** 2
             + config.tilt * ((tilt / 0.2) ** 2).sum(1)
-            + config.spread * (((lateral - self._home_width) / config.spread_width) ** 2 + (turn / 0.3) ** 2)
+            + config.spread * (((lateral - self._home_width) / 0.1) ** 2 + (turn / 0.3) ** 2)
         )
-        foot_moves = np.array([item.limb.is_foot for item in transitions])
         relief = config.palm_relief ** len(stance.palms)
-        objective = np.where(foot_moves, objective * relief, 1.0)
+        objective = np.where(rows.limb < len(FEET), objective * relief, 1.0)
         return TransitionBatch(feasible, objective, self._com(position, rotation, mean, yaw), np.zeros((n, 3)))
 
     def _com(self, position: np.ndarray, rotation: np.ndarray, mean: np.ndarray, yaw: np.ndarray) -> np.ndarray:
@@ -103,21 +98,7 @@ class KinematicEvaluator:
             leg = self._robot.legs[limb]
             ankle = position[:, side] + rotation[:, side] @ leg.ankle_in_sole
             away = mean + turn @ leg.hip_in_com - ankle
-            reach = leg.max_length - self._config.length_margin
+            reach = leg.max_length - _LENGTH_MARGIN
             rise = np.sqrt(np.maximum(reach**2 - away[:, 0] ** 2 - away[:, 1] ** 2, 0.0))
             com[:, 2] = np.minimum(com[:, 2], ankle[:, 2] + rise - leg.hip_in_com[2])
         return com
-
-    @staticmethod
-    def _feet(
-        stance: Stance, transitions: Sequence[ContactTransition], limb
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions, rotations and friction of one foot after each transition."""
-        contacts: list[Contact] = [
-            item.contact if item.limb == limb and item.contact is not None else stance[limb] for item in transitions
-        ]
-        return (
-            np.array([contact.pose.position for contact in contacts]),
-            np.array([contact.pose.rotation for contact in contacts]),
-            np.array([contact.friction for contact in contacts]),
-        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -36,19 +36,17 @@ def load_networks(robot: RobotModel, folder: Path | None = None) -> dict[Categor
     }
 
 
-@dataclass
-class NetworkEvaluator:
+@dataclass(frozen=True)
+class NetworkEvaluator(TransitionEvaluator):
     """Judges by networks; hands transitions that lie outside the trained timings and frictions to another judge.
 
     Attributes:
-        networks: by category.
-        outside: judges what the networks have not been trained for; None: the networks judge all the same.
-        outside_count: transitions that lay outside so far.
+        networks: By category.
+        stand_in: Judges what the networks have not been trained for; None: the networks judge all the same.
     """
 
     networks: dict[Category, TransitionNetwork]
-    outside: TransitionEvaluator | None = None
-    outside_count: int = field(default=0, init=False)
+    stand_in: TransitionEvaluator | None = None
 
     def evaluate(
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
@@ -61,6 +59,7 @@ class NetworkEvaluator:
         all_rows, n = TransitionRows.of(transitions), len(transitions)
         feasible, objective = np.zeros(n, bool), np.zeros(n)
         end_com, end_velocity = np.zeros((n, 3)), np.zeros((n, 3))
+        untrained = 0
         group = 2 * all_rows.limb + all_rows.makes
         for code in dict.fromkeys(group.tolist()):
             rows = np.flatnonzero(group == code)
@@ -75,9 +74,9 @@ class NetworkEvaluator:
             inside = network.knows(features)
             rows_out = rows[~inside]
             if len(rows_out):
-                self.outside_count += len(rows_out)
-                if self.outside is not None:
-                    batch = self.outside.evaluate(stance, com, com_velocity, all_rows.select(rows_out))
+                untrained += len(rows_out)
+                if self.stand_in is not None:
+                    batch = self.stand_in.evaluate(stance, com, com_velocity, all_rows.select(rows_out))
                     feasible[rows_out], objective[rows_out] = batch.feasible, batch.objective
                     end_com[rows_out], end_velocity[rows_out] = batch.com, batch.com_velocity
                     rows, features = rows[inside], features[inside]
@@ -91,4 +90,4 @@ class NetworkEvaluator:
                 objective[kept] = outputs[:, 0]
                 end_com[kept] = frame.point_back(outputs[:, 1:4])
                 end_velocity[kept] = frame.vector_back(outputs[:, 4:7])
-        return TransitionBatch(feasible, objective, end_com, end_velocity)
+        return TransitionBatch(feasible, objective, end_com, end_velocity, untrained=untrained)

@@ -11,12 +11,12 @@ from toolkit.centroidal.build import ProblemConfig, sequence_problem, transition
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Stance
-from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.prediction.reach import within_reach
 from toolkit.robot.model import RobotModel
 
 
-class OptimiserEvaluator:
+class OptimiserEvaluator(TransitionEvaluator):
     """Solves the centroidal problem of every transition; about a millisecond each.
 
     Args:
@@ -24,9 +24,6 @@ class OptimiserEvaluator:
         config: what the problems assume.
         solver: settings of the fast solver.
         final_at_rest: whether the CoM must be at rest after the transition, as at the goal.
-
-    Attributes:
-        costly: a search had better ask about one transition at a time.
     """
 
     costly = True
@@ -78,15 +75,7 @@ class OptimiserEvaluator:
         transitions: Sequence[ContactTransition],
         rest: float,
     ) -> float | None:
-        """Objective of coming to rest by several transitions in a row; None where that is infeasible.
-
-        Args:
-            stance: before the first.
-            com: (3,) m; before it.
-            com_velocity: (3,) m/s.
-            transitions: in order.
-            rest: s on the last stance, at whose end the CoM is at rest.
-        """
+        """Objective of coming to rest; see `TransitionEvaluator`."""
         com = within_reach(self._robot, stance, np.asarray(com, float)[None], self._config)[0]
         schedule = ContactSchedule.of(ContactSequence(stance, tuple(transitions)), final_rest=rest)
         problem = sequence_problem(self._robot, schedule, com, com_velocity, config=self._config)

@@ -1,1 +1,1 @@
-"""Anytime contact search: ANA*, heuristic, planner, baselines."""
+"""Contact search: `anytime` search of graphs, `states`, `moves` and their `costs`; then strategies and planner."""

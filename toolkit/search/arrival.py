@@ -11,61 +11,51 @@ from typing import Any
 
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.search.anytime.graph import Edge
-from toolkit.search.costs.cost import CostConfig
+from toolkit.search.costs.edge_cost import EdgeCost
+from toolkit.search.judging import Tally
 from toolkit.search.moves.reasons import Reason
-from toolkit.search.problem import ContactProblem
+from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import is_pending
+
+_WINDOWS = (1, 3, 6)  # transitions that are optimised together, in the order in which they are tried
+_REST = 0.6  # s on the final stance that are optimised with them
 
 
 class Arrival:
     """Judge of the last transition, for ANA*; the objective of the last edge is replaced by what coming to rest takes.
 
     Args:
-        problem: the search.
-        evaluator: judges one transition as the last one. Where it has a method `halt` (see `OptimiserEvaluator`),
-            that judges several.
-        cost: of edges.
-        windows: numbers of transitions that are optimised together, in the order in which they are tried.
-        rest: s on the final stance that are optimised with them.
+        evaluator: Judges one transition as the last one, and whether several come to rest.
+        reader: Of the search's states.
+        cost: Of edges.
+        tally: Counted up.
     """
 
-    def __init__(
-        self,
-        problem: ContactProblem,
-        evaluator: TransitionEvaluator,
-        cost: CostConfig,
-        windows: Sequence[int] = (1, 3, 6),
-        rest: float = 0.6,
-    ):
-        self._problem, self._evaluator, self._cost = problem, evaluator, cost
-        self._windows, self._rest = windows, rest
+    def __init__(self, evaluator: TransitionEvaluator, reader: StateReader, cost: EdgeCost, tally: Tally):
+        self._evaluator, self._reader, self._cost, self._tally = evaluator, reader, cost, tally
 
     def __call__(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> Edge[bytes] | None:
         """See `toolkit.search.anytime.graph.Judge`."""
-        problem = self._problem
-        last = problem.transition(edge.state, edge.payload)
-        batch = self._evaluator.evaluate(*problem.origin(states[-1]), [last])
+        last = self._reader.transition(edge.state, edge.payload)
+        batch = self._evaluator.evaluate(*self._reader.origin(states[-1]), [last])
         objective = float(batch.objective[0]) if batch.feasible[0] else self._together(states, payloads, edge)
         if objective is None:
-            problem.rejected[Reason.DYNAMICS] += 1
+            self._tally.rejected[Reason.DYNAMICS] += 1
             return None
-        cost = edge.cost + self._cost.dynamics * (objective - edge.payload[0])
+        cost = edge.cost + self._cost.dynamics(objective - edge.payload[0])
         return edge._replace(cost=cost, payload=(objective, edge.payload[1]))
 
     def _together(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> float | None:
         """What of the objective of coming to rest falls to the last edge; None where that is infeasible."""
-        halt = getattr(self._evaluator, "halt", None)
-        if halt is None:
-            return None
-        problem = self._problem
         judged = [payload for payload in payloads if payload is not None]
         passed = [state for state in states if not is_pending(state)]
-        transitions = [problem.transition(edge.state, edge.payload)]
-        transitions += [problem.transition(*step) for step in zip(passed[:0:-1], judged[::-1], strict=True)]
-        for count in self._windows:
+        transitions = [self._reader.transition(edge.state, edge.payload)]
+        transitions += [self._reader.transition(*step) for step in zip(passed[:0:-1], judged[::-1], strict=True)]
+        for count in _WINDOWS:
             if count > len(transitions):
                 break
-            objective = halt(*problem.origin(passed[-count]), transitions[count - 1 :: -1], self._rest)
+            start = self._reader.origin(passed[-count])
+            objective = self._evaluator.halt(*start, transitions[count - 1 :: -1], _REST)
             if objective is not None:
                 return max(objective - sum(payload[0] for payload in judged[len(judged) - count + 1 :]), 0.0)
         return None

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from toolkit.contacts.projection import ProjectionConfig
 from toolkit.errors import InputError
 from toolkit.search.anytime.ana_star import AnaStarConfig
-from toolkit.search.costs.cost import CostConfig
-from toolkit.search.costs.haste import HasteConfig
-from toolkit.search.costs.heuristic import GridConfig
+from toolkit.search.costs.delay import HasteConfig
+from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.moves.moves import MoveConfig
 from toolkit.search.moves.reach_check import ReachConfig
 from toolkit.world.timing import Timing
@@ -33,7 +32,6 @@ class PlannerConfig:
         reach: what legs and arms may reach.
         moves: kinematic limits.
         projection: how patches find their place.
-        grid: of the heuristic.
         acceptable_cost: per m of way; order of magnitude of the first solution's cost, where `search.initial_cost`
             leaves it open: the lower, the more the cost so far counts before there is a solution; inf: the search goes
             straight for the goal.
@@ -52,7 +50,6 @@ class PlannerConfig:
     reach: ReachConfig = field(default_factory=ReachConfig)
     moves: MoveConfig = field(default_factory=MoveConfig)
     projection: ProjectionConfig = field(default_factory=ProjectionConfig)
-    grid: GridConfig = field(default_factory=GridConfig)
     acceptable_cost: float = 2500.0
     search: AnaStarConfig = field(default_factory=lambda: AnaStarConfig(max_expansions=20_000))
 

@@ -12,7 +12,7 @@ program of `toolkit.centroidal.balance`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z, steepness
-from toolkit.prediction.evaluator import TransitionBatch
+from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.legs import legs_of, violated
 from toolkit.search.moves.moves import MoveConfig
@@ -31,42 +31,25 @@ from toolkit.search.planner_config import PlannerConfig
 from toolkit.world.surface import Surface
 from toolkit.world.world import World
 
+_FRICTION = 0.9  # part of the friction coefficients that may be used
+_PATCH = 0.5  # part of a sole's half extents in which the centre of pressure may be
+_DROPS = (0.0, 0.06, 0.12, 0.18)  # parts of its height by which the CoM may be lower than at home
 _KEPT = 20_000  # linear programs remembered
 _PARTS = np.array([0.0, 0.5, 1.0])  # of the way from the middle of the support to its point nearest to the other foot
 
 
-@dataclass(frozen=True)
-class QuasiStaticConfig:
-    """Settings of static balance.
-
-    Attributes:
-        friction: part of the friction coefficients that may be used.
-        patch: part of a sole's half extents in which the centre of pressure may be.
-        drops: the CoM may be lower than at home by any of these parts of its height.
-    """
-
-    friction: float = 0.9
-    patch: float = 0.5
-    drops: tuple[float, ...] = (0.0, 0.06, 0.12, 0.18)
-
-
-class QuasiStaticEvaluator:
+class QuasiStaticEvaluator(TransitionEvaluator):
     """Judges by static balance at take-off and touch-down.
 
     Args:
         robot: the robot.
         moves: kinematic limits, those of the search.
-        config: settings.
-
-    Attributes:
-        rejection: what it means where a transition is infeasible, for messages.
     """
 
     rejection = "no statically balanced posture at take-off or touch-down"
 
-    def __init__(self, robot: RobotModel, moves: MoveConfig, config: QuasiStaticConfig | None = None):
-        self._robot, self._config = robot, config or QuasiStaticConfig()
-        self._legs = legs_of(robot, moves.margins)
+    def __init__(self, robot: RobotModel, moves: MoveConfig):
+        self._robot, self._legs = robot, legs_of(robot, moves.margins)
         self._programs: dict[bytes, np.ndarray | None] = {}
 
     def evaluate(
@@ -91,7 +74,7 @@ class QuasiStaticEvaluator:
         feet = [contact for contact in support if contact.limb.is_foot]
         if all(self._holds(contact) for contact in feet):
             for x, y in self._above(feet, touched):
-                for drop in self._config.drops:
+                for drop in _DROPS:
                     height = min(contact.pose.position[2] for contact in touched.contacts[:2])
                     place = np.array([x, y, height + (1.0 - drop) * self._robot.com_height])
                     if self._reaches(place, touched):
@@ -103,7 +86,7 @@ class QuasiStaticEvaluator:
 
     def _holds(self, contact: Contact) -> bool:
         """Whether the surface is within its friction angle."""
-        return bool(steepness(contact.pose.normal[2]) <= self._config.friction * contact.friction)
+        return bool(steepness(contact.pose.normal[2]) <= _FRICTION * contact.friction)
 
     def _above(self, feet: list[Contact], touched: Stance) -> np.ndarray:
         """(k, 2) m; points above the support, from its middle towards the middle of the stance."""
@@ -111,7 +94,7 @@ class QuasiStaticEvaluator:
         middle, target = centres.mean(0), touched.mean_feet.position[:2]
         if len(feet) == 2:
             return np.stack([middle, centres[0], centres[1]])
-        pose, half = feet[0].pose, self._config.patch * self._robot.limbs[feet[0].limb].half_size
+        pose, half = feet[0].pose, _PATCH * self._robot.limbs[feet[0].limb].half_size
         axes = pose.rotation[:2, :2]  # of the patch, seen from above
         inner = np.clip(np.linalg.solve(axes, target - middle), -half, half)
         return middle + _PARTS[:, None] * (axes @ inner)
@@ -140,7 +123,7 @@ class QuasiStaticEvaluator:
         if key not in self._programs:
             if len(self._programs) >= _KEPT:
                 self._programs.clear()
-            result = statically_balanced(self._robot, support, margins=Margins(friction=self._config.friction))
+            result = statically_balanced(self._robot, support, margins=Margins(friction=_FRICTION))
             self._programs[key] = result.com if result.balanced else None
         return self._programs[key]
 
@@ -153,16 +136,16 @@ def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig 
         world: the world.
         config: settings; neither dynamics nor steepness count in the cost.
     """
-    config, static = config or PlannerConfig(), QuasiStaticConfig()
+    config = config or PlannerConfig()
     palms = config.palms and bool(robot.arms) and _walls_in_reach(robot, world)
     config = replace(
         config,
         cost=replace(config.cost, dynamics=0.0, steep=0.0),
-        rest_friction=None if palms else static.friction,
+        rest_friction=None if palms else _FRICTION,
         wide_steps="off" if config.wide_steps == "auto" else config.wide_steps,
         timings=config.timings[:1],
     )
-    return ContactPlanner(robot, world, QuasiStaticEvaluator(robot, config.moves, static), config)
+    return ContactPlanner(robot, world, QuasiStaticEvaluator(robot, config.moves), config)
 
 
 def _walls_in_reach(robot: RobotModel, world: World) -> bool:

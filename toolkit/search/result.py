@@ -1,4 +1,4 @@
-"""What a contact search returns."""
+"""What a contact search returns, in the words of contacts; or why it found nothing."""
 
 from __future__ import annotations
 
@@ -7,6 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
+from toolkit.search.anytime.graph import Path
+from toolkit.search.moves.reasons import Reason
+from toolkit.search.states.reader import StateReader
+from toolkit.search.states.state import COM, CONTACTS, VELOCITY, is_pending, unpack
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,23 @@ class Solution:
     com: np.ndarray
     com_velocity: np.ndarray
     objective: np.ndarray
+
+    @classmethod
+    def of(cls, reader: StateReader, path: Path[bytes]) -> Solution:
+        """A path as a contact sequence with its predicted motion."""
+        states = [state for state in path.states if not is_pending(state)]
+        payloads = [payload for payload in path.payloads if payload is not None]
+        rows = unpack(states)
+        transitions = tuple(reader.transition(*step) for step in zip(states[1:], payloads, strict=True))
+        return cls(
+            sequence=ContactSequence(reader.stance(rows[0, CONTACTS]), transitions),
+            cost=path.cost,
+            bound=path.bound,
+            seconds=path.seconds,
+            com=rows[:, COM] / 1000.0,
+            com_velocity=rows[:, VELOCITY] / 1000.0,
+            objective=np.array([payload[0] for payload in payloads]),
+        )
 
 
 @dataclass(frozen=True)
@@ -56,3 +77,24 @@ class SearchResult:
     reason: str
     warning: str = ""
     hasty: int = 0
+
+
+def reason_of(stopped_by: str, seconds: float, expansions: int, rejected: np.ndarray, dynamics: str) -> str:
+    """One line on why there is no solution and what rejected most candidates, the choice of palms apart."""
+    how = {
+        "exhausted": f"every stance that can be reached was looked at ({expansions})",
+        "time": f"the time limit of {seconds:.3g} s was reached after {expansions} expansions; a longer one may help",
+        "expansions": f"the limit of {expansions} expansions was reached; a higher one may help",
+        "memory": f"the limit on memory was reached after {expansions} expansions",
+    }[stopped_by]
+    rejected = np.where([reason.of_palm for reason in Reason], 0, rejected)
+    total = int(rejected.sum())
+    if total == 0:
+        return f"no contact sequence found: {how}"
+    order = np.argsort(-rejected, kind="stable")[:4]
+    shares = ", ".join(
+        f"{dynamics if code == Reason.DYNAMICS else Reason(code).words} {100 * rejected[code] / total:.0f} %"
+        for code in order
+        if rejected[code] > 0
+    )
+    return f"no contact sequence found: {how}; candidates were rejected for: {shares}"

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -41,47 +42,40 @@ def search_in_turn(
     """
     paths: list[Path[State]] = []
     expanded: list[State] = []
-    seconds, bound = 0.0, 0.0
+    seconds, bound, early = 0.0, 0.0, 0
     result: AnaStarResult[State] | None = None
-    generators, early = [*rng.spawn(len(searches) - 1), rng], 0
-    for (problem, config), generator in zip(searches, generators, strict=True):
-        early, whole = len(paths), problem is searches[-1][0]
-        began, before, best = seconds, len(expanded), min(paths, key=lambda path: path.cost, default=None)
+    for (problem, config), generator in zip(searches, [*rng.spawn(len(searches) - 1), rng], strict=True):
+        early, whole, before = len(paths), problem is searches[-1][0], len(expanded)
         # Of a part of the graph the bound holds for that part: of the whole one only what h says at the start is known.
         least = 0.0 if whole else float(problem.heuristic([problem.start()])[0])
-
-        def observed(
-            progress: Progress[State],
-            began: float = began,
-            before: int = before,
-            best: Path[State] | None = best,
-            least: float = least,
-        ) -> None:
-            progress = replace(progress, bound=_loosened(progress.bound, progress.cost, least))
-            if best is not None and best.cost < progress.cost:
-                progress = replace(progress, cost=best.cost, bound=best.bound)
-            assert observer is not None
-            observer(replace(progress, seconds=began + progress.seconds, expansions=before + progress.expansions))
-
-        search = AnaStar(problem, generator, config, judge)
-        result = search.run(time_limit - began, None if observer is None else observed)
+        best = min(paths, key=lambda path: path.cost, default=None)
+        tell = None if observer is None else partial(_tell, observer, seconds, before, best, least)
+        result = AnaStar(problem, generator, config, judge).run(time_limit - seconds, tell)
         for path in result.paths:
-            loose = _loosened(path.bound, path.cost, least)
-            paths.append(replace(path, bound=loose, seconds=began + path.seconds, expansions=before + path.expansions))
+            loose, found = _loosened(path.bound, path.cost, least), seconds + path.seconds
+            paths.append(replace(path, bound=loose, seconds=found, expansions=before + path.expansions))
         expanded += result.expanded
-        seconds, bound = began + result.seconds, max(bound, result.lower_bound if whole else least)
+        seconds, bound = seconds + result.seconds, max(bound, result.lower_bound if whole else least)
         if result.stopped_by == "time" or (result.stopped_by == "exhausted" and whole):
             break
     assert result is not None
-    together = replace(
-        result,
-        paths=tuple(paths),
-        lower_bound=bound,
-        seconds=seconds,
-        expansions=len(expanded),
-        expanded=tuple(expanded),
-    )
-    return together, early
+    spent = {"seconds": seconds, "expansions": len(expanded), "expanded": tuple(expanded)}
+    return replace(result, paths=tuple(paths), lower_bound=bound, **spent), early
+
+
+def _tell(
+    observer: Callable[[Progress[State]], None],
+    seconds: float,
+    expansions: int,
+    best: Path[State] | None,
+    least: float,
+    progress: Progress[State],
+) -> None:
+    """Tell of the progress of a search as if it had gone on from the searches before it and from their best path."""
+    progress = replace(progress, bound=_loosened(progress.bound, progress.cost, least))
+    if best is not None and best.cost < progress.cost:
+        progress = replace(progress, cost=best.cost, bound=best.bound)
+    observer(replace(progress, seconds=seconds + progress.seconds, expansions=expansions + progress.expansions))
 
 
 def _loosened(bound: float, cost: float, least: float) -> float:

@@ -1,4 +1,4 @@
-"""How far it is to the goal for a floating box on an SE(2) grid (paper, Sec. V), and the search's heuristic from it.
+"""How far it is to the goal for a floating box on an SE(2) grid (paper, Sec. V).
 
 Cells are 8-connected in XY with free turning in place. A cell counts where a sole finds a surface within half a stride
 (so that gaps up to the longest stride can be crossed, wider ones not) and the body fits above it. Since ground can
@@ -20,6 +20,12 @@ from toolkit.search.costs.grid_kernels import LEVELS, link_nodes, number_nodes, 
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.world import Goal
 
+_CELL = 0.1  # m; larger where the world would need more than _MAX_CELLS
+_MAX_CELLS = 200_000  # in XY
+_YAWS = 8  # layers over half a turn (the box is the same both ways)
+CLIMB = 0.35  # m; largest change of height between neighbouring cells
+_MERGE = 0.3  # m; heights in one cell that differ by less are one
+_TURN = 1e-4  # m; cost of one yaw layer, only there to prefer straight ways
 _OCTILE = 1.0 / 1.0823923  # largest ratio of 8-connected to straight distance, inverted: keeps the estimate low
 
 
@@ -42,27 +48,6 @@ class EuclideanDistance:
         return np.maximum(np.hypot(*(position[:, :2] - self.goal.position[:2]).T) - self.goal.radius, 0.0)
 
 
-@dataclass(frozen=True)
-class GridConfig:
-    """Settings of the grid.
-
-    Attributes:
-        cell: m; enlarged where the world would need more than `max_cells`.
-        yaws: layers over half a turn (the box is the same both ways).
-        climb: m; largest change of height between neighbouring cells.
-        merge: m; heights in one cell that differ by less are one.
-        turn: m; cost of one yaw layer, only there to prefer straight ways.
-        max_cells: of the XY grid.
-    """
-
-    cell: float = 0.1
-    yaws: int = 8
-    climb: float = 0.35
-    merge: float = 0.3
-    turn: float = 1e-4
-    max_cells: int = 200_000
-
-
 class GridDistance:
     """Distance to the goal on the grid.
 
@@ -73,7 +58,6 @@ class GridDistance:
         goal: where to.
         bounds: (xmin, ymin, xmax, ymax) m of the grid.
         stride: m; longest step.
-        config: settings.
 
     Attributes:
         supported: whether any cell in the goal region has a surface for a sole.
@@ -87,17 +71,15 @@ class GridDistance:
         goal: Goal,
         bounds: tuple[float, float, float, float],
         stride: float,
-        config: GridConfig | None = None,
     ):
-        self.config = config = config or GridConfig()
         self._goal = goal
         extent = np.array(bounds[2:]) - bounds[:2]
-        self._cell = cell = max(config.cell, float(np.sqrt(extent.prod() / config.max_cells)))
+        self._cell = cell = max(_CELL, float(np.sqrt(extent.prod() / _MAX_CELLS)))
         shape = np.ceil(extent / cell).astype(np.int64) + 1
         self._corner = np.array(bounds[:2], float)
         levels = self._levels(projector, shape, stride)
         self._height = levels
-        nodes = np.full((*levels.shape, config.yaws), -1, np.int32)
+        nodes = np.full((*levels.shape, _YAWS), -1, np.int32)
         count = number_nodes(levels, self._corner, cell, occupancy, box, nodes)
         self._distance = np.full(nodes.shape, np.inf, np.float64)
         middle = self._corner + cell * np.stack(np.meshgrid(*(np.arange(k) for k in shape), indexing="ij"), axis=-1)
@@ -107,7 +89,7 @@ class GridDistance:
         self.supported = bool((levels[inside] > -np.inf).any())
         if len(targets):
             start, none = np.zeros(count + 1, np.int32), np.zeros(0)
-            grid = (nodes, levels, cell, config.climb, config.turn, start)
+            grid = (nodes, levels, cell, CLIMB, _TURN, start)
             edges = link_nodes(*grid, none.astype(np.int32), none)
             end, weight = np.empty(edges, np.int32), np.empty(edges)
             link_nodes(*grid, end, weight)
@@ -124,7 +106,7 @@ class GridDistance:
             cell,
             projector.half_sizes[Limb.LEFT_FOOT],
             np.ascontiguousarray(projector.offsets),
-            self.config.merge,
+            _MERGE,
             projector.table,
             low,
         )
@@ -133,7 +115,7 @@ class GridDistance:
         disc = [(i, j) for i in range(-k, k + 1) for j in range(-k, k + 1) if 0 < i * i + j * j <= reach**2]
         disc.sort(key=lambda ij: (ij[0] ** 2 + ij[1] ** 2, ij))
         levels = low.copy()
-        spread(low, np.array(disc, np.int64).reshape(-1, 2), self.config.merge, levels)
+        spread(low, np.array(disc, np.int64).reshape(-1, 2), _MERGE, levels)
         return levels
 
     def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from toolkit.centroidal.problem import GRAVITY
 from toolkit.contacts.projection import Projector
 from toolkit.geometry.pose import Pose, steepness
 from toolkit.robot.model import RobotModel
-from toolkit.search.costs.heuristic import GridConfig, GridDistance
+from toolkit.search.costs.heuristic import CLIMB, GridDistance
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.surface import Surface
 from toolkit.world.world import World
@@ -44,15 +44,14 @@ class TerrainDistance:
         robot: the robot.
         world: the world.
         projector: of the robot on the world's surfaces.
-        config: of the grid.
 
     Attributes:
         box: the body.
         occupancy: what the body can hit, around start and goal.
     """
 
-    def __init__(self, robot: RobotModel, world: World, projector: Projector, config: GridConfig):
-        self._world, self._projector, self._config = world, projector, config
+    def __init__(self, robot: RobotModel, world: World, projector: Projector):
+        self._world, self._projector = world, projector
         self.box = BodyBox.of(robot)
         table = projector.table
         first, last = table.edge_start[:-1], table.edge_start[1:]
@@ -95,7 +94,7 @@ class TerrainDistance:
 
     def _grid(self, occupancy: Occupancy, stride: float) -> GridDistance:
         bounds = self._bounds[self._detour]
-        return GridDistance(self._projector, occupancy, self.box, self._world.goal, bounds, stride, self._config)
+        return GridDistance(self._projector, occupancy, self.box, self._world.goal, bounds, stride)
 
     @staticmethod
     def _at(grid: GridDistance, start: Pose) -> float:
@@ -115,7 +114,7 @@ class TerrainDistance:
             return f"{head}: walls or a ceiling leave no room for the body ({room}) on any way; make more room"
         return (
             f"{head}: the ground is interrupted by a gap wider than the longest step ({stride:.2g} m) or a rise higher "
-            f"than {self._config.climb:.2g} m; bring the surfaces closer together"
+            f"than {CLIMB:.2g} m; bring the surfaces closer together"
         )
 
     def too_steep(self, friction: float) -> str:

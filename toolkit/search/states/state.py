@@ -50,6 +50,13 @@ def pack_pending(before: np.ndarray, contacts: np.ndarray, limb: np.ndarray, tim
     return _split(rows)
 
 
+def moved_last(state: bytes, limb: int) -> bytes:
+    """The same state after another last limb, so that this one may not move at once."""
+    row = unpack([state]).copy()
+    row[:, LAST] = limb
+    return row.tobytes()
+
+
 def is_pending(state: bytes) -> bool:
     """Whether a state stands for a transition that is still to be judged."""
     return len(state) == 4 * PENDING
@@ -64,6 +71,15 @@ def unpack_all(states: Sequence[bytes]) -> np.ndarray:
     """(n, 11) int rows of states of both kinds; of pending ones the part that they share."""
     size = 4 * SIZE
     return np.frombuffer(b"".join([state[:size] for state in states]), np.int32).reshape(len(states), SIZE)
+
+
+def origin_of(row: np.ndarray) -> np.ndarray:
+    """The row of a state, or, of a pending one, that of the state that it comes from (its last limb apart)."""
+    if len(row) <= OLD:
+        return row
+    before = row.copy()
+    before[CONTACTS][row[LAST]] = row[OLD]
+    return before
 
 
 def _split(rows: np.ndarray) -> list[bytes]:

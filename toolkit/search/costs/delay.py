@@ -1,11 +1,13 @@
-"""How far a motion runs ahead of its feet: what to be wary of where feet slide and cannot brake.
+"""What makes states wait for others: an estimate for the order of expansion, never a verdict.
+
+A transition not yet judged waits the longer the more it would have to bend the motion (`toolkit.search.moves.drift`).
+Where feet slide and cannot brake, a motion that runs ahead of its feet waits as well.
 
 The capture point c + v / w, w^2 = g / h, of an inverted pendulum is where the robot would have to step to come to rest.
 The farther it lies ahead of the foremost foot, the longer the next stride has to be, until no stride is long enough.
 On ground steeper than its friction angle the robot moreover gains v^2 = 2 a with every metre, whatever it does, so that
 whoever is fast early is too fast for its legs later: v^2 / 2 a is the way by which it is too far on. And legs that
-turn in fast swings touch each other. All of it only delays a state: an estimate for the order of expansion, never a
-verdict.
+turn in fast swings touch each other.
 
 Reference:
     Koolen, de Boer, Rebula, Goswami, Pratt: Capturability-based analysis and control of legged locomotion, IJRR 2012.
@@ -19,6 +21,9 @@ import numpy as np
 
 from toolkit.centroidal.problem import GRAVITY
 from toolkit.geometry.heading import wrapped
+from toolkit.search.costs.edge_cost import CostConfig
+from toolkit.search.moves.candidates import Candidates
+from toolkit.search.moves.drift import Drift
 from toolkit.search.states.contact_table import ContactTable
 
 
@@ -71,3 +76,36 @@ class Haste:
         turn = self._table.yaw[contacts[:, 0]] - self._table.yaw[contacts[:, 1]]
         turn = np.abs(wrapped(turn))
         return self._capture * np.maximum(capture, 0.0) + self._energy * square + self._turn * turn
+
+
+class Delay:
+    """How long the states of one search wait, in units of cost.
+
+    Args:
+        config: Weights of what waits to be judged.
+        drift: Of the CoM.
+        haste: Of motions that run ahead of their feet; None where that is no matter.
+    """
+
+    def __init__(self, config: CostConfig, drift: Drift, haste: Haste | None):
+        self._config, self._drift, self._haste = config, drift, haste
+
+    def of_states(self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """(n,) delays of states with contact numbers (n, 4), CoM (n, 3) m and velocity (n, 3) m/s."""
+        return np.zeros(len(contacts)) if self._haste is None else self._haste.delay(contacts, com, velocity)
+
+    def of_waiting(
+        self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray, candidates: Candidates, *, doubted: bool
+    ) -> np.ndarray:
+        """(n,) delays of transitions that are not judged yet.
+
+        Args:
+            contacts: (4,) int; contact numbers of the state that they lead out of.
+            com: (3,) m; its CoM.
+            velocity: (3,) m/s; its velocity.
+            candidates: The n transitions.
+            doubted: Whether one judge has already rejected them.
+        """
+        miss = self._drift.miss(contacts, com, velocity, candidates)
+        doubt = self._config.doubt if doubted else 0.0
+        return doubt + self._config.miss * miss + self.of_states(contacts[None], com[None], velocity[None])

@@ -1,0 +1,52 @@
+"""Networks hand on what they were not trained for, and count it in their answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.prediction.networks import write_random_networks
+from tests.prediction.test_features import random_case
+from toolkit.contacts.category import Category
+from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
+from toolkit.prediction.network import load_network, network_path
+from toolkit.prediction.networks import NetworkEvaluator
+from toolkit.world.timing import Timing
+
+CATEGORY = Category.MOVE_FOOT
+
+
+class Seven(TransitionEvaluator):
+    """Finds everything feasible at an objective of 7."""
+
+    def evaluate(self, stance, com, com_velocity, transitions):
+        n = len(transitions)
+        return TransitionBatch(np.ones(n, bool), np.full(n, 7.0), np.zeros((n, 3)), np.zeros((n, 3)))
+
+
+@pytest.fixture
+def networks(tmp_path):
+    write_random_networks(tmp_path / "networks", "abc")
+    return {CATEGORY: load_network(network_path(tmp_path / "networks", CATEGORY), CATEGORY, "abc")}
+
+
+def test_what_was_not_trained_goes_to_the_stand_in_and_is_counted(networks):
+    stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(0))
+    known, strange = (replace(transition, timing=Timing(0.5, swing)) for swing in (0.5, 3.0))  # trained: up to 1 s
+    judge = NetworkEvaluator(networks, Seven())
+    batch = judge.evaluate(stance, com, velocity, [known, strange, strange])
+    assert batch.untrained == 2 and batch.feasible[1:].all()
+    np.testing.assert_array_equal(batch.objective[1:], 7.0)
+    assert judge.evaluate(stance, com, velocity, [known]).untrained == 0
+    assert NetworkEvaluator(networks).evaluate(stance, com, velocity, [strange]).untrained == 1  # judged all the same
+
+
+def test_a_judge_says_of_itself_what_a_search_has_to_know(networks):
+    stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(1))
+    plain, stand_in = Seven(), Seven()
+    assert (plain.costly, plain.rejection, plain.stand_in) == (False, "dynamics", None)
+    assert plain.halt(stance, com, velocity, [transition], 0.6) is None
+    assert plain.evaluate(stance, com, velocity, [transition]).untrained == 0
+    assert NetworkEvaluator(networks, stand_in).stand_in is stand_in
+    with pytest.raises(TypeError, match="abstract"):
+        TransitionEvaluator()

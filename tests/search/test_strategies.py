@@ -1,0 +1,123 @@
+"""Strategies own their settings; the edge cost owns its terms and their lower bound."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.search.worlds import FLOOR, make_world
+from toolkit.contacts.projection import Projected
+from toolkit.geometry.limb import Limb
+from toolkit.prediction.kinematic import KinematicEvaluator
+from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.costs.edge_cost import CostConfig, EdgeCost
+from toolkit.search.costs.heuristic import EuclideanDistance
+from toolkit.search.moves.candidates import Candidates, mean_feet
+from toolkit.search.planner_config import PlannerConfig
+from toolkit.search.states.contact_table import ContactTable
+from toolkit.search.states.state import LAST, moved_last, pack, unpack
+from toolkit.search.strategies import strategy_of
+from toolkit.world.timing import Timing
+
+CONFIG = PlannerConfig(search=AnaStarConfig(max_expansions=100))
+
+
+class Slow(KinematicEvaluator):
+    """A judge that had better be asked about one transition at a time."""
+
+    costly = True
+
+
+@pytest.fixture
+def quick(robot):
+    """A judge that has a stand-in."""
+    judge = KinematicEvaluator(robot)
+    judge.stand_in = Slow(robot)
+    return judge
+
+
+def test_an_ordinary_search_judges_at_once_and_doubts_nothing(quick):
+    strategy = strategy_of(CONFIG, quick, 3.0, slides=False)
+    assert (strategy.at_once, strategy.waiting, strategy.hasty, strategy.haste) == (quick, None, None, None)
+    assert strategy.cost == CONFIG.cost
+    assert strategy.patient == replace(CONFIG.search, initial_cost=3.0 * CONFIG.acceptable_cost)
+
+
+@pytest.mark.parametrize("slides", [False, True])
+def test_a_lazy_search_lets_everything_wait_and_may_look_at_more(robot, slides):
+    judge = Slow(robot)
+    strategy = strategy_of(CONFIG, judge, 0.5, slides=slides)
+    assert (strategy.at_once, strategy.waiting, strategy.hasty, strategy.haste) == (None, judge, None, None)
+    assert strategy.patient.max_expansions == 2000
+    assert strategy.patient.initial_cost == CONFIG.acceptable_cost
+    assert strategy.patient.patience == CONFIG.search.patience * (10 if slides else 1)
+    assert strategy.cost.steep == (0.0 if slides else CONFIG.cost.steep)
+
+
+@pytest.mark.parametrize(("limit", "patient", "hasty"), [(100, 300, 60), (None, None, 600)])
+def test_a_sliding_search_begins_in_haste_and_asks_the_stand_in(quick, limit, patient, hasty):
+    config = replace(CONFIG, search=replace(CONFIG.search, max_expansions=limit))
+    strategy = strategy_of(config, quick, 3.0, slides=True)
+    assert (strategy.at_once, strategy.waiting, strategy.haste) == (quick, quick.stand_in, config.haste)
+    assert strategy.hasty is not None and strategy.hasty.first_only and not strategy.patient.first_only
+    assert (strategy.patient.max_expansions, strategy.hasty.max_expansions) == (patient, hasty)
+    assert strategy.patient.initial_cost == np.inf  # the cost so far would lead back
+    assert strategy.cost.steep == 0.0
+
+
+def test_a_given_first_cost_is_kept(quick):
+    config = replace(CONFIG, search=replace(CONFIG.search, initial_cost=7.0))
+    assert all(strategy_of(config, quick, 3.0, slides=slides).patient.initial_cost == 7.0 for slides in (False, True))
+
+
+def test_a_limb_that_moved_last_is_all_that_changes():
+    state = pack(np.array([[3, 5, -1, 8]]), np.array([-1]), np.ones((1, 3)), np.zeros((1, 3)))[0]
+    before, after = unpack([state])[0], unpack([moved_last(state, Limb.RIGHT_FOOT)])[0]
+    assert (before[LAST], after[LAST]) == (-1, Limb.RIGHT_FOOT)
+    np.testing.assert_array_equal(np.delete(before, LAST), np.delete(after, LAST))
+
+
+@pytest.fixture
+def walk():
+    """Costs on a floor of friction 0.5 with the goal at x = 1 m, and moves of the left foot from 0 to `x` m."""
+    table, goal = ContactTable(np.array([0.5])), make_world(FLOOR, goal=(1.0, 0, 0)).goal
+    timings = (Timing(0.5, 0.5), Timing(1.0, 1.0))
+
+    def cost(config):
+        return EdgeCost(config, table, timings, goal, EuclideanDistance(goal), 0.4)
+
+    def moves(x, angle=0.0):
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+        n = len(x)
+        right = table.add(Limb.RIGHT_FOOT, Projected(np.zeros(1, int), np.array([[0.9, -0.1, 0]]), np.eye(3)[None]))
+        place = np.column_stack([x, np.full(n, 0.1), np.zeros(n)])
+        left = table.add(Limb.LEFT_FOOT, Projected(np.zeros(n, int), place, np.tile(turn, (n, 1, 1))))
+        after = np.column_stack([left, np.full(n, right[0]), np.full((n, 2), -1)])
+        centre, yaw = mean_feet(table, after)
+        return Candidates(np.zeros(n, int), left, after, centre, yaw, np.abs(x) / 2, np.arange(n) % 2)
+
+    return cost, moves
+
+
+def test_the_edge_cost_is_the_sum_of_its_terms(walk):
+    cost, moves = walk
+    candidates = moves(np.array([0.0, 0.2, 0.8]))
+    edges = cost(CostConfig(step=3.0, time=5.0, stagger=10.0)).known(candidates)
+    way, time, stagger = np.array([0.0, 0.1, 0.4]), 5.0 * np.array([1.0, 2.0, 1.0]), np.array([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(edges, way + 3.0 + time + stagger, rtol=1e-12)
+    tilted, angle = moves(np.array([0.1]), 0.4), np.tan(0.4) / 0.5
+    steep = cost(CostConfig(steep=200.0, reserve=0.5)).known(tilted) - cost(CostConfig(steep=0.0)).known(tilted)
+    np.testing.assert_allclose(steep, 200.0 * (0.5 / (1.0 - angle) - 1.0), rtol=1e-9)
+
+
+def test_no_edge_costs_less_than_its_bound_and_the_heuristic_falls_no_faster_than_costs_rise(walk):
+    cost, moves = walk
+    edge, candidates = cost(CostConfig()), moves(np.linspace(0.0, 0.8, 9))
+    least = edge.least_of_edge(candidates)
+    assert (edge.known(candidates) >= least).all()
+    before = edge.to_go(np.array([[0.45, 0.0, 0.0]]), np.zeros(1))
+    after = edge.to_go(candidates.centre, candidates.yaw)
+    assert (after >= 0.0).all() and (after[~edge.at_goal(candidates.centre)] >= 3.0).all()
+    assert (before <= least + after + 1e-9).all()
+    assert edge.per_metre == pytest.approx(1.0 + 3.0 / 0.4)

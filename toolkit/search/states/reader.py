@@ -1,0 +1,68 @@
+"""States of the contact search in the words of contacts: stances and transitions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Stance
+from toolkit.contacts.transition_rows import TransitionRows
+from toolkit.geometry.limb import Limb
+from toolkit.search.states.contact_table import ContactTable
+from toolkit.search.states.state import COM, CONTACTS, LAST, VELOCITY, origin_of, pack, unpack
+from toolkit.world.timing import Timing
+
+_LIMBS = tuple(Limb)
+
+
+class StateReader:
+    """Reads the states of one search.
+
+    Args:
+        table: The contacts that states name by number.
+        timings: The timings of transitions to choose from.
+    """
+
+    def __init__(self, table: ContactTable, timings: tuple[Timing, ...]):
+        self._table, self._timings = table, timings
+        self._shifts, self._swings = np.array([(item.shift, item.swing) for item in timings]).T
+
+    def at_rest(self, stance: Stance, com: np.ndarray) -> bytes:
+        """State of a robot at rest in a stance with CoM (3,) m, of which no limb has moved yet."""
+        numbers = np.full((1, 4), -1)
+        for contact in stance.contacts:
+            numbers[0, contact.limb] = self._table.add_contact(contact)
+        return pack(numbers, np.array([-1]), com[None], np.zeros((1, 3)))[0]
+
+    def stance(self, contacts: np.ndarray) -> Stance:
+        """Stance of contact numbers (4,)."""
+        return Stance(tuple(self._table.contact(int(number)) for number in contacts if number >= 0))
+
+    def origin(self, state: bytes) -> tuple[Stance, np.ndarray, np.ndarray]:
+        """Stance, CoM (3,) m and velocity (3,) m/s of a state, or of the one that a pending state comes from."""
+        row = unpack([state])[0]
+        return self.stance(origin_of(row)[CONTACTS]), row[COM] / 1000.0, row[VELOCITY] / 1000.0
+
+    def transition(self, state: bytes, payload: tuple[float, int]) -> ContactTransition:
+        """The transition that led to a state over an edge with this payload (objective, index of the timing)."""
+        row = unpack([state])[0]
+        limb = int(row[LAST])
+        return self._transition(limb, int(row[CONTACTS][limb]), payload[1])
+
+    def transitions(self, limb: np.ndarray, number: np.ndarray, timing: np.ndarray) -> TransitionRows:
+        """Transitions of limbs (n,) to contact numbers (n,), -1 where a palm breaks, with timings (n,) by index."""
+        table = self._table
+        return TransitionRows(
+            limb,
+            number >= 0,
+            table.position[number],
+            table.rotation[number],
+            table.friction(number),
+            self._shifts[timing],
+            self._swings[timing],
+            lambda row: self._transition(int(limb[row]), int(number[row]), int(timing[row])),
+        )
+
+    def _transition(self, limb: int, number: int, timing: int) -> ContactTransition:
+        contact = self._table.contact(number) if number >= 0 else None
+        return ContactTransition(_LIMBS[limb], contact, self._timings[timing])
