@@ -8,8 +8,8 @@ import numpy as np
 
 from toolkit.contacts.category import Category
 from toolkit.errors import InputError
-from toolkit.learning.dataset import Samples
-from toolkit.prediction.features import contact_count, tait_bryan
+from toolkit.learning.samples import Samples
+from toolkit.prediction.features import tait_bryan
 
 AXES, ANGLES = "axes of each contact's frame", "Tait-Bryan angles with copies at ±2π"
 NEAR = 0.5  # rad; angles so near to ±π are copied
@@ -75,19 +75,21 @@ def compare_encodings(
         InputError: torch is not installed.
     """
     try:
-        from toolkit.learning.fit import FitConfig, train_networks
+        from toolkit.learning.descent import FitConfig
+        from toolkit.learning.fit import train_networks
     except ImportError:
         raise InputError("the comparison of encodings needs torch: pip install -e '.[train]'") from None
     config = FitConfig(epochs=epochs, seed=seed)
-    contacts = contact_count(category)
+    contacts = len(category.contact_limbs)
     results = {}
     for name in (AXES, ANGLES):
-        learnt, asked = train, test
+        learnt, asked, settings = train, test, config
         if name == ANGLES:
             features, rows = with_copies(tait_bryan(train.features, category), contacts)
-            learnt = Samples(features.astype(np.float32), train.feasible[rows], train.targets[rows])
+            learnt = replace(train.select(rows), features=features.astype(np.float32))
             asked = replace(test, features=tait_bryan(test.features, category).astype(np.float32))
-        trained = train_networks(learnt, config)
+            settings = replace(config, sensitivity_weight=0.0)  # derivatives are known in axes alone
+        trained = train_networks(learnt, settings)
         feasible = trained.feasible(asked.features)
         good = asked.feasible
         outputs, targets = trained.predict(asked.features[good]), asked.targets[good]

@@ -17,8 +17,11 @@ from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
 from toolkit.learning import collect as module
 from toolkit.learning.collect import collect
-from toolkit.learning.dataset import Samples, shard_path
-from toolkit.learning.shard import CollectConfig
+from toolkit.learning.collect_config import CollectConfig
+from toolkit.learning.dataset import shard_path
+from toolkit.learning.jobs import executor
+from toolkit.learning.samples import Samples
+from toolkit.learning.sensitivity import unknown_sensitivity
 from toolkit.prediction.features import feature_size
 from toolkit.robot.loader import load_robot
 
@@ -48,6 +51,7 @@ def quick_shard(config, index):
             rng.normal(size=(n, feature_size(category))).astype(np.float32),
             rng.random(n) < 0.6,
             rng.normal(size=(n, 7)).astype(np.float32),
+            unknown_sensitivity(category, n),
         )
         for category in Category
     }
@@ -125,7 +129,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 from toolkit.learning.collect import collect
-from toolkit.learning.shard import CollectConfig
+from toolkit.learning.collect_config import CollectConfig
 from toolkit.robot.loader import load_robot
 
 if __name__ == "__main__":
@@ -171,8 +175,6 @@ def test_a_cluster_makes_the_same_shards(tmp_path, robot):
     config = CollectConfig(robot=robot.name, seed=5, samples_per_category=12, per_shard=4)
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         collect(tmp_path / "local", robot, config, pool)
-    from toolkit.train import executor
-
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
         executor(2, cluster.scheduler_address) as pool,

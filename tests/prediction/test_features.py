@@ -8,7 +8,7 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_about_z
-from toolkit.prediction.features import LAYOUT, MIRROR, encode, feature_size, tait_bryan
+from toolkit.prediction.features import MIRROR, encode, feature_size, tait_bryan
 from toolkit.world.timing import Timing
 
 REFLECT = np.diag(MIRROR)
@@ -22,14 +22,13 @@ def random_rotation(rng):
 
 def random_case(category, rng):
     """A stance, CoM, velocity and transition of a category, moving a left limb."""
-    limbs, makes = LAYOUT[category]
 
     def contact(limb):
         return Contact(limb, Pose(random_rotation(rng), rng.normal(size=3)), 0.5)
 
-    moving = Limb.LEFT_FOOT if "FOOT" in category.name else Limb.LEFT_PALM
-    stance = Stance(tuple(contact(limb) for limb in sorted(limbs)))
-    transition = ContactTransition(moving, contact(moving) if makes else None, Timing(0.7, 0.4))
+    moving = category.moving
+    stance = Stance(tuple(contact(limb) for limb in category.before))
+    transition = ContactTransition(moving, contact(moving) if category.makes else None, Timing(0.7, 0.4))
     return stance, rng.normal(size=3), rng.normal(size=3), transition
 
 

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from toolkit.contacts.category import Category
+from toolkit.contacts.category import Category, categories_of
+from toolkit.learning.collect_config import CollectConfig
 from toolkit.learning.dataset import (
     SCHEMA,
     Manifest,
-    Samples,
     begin,
     plain_settings,
     read_shard,
@@ -24,7 +24,8 @@ from toolkit.learning.dataset import (
     write_shard,
 )
 from toolkit.learning.jobs import run_jobs
-from toolkit.learning.shard import CollectConfig, categories_of, collect_shard
+from toolkit.learning.samples import Samples
+from toolkit.learning.shard import collect_shard
 from toolkit.robot.model import RobotModel
 
 Counts = dict[Category, tuple[int, int]]
@@ -44,9 +45,9 @@ class CollectSummary:
     """How a collection went.
 
     Attributes:
-        labelled: transitions in the data set now.
-        resumed: of them from before.
-        seconds: wall-clock.
+        labelled: number of transitions in the data set now.
+        resumed: number of those that were there before.
+        seconds: wall-clock time.
         counts: (feasible, all) transitions of each category.
     """
 
@@ -86,10 +87,10 @@ def collect(
 
     Args:
         folder: the data set, seen under the same path by every worker.
-        robot: that `config.robot` names.
+        robot: the robot that `config.robot` names.
         config: what to collect.
         executor: where shards are made, through the `concurrent.futures` interface.
-        progress: told how far it is.
+        progress: is told how far it is.
         ahead: shards handed to the executor at a time.
 
     Returns:
