@@ -57,9 +57,11 @@ def test_what_changes_in_the_world_is_what_changes_in_the_features(category, mir
 
 
 @pytest.mark.parametrize("category", list(Category))
-def test_features_are_decoded(category):
+@pytest.mark.parametrize("mirror", [False, True])
+def test_features_are_decoded(category, mirror):
     _, features = encode(*(case := random_case(category, np.random.default_rng(int(category))))[:3], [case[3]])
-    stance, com, velocity, transition = decode(features[0], category)
+    stance, com, velocity, transition = decode(features[0], category, mirrored=mirror)
+    assert transition.limb.is_left != mirror
     np.testing.assert_allclose(encode(stance, com, velocity, [transition])[1], features, rtol=0, atol=1e-12)
 
 

@@ -85,11 +85,19 @@ def category_of(stance: Stance, transition: ContactTransition) -> Category:
     return Category(category_rows(stance, [transition])[0])
 
 
+def performs(robot: RobotModel, category: Category, *, mirrored: bool = False) -> bool:
+    """Whether a robot has the limbs of a category's row, or of its mirror image."""
+    used = (*category.before, category.moving)
+    return {limb.mirrored if mirrored else limb for limb in used} <= {*robot.legs, *robot.arms}
+
+
 def categories_of(robot: RobotModel) -> list[Category]:
     """Categories that a robot has the limbs for, on one of its sides at least."""
-    limbs = {*robot.legs, *robot.arms}
-    sides = {category: {*category.before, category.moving} for category in Category}
-    return [category for category, used in sides.items() if used <= limbs or {limb.mirrored for limb in used} <= limbs]
+    return [
+        category
+        for category in Category
+        if performs(robot, category) or performs(robot, category, mirrored=True)
+    ]
 
 
 @lru_cache

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from toolkit.contacts.category import Category
+from toolkit.contacts.category import Category, performs
 from toolkit.geometry.limb import FEET
 from toolkit.learning.dataset import (
     SCHEMA,
@@ -232,9 +232,9 @@ def chosen(features: np.ndarray, network: TransitionNetwork, count: int, rng: np
 
 def labelled(robot: RobotModel, category: Category, features: np.ndarray) -> Samples:
     """Samples of transitions with features (n, d): the feasible ones whose objective is not above the limit."""
-    parts = [no_samples(category)]
+    parts, mirrored = [no_samples(category)], not performs(robot, category)
     for row in features:
-        stance, com, velocity, transition = decode(row, category)
+        stance, com, velocity, transition = decode(row, category, mirrored=mirrored)
         labels = label(robot, stance, com[None], velocity[None], [transition])
         found = samples_of(stance, com[None], velocity[None], [transition], labels)
         parts.append(found.select(labels.feasible & (labels.objective <= LIMIT)))
