@@ -11,8 +11,7 @@ from rich.console import Console
 from toolkit import cli
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError, InputError
-from toolkit.learning.collect import Progress as Collected
-from toolkit.learning.collect import collect
+from toolkit.learning.collect import Collected, collect
 from toolkit.learning.collect_config import CollectConfig
 from toolkit.learning.dataset import read_dataset, read_datasets
 from toolkit.learning.enrich import EnrichConfig, enrich
@@ -55,8 +54,7 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
         summary = collect(args.out, robot, config, pool, tick)
     console.print(
         f"{summary.labelled} transitions in {summary.seconds:.0f} s ({summary.rate:.0f} per s, {summary.resumed} found "
-        f"from before), feasible: {summary.feasible_share:.0%}; fewest of a category: "
-        f"{min(total for _, total in summary.counts.values())}\n{args.out}"
+        f"from before), feasible: {summary.feasible_share:.0%}; fewest of a category: {summary.fewest}\n{args.out}"
     )
     return 0
 

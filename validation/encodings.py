@@ -9,7 +9,7 @@ import numpy as np
 from toolkit.contacts.category import Category
 from toolkit.errors import InputError
 from toolkit.learning.samples import Samples
-from toolkit.prediction.features import tait_bryan
+from toolkit.prediction.features import CONTACT
 
 AXES, ANGLES = "axes of each contact's frame", "Tait-Bryan angles with copies at ±2π"
 NEAR = 0.5  # rad; angles so near to ±π are copied
@@ -33,6 +33,27 @@ class EncodingScore:
     relative_objective_error: float
     com_error: float
     velocity_error: float
+
+
+def tait_bryan(features: np.ndarray, category: Category) -> np.ndarray:
+    """The paper's encoding: each contact's axes replaced by yaw, pitch and roll in [-pi, pi).
+
+    Args:
+        features: (n, feature_size) as `encode` gives them.
+        category: of the transitions.
+
+    Returns:
+        (n, 6 * contacts + 9) float.
+    """
+    count = len(category.contact_limbs)
+    contacts = features[:, : CONTACT * count].reshape(len(features), count, CONTACT)
+    x, z = contacts[..., 3:6], contacts[..., 6:9]
+    y = np.cross(z, x)
+    yaw = np.arctan2(x[..., 1], x[..., 0])
+    pitch = np.arctan2(-x[..., 2], np.hypot(x[..., 0], x[..., 1]))
+    roll = np.arctan2(y[..., 2], z[..., 2])
+    poses = np.concatenate([contacts[..., :3], np.stack([yaw, pitch, roll], -1)], axis=-1)
+    return np.concatenate([poses.reshape(len(features), -1), features[:, CONTACT * count :]], axis=1)
 
 
 def with_copies(features: np.ndarray, contacts: int, *, near: float = NEAR) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from toolkit.errors import DatasetError
 from toolkit.learning import collect as module
 from toolkit.learning.collect import collect
 from toolkit.learning.collect_config import CollectConfig
-from toolkit.learning.dataset import shard_path
+from toolkit.learning.dataset import read_shard, shard_path
 from toolkit.learning.jobs import executor
 from toolkit.learning.samples import Samples
 from toolkit.learning.sensitivity import unknown_sensitivity
@@ -76,7 +76,10 @@ def test_an_interrupted_collection_goes_on_to_the_same_files(tmp_path, robot, co
     whole, halting = tmp_path / "whole", tmp_path / "halting"
     summary = collect(whole, robot, config, InlineExecutor())
     assert len(list(whole.glob("shard-*.npz"))) == config.shards == 5
-    assert summary.resumed == 0 and summary.labelled == sum(total for _, total in summary.counts.values())
+    assert summary.resumed == 0 and config.samples_per_category <= summary.fewest
+    shards = [read_shard(path) for path in whole.glob("shard-*.npz")]
+    assert summary.labelled == sum(len(group) for shard in shards for group in shard.values())
+    assert summary.feasible == sum(group.feasible.sum() for shard in shards for group in shard.values())
     with pytest.raises(KeyboardInterrupt):
         collect(halting, robot, config, InlineExecutor(fail_at=3), ahead=1)
     assert len(list(halting.glob("shard-*.npz"))) == 2

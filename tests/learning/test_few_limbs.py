@@ -30,7 +30,7 @@ ROBOTS = {
 }
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", ["feet_only", "left_arm", pytest.param("right_arm", marks=pytest.mark.slow)])
 def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
     model, toml, categories = ROBOTS[name]
     robot = load_robot(str(write_robot(tmp_path / "robots" / name, model, toml)))
@@ -41,7 +41,7 @@ def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
 
     def planned(planner):
         out = ["--out", str(tmp_path / planner), "--no-recording"]
-        return plan.main([str(world), *options, *out, "--planner", planner, "--expansions", "60"])
+        return plan.main([str(world), *options, *out, "--planner", planner, "--expansions", "30"])
 
     def trained(command, *more):
         return train.main([command, *options, *more])
@@ -51,12 +51,12 @@ def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
 
     # Few samples, made in this process; the commands themselves are as they are.
     monkeypatch.setattr(train, "executor", lambda workers, cluster: ThreadPoolExecutor(1))
-    monkeypatch.setattr(train, "CollectConfig", partial(CollectConfig, per_shard=20, default_share=0.7))
+    monkeypatch.setattr(train, "CollectConfig", partial(CollectConfig, per_shard=30, default_share=0.7))
     monkeypatch.setattr(fit, "MINIMUM", 3)
     data, rich, mixed = (str(tmp_path / folder) for folder in ("data", "rich", "mixed"))
-    assert trained("collect", "--out", data, "--samples", "60") == 0
+    assert trained("collect", "--out", data, "--samples", "30") == 0
     samples = read_dataset(tmp_path / "data", robot.fingerprint)
-    assert list(samples) == categories and min(len(group) for group in samples.values()) >= 60
+    assert list(samples) == categories and min(len(group) for group in samples.values()) >= 30
     assert trained("enrich", "--data", data, "--out", rich, "--draws", "6") == 0
     more = read_dataset(tmp_path / "rich", robot.fingerprint)
     assert list(more) == categories and sum(len(group) for group in more.values()) > 0
@@ -66,6 +66,5 @@ def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
     assert trained("enrich", "--data", data, "--out", mixed, "--draws", "3", "--networks", networks) == 0
     assert trained("evaluate", "--data", data, "--count", "20") == 0
     assert planned("learned") in (0, 1)  # what so little training says of a plan is open
-    assert planned("auto") in (0, 1)
     for group in samples.values():
         assert np.isfinite(group.features).all()

@@ -93,11 +93,7 @@ def performs(robot: RobotModel, category: Category, *, mirrored: bool = False) -
 
 def categories_of(robot: RobotModel) -> list[Category]:
     """Categories that a robot has the limbs for, on one of its sides at least."""
-    return [
-        category
-        for category in Category
-        if performs(robot, category) or performs(robot, category, mirrored=True)
-    ]
+    return [category for category in Category if performs(robot, category) or performs(robot, category, mirrored=True)]
 
 
 @lru_cache

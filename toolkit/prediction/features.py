@@ -3,7 +3,7 @@
 Every transition is brought into one canonical form: the frame of the parent stance (mean of the feet, yaw only), and
 mirrored where a right limb moves, so that the moving limb is always a left one (paper, Sec. VI). Each contact enters
 with its position and the x and z axes of its frame (9 numbers). The axes are continuous over all orientations, so the
-paper's copies of samples at +-2 pi are not needed; `tait_bryan` gives the paper's angles for comparison.
+paper's copies of samples at +-2 pi are not needed.
 
 Order: left foot, right foot, (left palm), (right palm), (new contact), CoM, CoM velocity, shift, swing, friction.
 """
@@ -131,24 +131,3 @@ def encode(
     features[:, column + 3 : column + 6] = frame.vector(np.asarray(com_velocity, float))
     features[:, column + 6], features[:, column + 7], features[:, column + 8] = new.shift, new.swing, friction
     return frame, features
-
-
-def tait_bryan(features: np.ndarray, category: Category) -> np.ndarray:
-    """The paper's encoding: each contact's axes replaced by yaw, pitch and roll in [-pi, pi).
-
-    Args:
-        features: (n, feature_size) as `encode` gives them.
-        category: of the transitions.
-
-    Returns:
-        (n, 6 * contacts + 9) float.
-    """
-    count = len(category.contact_limbs)
-    contacts = features[:, : CONTACT * count].reshape(len(features), count, CONTACT)
-    x, z = contacts[..., 3:6], contacts[..., 6:9]
-    y = np.cross(z, x)
-    yaw = np.arctan2(x[..., 1], x[..., 0])
-    pitch = np.arctan2(-x[..., 2], np.hypot(x[..., 0], x[..., 1]))
-    roll = np.arctan2(y[..., 2], z[..., 2])
-    poses = np.concatenate([contacts[..., :3], np.stack([yaw, pitch, roll], -1)], axis=-1)
-    return np.concatenate([poses.reshape(len(features), -1), features[:, CONTACT * count :]], axis=1)
