@@ -3,98 +3,33 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager, suppress
-from dataclasses import asdict
-from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from toolkit import cli
 from toolkit.contacts.category import Category
-from toolkit.errors import DatasetError, InputError, NetworkError
-from toolkit.learning.collect import Progress as Collected
-from toolkit.learning.collect import collect
+from toolkit.errors import DatasetError, InputError
+from toolkit.learning.collect import Collected, collect
+from toolkit.learning.collect_config import CollectConfig
 from toolkit.learning.dataset import read_dataset, read_datasets
-from toolkit.learning.differentiate import differentiate
 from toolkit.learning.enrich import EnrichConfig, enrich
-from toolkit.learning.evaluate import Score, at_default, balanced, score
-from toolkit.learning.query import query_seconds
-from toolkit.learning.shard import CollectConfig
-from toolkit.prediction.network import load_network, network_path, training_summary
+from toolkit.learning.evaluate import Score, balanced, query_seconds, score
+from toolkit.learning.jobs import executor
 from toolkit.prediction.networks import load_networks
-from toolkit.report.console import make_console
+from toolkit.report.console import make_console, progress_bar
 from toolkit.report.scores import score_table
 from toolkit.robot.loader import load_robot
-from toolkit.robot.model import RobotModel
-
-if TYPE_CHECKING:
-    from toolkit.learning.fit import FitConfig
 
 DESCRIPTION = """\
 Make the networks with which the contact search judges transitions.
 
-  collect        run the planner in random terrain and label every transition with the centroidal optimiser
-  differentiate  add to a data set of an earlier version how the optimiser's objective changes
-  enrich         label variations of transitions as well, the costly ones most of all
-  fit            train a classifier and a regressor per category (needs torch: pip install -e '.[train]')
-  evaluate       score the trained networks on fresh transitions
+  collect    run the planner in random terrain and label every transition with the centroidal optimiser
+  enrich     label more transitions made of those of a data set, the costly ones most of all
+  fit        train a classifier and a regressor per category (needs torch: pip install -e '.[train]')
+  evaluate   score the trained networks on fresh transitions
 """
-
-
-def progress_bar(console: Console) -> Progress:
-    """A progress bar for counted work."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-    )
-
-
-@contextmanager
-def executor(workers: int, cluster: str | None) -> Iterator[Executor]:
-    """Local processes, or the workers of a dask cluster.
-
-    Raises:
-        InputError: dask is not installed, or the cluster does not answer.
-    """
-    if cluster is None:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            yield pool
-        return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError("--cluster needs dask: pip install -e '.[cluster]'") from None
-    try:
-        client = Client(cluster, timeout="20s")
-    except (OSError, TimeoutError, ValueError) as error:
-        raise InputError(f"--cluster {cluster}: no dask scheduler answers there ({error})") from None
-    with client, client.get_executor(pure=False) as pool:
-        yield pool
-
-
-def add_executor_options(parser: argparse.ArgumentParser) -> None:
-    """Options for `executor`."""
-    parser.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
-    parser.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
-
-
-@contextmanager
-def shards_at_work(args: argparse.Namespace, console: Console) -> Iterator[tuple[Executor, Callable[[int, int], None]]]:
-    """The executor that the options ask for, and a callback that shows how many shards of how many are done."""
-    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
-        task = progress.add_task("shards")
-        yield pool, lambda done, of: progress.update(task, completed=done, total=of)
 
 
 def run_collect(args: argparse.Namespace, console: Console) -> int:
@@ -119,18 +54,8 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
         summary = collect(args.out, robot, config, pool, tick)
     console.print(
         f"{summary.labelled} transitions in {summary.seconds:.0f} s ({summary.rate:.0f} per s, {summary.resumed} found "
-        f"from before), feasible: {summary.feasible_share:.0%}; fewest of a category: "
-        f"{min(total for _, total in summary.counts.values())}\n{args.out}"
+        f"from before), feasible: {summary.feasible_share:.0%}; fewest of a category: {summary.fewest}\n{args.out}"
     )
-    return 0
-
-
-def run_differentiate(args: argparse.Namespace, console: Console) -> int:
-    """`differentiate`."""
-    robot = load_robot(args.robot, args.robots)
-    with shards_at_work(args, console) as (pool, progress):
-        changed = differentiate(args.data, robot, pool, progress)
-    console.print(f"{changed} shards had transitions without derivatives\n{args.data}")
     return 0
 
 
@@ -141,12 +66,17 @@ def run_enrich(args: argparse.Namespace, console: Console) -> int:
         robot=robot.name,
         robots=str(robot.folder.parent.resolve()),
         seed=args.seed,
-        categories=tuple(args.categories),
+        categories=tuple(args.categories or (int(category) for category in Category)),
         draws=args.draws,
         networks=str(args.networks.resolve()) if args.networks else None,
     )
-    with shards_at_work(args, console) as (pool, progress):
-        added = enrich(args.data, args.out, robot, config, pool, progress)
+    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
+        task = progress.add_task("shards")
+
+        def tick(done: int, of: int) -> None:
+            progress.update(task, completed=done, total=of)
+
+        added = enrich(args.data, args.out, robot, config, pool, tick)
     console.print(f"{added} transitions added\n{args.out}")
     return 0
 
@@ -156,7 +86,8 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
     try:
         import torch
 
-        from toolkit.learning.fit import FitConfig, fit_category
+        from toolkit.learning.descent import FitConfig
+        from toolkit.learning.fit import check_device, fit_category, is_trained, saved_curves
     except ImportError:
         raise InputError("fit needs torch: pip install -e '.[train]'") from None
     from toolkit.report.curves import draw_curves
@@ -166,11 +97,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
     out = args.out or robot.folder / "networks"
     data = read_datasets(args.data, robot.fingerprint, limit=args.limit)
     wanted = [Category(index) for index in args.categories] if args.categories else list(data)
-    try:
-        torch.zeros(1, device=args.device)
-    except (RuntimeError, AssertionError) as error:
-        reason = str(error).splitlines()[0]
-        raise InputError(f"--device {args.device}: torch cannot compute there ({reason}); use --device cpu") from None
+    check_device(args.device)
     config = FitConfig(
         epochs=args.epochs,
         batch=args.batch,
@@ -184,53 +111,31 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
         for number, category in enumerate(wanted):
             if category not in data:
                 raise DatasetError(f"{args.data[0]}: holds no transitions of category {int(category)}; collect more")
+            samples = data[category]
+            if args.resume and is_trained(category, out, robot.fingerprint, config, len(samples)):
+                console.print(f"category {int(category)}: trained already")
+                continue
 
             def tick(name: str, epoch: int, training: float, held: float, number=number, category=category) -> None:
                 done = (2 * number + (name == "regressor")) * config.epochs + epoch + 1
                 progress.update(task, completed=done, description=f"{int(category)} {name} {training:.4f} {held:.4f}")
 
-            if args.resume and _is_trained(robot, out, category, config, len(data[category])):
-                console.print(f"category {int(category)}: trained already")
-                continue
-            kept = None
-            if args.keep_classifiers or args.refine:
-                kept = load_network(network_path(out, category), category, robot.fingerprint)
             curves = fit_category(
                 category,
-                data[category],
+                samples,
                 fingerprint=robot.fingerprint,
                 folder=out,
                 config=config,
                 progress=tick,
-                kept=kept,
+                keep_classifier=args.keep_classifiers,
                 refine=args.refine,
             )
             if not console.is_terminal:
                 losses = {name: round(float(curve.validation.min()), 4) for name, curve in curves.items()}
-                console.print(f"category {int(category)}: {len(data[category])} transitions, validation {losses}")
-            draw_curves(_saved_curves(robot, out), out / "learning_curves.png")
+                console.print(f"category {int(category)}: {len(samples)} transitions, validation {losses}")
+            draw_curves(saved_curves(out, robot.fingerprint), out / "learning_curves.png")
     console.print(str(out))
     return 0
-
-
-def _is_trained(robot: RobotModel, folder: Path, category: Category, config: FitConfig, samples: int) -> bool:
-    """Whether the folder holds networks of a category, trained with these settings on as many samples."""
-    try:
-        summary = training_summary(load_network(network_path(folder, category), category, robot.fingerprint))
-    except NetworkError:
-        return False
-    return summary.get("config") == asdict(config) and summary.get("samples") == samples
-
-
-def _saved_curves(robot: RobotModel, folder: Path) -> dict[Category, dict]:
-    """Learning curves of the networks in a folder, also of those that were trained before."""
-    found = {}
-    for category in Category:
-        path = network_path(folder, category)
-        if path.is_file():
-            with suppress(NetworkError):  # of another robot, or older than this format
-                found[category] = training_summary(load_network(path, category, robot.fingerprint))["curves"]
-    return found
 
 
 def run_evaluate(args: argparse.Namespace, console: Console) -> int:
@@ -238,13 +143,14 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
     robot = load_robot(args.robot, args.robots)
     networks = load_networks(robot, args.networks)
     data = read_dataset(args.data, robot.fingerprint)
-    for title, chosen in (("1 s + 1 s, friction 0.5", at_default), ("all timings and frictions", lambda group: group)):
+    at_default = {category: samples.at_default() for category, samples in data.items()}
+    for title, chosen in (("1 s + 1 s, friction 0.5", at_default), ("all timings and frictions", data)):
         rng = np.random.default_rng(args.seed)
         scores: dict[Category, Score] = {}
         for category, network in networks.items():
-            if category not in data or not len(chosen(data[category])):
+            if category not in chosen or not len(chosen[category]):
                 raise DatasetError(f"{args.data}: too few transitions of category {int(category)}; collect more")
-            scores[category] = score(network, balanced(chosen(data[category]), args.count, rng))
+            scores[category] = score(network, balanced(chosen[category], args.count, rng))
         console.print(f"{title}:")
         console.print(score_table(scores))
     network = next(iter(networks.values()))
@@ -261,36 +167,38 @@ def main(argv: list[str] | None = None) -> int:
     def add(name: str, help_text: str) -> argparse.ArgumentParser:
         sub = commands.add_parser(name, help=help_text, description=help_text)
         cli.add_robot_options(sub)
-        sub.add_argument("--seed", type=int, default=0, help="of every random draw (default: %(default)s)")
+        sub.add_argument("--seed", type=int, default=0, help="seed of every random draw (default: %(default)s)")
         return sub
+
+    def add_executor(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: cores)")
+        sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+
+    def add_categories(sub: argparse.ArgumentParser) -> None:
+        numbers = [int(category) for category in Category]
+        metavar = f"{numbers[0]}..{numbers[-1]}"
+        sub.add_argument("--categories", type=int, nargs="+", choices=numbers, metavar=metavar, help="only these")
 
     sub = add("collect", "label transitions with the centroidal optimiser; goes on where it was stopped")
     sub.add_argument("--out", type=Path, required=True, help="data set folder, new or begun")
     sub.add_argument("--samples", type=cli.positive(int), default=100_000, help="per category (default: %(default)s)")
-    add_executor_options(sub)
+    add_executor(sub)
     sub.set_defaults(run=run_collect)
 
-    sub = add("differentiate", "add derivatives to a data set of an earlier version; goes on where it was stopped")
+    sub = add("enrich", "label transitions made of a data set's, costly ones above all; goes on where it was stopped")
     sub.add_argument("--data", type=Path, required=True, help="data set folder")
-    add_executor_options(sub)
-    sub.set_defaults(run=run_differentiate)
-
-    sub = add(
-        "enrich", "add variations of a data set's transitions, costly ones above all; goes on where it was stopped"
-    )
-    sub.add_argument("--data", type=Path, required=True, help="data set folder")
-    sub.add_argument("--out", type=Path, required=True, help="data set folder for the variations, new or begun")
+    sub.add_argument("--out", type=Path, required=True, help="data set folder for the result, new or begun")
     sub.add_argument(
         "--draws", type=cli.positive(int), default=200, help="per category and shard (default: %(default)s)"
     )
     sub.add_argument(
         "--networks",
         type=Path,
-        help="folder of networks: put transitions together from parts of several instead and label what these "
-        "networks call feasible and costly",
+        help="folder of networks: put transitions together from parts of several, instead of varying each, and label "
+        "what these networks call feasible and costly",
     )
-    sub.add_argument("--categories", type=int, nargs="+", choices=range(10), metavar="0..9", default=list(range(10)))
-    add_executor_options(sub)
+    add_categories(sub)
+    add_executor(sub)
     sub.set_defaults(run=run_enrich)
 
     sub = add("fit", "train a classifier and a regressor per category")
@@ -306,7 +214,7 @@ def main(argv: list[str] | None = None) -> int:
     )
     sub.add_argument("--refine", action="store_true", help="go on from the regressors in --out, classifiers kept")
     sub.add_argument("--keep-classifiers", action="store_true", help="train the regressors alone, of networks in --out")
-    sub.add_argument("--categories", type=int, nargs="+", choices=range(10), metavar="0..9", help="only these")
+    add_categories(sub)
     sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="threads (default: all cores)")
     sub.add_argument("--device", default="cpu", help="where torch computes, such as cuda (default: %(default)s)")
     sub.set_defaults(run=run_fit)

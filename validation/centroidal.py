@@ -1,6 +1,6 @@
 """The fast centroidal solver against the Ipopt reference, and whole sequences, on one thread.
 
-`python -m validation.centroidal` times random transitions of all ten categories with both solvers (building the
+`python -m validation.centroidal` times random transitions of all categories with both solvers (building the
 problem and checking the motion counted in), compares their answers, and solves walks of up to 60 contacts. Times are
 processor times of the process, which on an idle machine are wall-clock times.
 """
@@ -24,10 +24,9 @@ from toolkit.centroidal.build import initial_com, sequence_problem, transition_p
 from toolkit.centroidal.residual import check
 from toolkit.contacts.category import Category
 from toolkit.contacts.schedule import ContactSchedule
-from toolkit.report.console import make_console
+from toolkit.report.console import make_console, progress_bar
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
-from toolkit.train import progress_bar
 from validation import goals, reference_solver
 from validation.goals import Goal
 from validation.growth import exponent

@@ -8,8 +8,8 @@ import numpy as np
 
 from toolkit.contacts.category import Category
 from toolkit.errors import InputError
-from toolkit.learning.dataset import Samples
-from toolkit.prediction.features import CONTACT, contact_count
+from toolkit.learning.samples import Samples
+from toolkit.prediction.features import CONTACT
 
 AXES, ANGLES = "axes of each contact's frame", "Tait-Bryan angles with copies at ±2π"
 NEAR = 0.5  # rad; angles so near to ±π are copied
@@ -45,7 +45,7 @@ def tait_bryan(features: np.ndarray, category: Category) -> np.ndarray:
     Returns:
         (n, 6 * contacts + 9) float.
     """
-    count = contact_count(category)
+    count = len(category.contact_limbs)
     contacts = features[:, : CONTACT * count].reshape(len(features), count, CONTACT)
     x, z = contacts[..., 3:6], contacts[..., 6:9]
     y = np.cross(z, x)
@@ -96,19 +96,21 @@ def compare_encodings(
         InputError: torch is not installed.
     """
     try:
-        from toolkit.learning.fit import FitConfig, train_networks
+        from toolkit.learning.descent import FitConfig
+        from toolkit.learning.fit import train_networks
     except ImportError:
         raise InputError("the comparison of encodings needs torch: pip install -e '.[train]'") from None
     config = FitConfig(epochs=epochs, seed=seed)
-    contacts = contact_count(category)
+    contacts = len(category.contact_limbs)
     results = {}
     for name in (AXES, ANGLES):
-        learnt, asked = train, test
+        learnt, asked, settings = train, test, config
         if name == ANGLES:
             features, rows = with_copies(tait_bryan(train.features, category), contacts)
-            learnt = Samples(features.astype(np.float32), train.feasible[rows], train.targets[rows])
+            learnt = replace(train.select(rows), features=features.astype(np.float32))
             asked = replace(test, features=tait_bryan(test.features, category).astype(np.float32))
-        trained = train_networks(learnt, config)
+            settings = replace(config, sensitivity_weight=0.0)  # derivatives are known in axes alone
+        trained = train_networks(learnt, settings)
         feasible = trained.feasible(asked.features)
         good = asked.feasible
         outputs, targets = trained.predict(asked.features[good]), asked.targets[good]

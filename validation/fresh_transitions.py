@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +9,11 @@ import numpy as np
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
 from toolkit.learning.collect import collect
-from toolkit.learning.dataset import Samples, read_dataset, read_manifest
-from toolkit.learning.evaluate import at_default, balanced
-from toolkit.learning.shard import CollectConfig
+from toolkit.learning.collect_config import CollectConfig
+from toolkit.learning.dataset import read_dataset, read_manifest
+from toolkit.learning.evaluate import balanced
+from toolkit.learning.jobs import executor
+from toolkit.learning.samples import Samples
 from toolkit.robot.model import RobotModel
 
 DEFAULT, ALL = "1 s + 1 s, friction 0.5", "all timings and frictions"
@@ -35,7 +35,7 @@ def fresh(folder: Path, robot: RobotModel, *, count: int, seed: int, workers: in
         seed=seed,
         samples_per_category=4 * count,  # a bit less than half of them have the default timing
     )
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with executor(workers) as pool:
         collect(folder, robot, config, pool)
     return read_dataset(folder, robot.fingerprint)
 
@@ -56,7 +56,7 @@ def test_sets(
     sets: dict[str, dict[Category, Samples]] = {DEFAULT: {}, ALL: {}}
     for category in categories:
         group = data.get(category)
-        for title, chosen in ((DEFAULT, None if group is None else at_default(group)), (ALL, group)):
+        for title, chosen in ((DEFAULT, None if group is None else group.at_default()), (ALL, group)):
             if chosen is None or len(chosen) < count:
                 found = 0 if chosen is None else len(chosen)
                 raise DatasetError(

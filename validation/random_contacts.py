@@ -19,19 +19,6 @@ from toolkit.geometry.pose import Pose, rotation_about_z, rotation_on_surface
 from toolkit.robot.model import RobotModel
 from toolkit.world.timing import Timing
 
-INITIAL_PALMS = {
-    Category.MOVE_FOOT: 0,
-    Category.ADD_PALM: 0,
-    Category.MOVE_INNER_FOOT_WITH_PALM: 1,
-    Category.MOVE_OUTER_FOOT_WITH_PALM: 1,
-    Category.BREAK_ONLY_PALM: 1,
-    Category.MOVE_ONLY_PALM: 1,
-    Category.ADD_OTHER_PALM: 1,
-    Category.MOVE_FOOT_WITH_PALMS: 2,
-    Category.BREAK_ONE_PALM: 2,
-    Category.MOVE_ONE_PALM: 2,
-}
-
 
 @dataclass(frozen=True)
 class SamplingConfig:
@@ -97,7 +84,7 @@ def sample_transition(
         contacts.append(_foot(foot, world_from_feet, place, rng.uniform(-0.35, 0.35), friction, rng, config))
     stance = Stance(tuple(contacts))
     palms = [Limb.LEFT_PALM, Limb.RIGHT_PALM] if rng.random() < 0.5 else [Limb.RIGHT_PALM, Limb.LEFT_PALM]
-    for palm in palms[: INITIAL_PALMS[category]]:
+    for palm in palms[: category.palms_before]:
         stance = stance.replace(_palm(robot, palm, stance.mean_feet, friction, rng, config))
 
     transition = _transition(robot, stance, category, palms, timing, friction, rng, config)
@@ -131,16 +118,14 @@ def _within_reach(robot, stance, world_from_mean, offset) -> bool:
 
 def _transition(robot, stance, category, palms, timing, friction, rng, config) -> ContactTransition:
     """What moves, by category."""
-    if category in (Category.BREAK_ONLY_PALM, Category.BREAK_ONE_PALM):
-        return ContactTransition(palms[0], None, timing)
-    if category in (Category.ADD_PALM, Category.MOVE_ONLY_PALM, Category.ADD_OTHER_PALM, Category.MOVE_ONE_PALM):
-        palm = palms[1] if category == Category.ADD_OTHER_PALM else palms[0]
-        return ContactTransition(palm, _palm(robot, palm, stance.mean_feet, friction, rng, config), timing)
-    inner = Limb.LEFT_FOOT if palms[0].is_left else Limb.RIGHT_FOOT
-    foot = {
-        Category.MOVE_INNER_FOOT_WITH_PALM: inner,
-        Category.MOVE_OUTER_FOOT_WITH_PALM: inner.mirrored,
-    }.get(category, FEET[int(rng.integers(2))])
+    if not category.moving.is_foot:
+        palm = palms[0 if category.moving in category.before else category.palms_before]
+        contact = _palm(robot, palm, stance.mean_feet, friction, rng, config) if category.makes else None
+        return ContactTransition(palm, contact, timing)
+    foot = FEET[int(rng.integers(len(FEET)))]
+    if category.palms_before == 1:
+        inner = FEET[0] if palms[0].is_left else FEET[1]
+        foot = inner if category.moving.is_left == category.before[-1].is_left else inner.mirrored
     standing = stance[foot.mirrored].pose
     world_from_standing = Pose.from_yaw(standing.position, standing.yaw)
     side = 1 if foot.is_left else -1

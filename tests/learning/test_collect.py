@@ -17,8 +17,11 @@ from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
 from toolkit.learning import collect as module
 from toolkit.learning.collect import collect
-from toolkit.learning.dataset import Samples, shard_path
-from toolkit.learning.shard import CollectConfig
+from toolkit.learning.collect_config import CollectConfig
+from toolkit.learning.dataset import read_shard, shard_path
+from toolkit.learning.jobs import executor
+from toolkit.learning.samples import Samples
+from toolkit.learning.sensitivity import unknown_sensitivity
 from toolkit.prediction.features import feature_size
 from toolkit.robot.loader import load_robot
 
@@ -48,6 +51,7 @@ def quick_shard(config, index):
             rng.normal(size=(n, feature_size(category))).astype(np.float32),
             rng.random(n) < 0.6,
             rng.normal(size=(n, 7)).astype(np.float32),
+            unknown_sensitivity(category, n),
         )
         for category in Category
     }
@@ -72,7 +76,10 @@ def test_an_interrupted_collection_goes_on_to_the_same_files(tmp_path, robot, co
     whole, halting = tmp_path / "whole", tmp_path / "halting"
     summary = collect(whole, robot, config, InlineExecutor())
     assert len(list(whole.glob("shard-*.npz"))) == config.shards == 5
-    assert summary.resumed == 0 and summary.labelled == sum(total for _, total in summary.counts.values())
+    assert summary.resumed == 0 and config.samples_per_category <= summary.fewest
+    shards = [read_shard(path) for path in whole.glob("shard-*.npz")]
+    assert summary.labelled == sum(len(group) for shard in shards for group in shard.values())
+    assert summary.feasible == sum(group.feasible.sum() for shard in shards for group in shard.values())
     with pytest.raises(KeyboardInterrupt):
         collect(halting, robot, config, InlineExecutor(fail_at=3), ahead=1)
     assert len(list(halting.glob("shard-*.npz"))) == 2
@@ -125,7 +132,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 from toolkit.learning.collect import collect
-from toolkit.learning.shard import CollectConfig
+from toolkit.learning.collect_config import CollectConfig
 from toolkit.robot.loader import load_robot
 
 if __name__ == "__main__":
@@ -171,8 +178,6 @@ def test_a_cluster_makes_the_same_shards(tmp_path, robot):
     config = CollectConfig(robot=robot.name, seed=5, samples_per_category=12, per_shard=4)
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         collect(tmp_path / "local", robot, config, pool)
-    from toolkit.train import executor
-
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
         executor(2, cluster.scheduler_address) as pool,

@@ -1,5 +1,7 @@
 """Network files and data sets: what is written comes back, and every broken file is refused in one clear line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from safetensors.numpy import save_file
@@ -8,14 +10,16 @@ from tests.prediction.networks import metadata, random_tensors
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError, NetworkError
 from toolkit.learning.dataset import (
+    SCHEMA,
     Manifest,
-    Samples,
     read_dataset,
     read_shard,
     shard_path,
     write_shard,
 )
 from toolkit.learning.evaluate import balanced, score
+from toolkit.learning.samples import Samples
+from toolkit.learning.sensitivity import unknown_sensitivity
 from toolkit.prediction.features import feature_size
 from toolkit.prediction.network import OBJECTIVE_SCALE, load_network, network_path
 from toolkit.prediction.networks import NetworkEvaluator
@@ -84,11 +88,12 @@ def some_samples(rng, n=40):
         rng.normal(size=(n, size)).astype(np.float32),
         feasible,
         (rng.random((n, 7)) * feasible[:, None]).astype(np.float32),
+        unknown_sensitivity(CATEGORY, n),
     )
 
 
 def data_set(folder, rng, fingerprint="abc"):
-    Manifest("transition-data-1", "some_robot", fingerprint, 0, {}, {}).write(folder)
+    Manifest(SCHEMA, "some_robot", fingerprint, 0, {}, {}).write(folder)
     groups = [some_samples(rng), some_samples(rng)]
     for index, group in enumerate(groups):
         write_shard(folder, index, {CATEGORY: group})
@@ -118,9 +123,10 @@ def test_a_broken_data_set_is_refused(tmp_path):
     write_shard(tmp_path, 1, {CATEGORY: group})
     with pytest.raises(DatasetError, match="NaN or infinite"):
         read_shard(path)
-    write_shard(tmp_path, 1, {CATEGORY: Samples(group.features[:, 1:], group.feasible, group.targets)})
-    with pytest.raises(DatasetError, match="has shapes"):
-        read_shard(path)
+    for name in ("features", "sensitivity"):
+        write_shard(tmp_path, 1, {CATEGORY: replace(group, **{name: getattr(group, name)[:, 1:]})})
+        with pytest.raises(DatasetError, match="has shapes"):
+            read_shard(path)
 
 
 def test_a_balanced_test_set_keeps_a_quarter_of_each_label(saved):

@@ -8,9 +8,10 @@ import torch
 
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
-from toolkit.learning.dataset import Samples
-from toolkit.learning.fit import FitConfig, _draw, fit_category, train_networks
-from toolkit.learning.sensitivity import sensitivity_size
+from toolkit.learning.descent import FitConfig, draw
+from toolkit.learning.fit import fit_category, train_networks
+from toolkit.learning.samples import Samples
+from toolkit.learning.sensitivity import sensitivity_size, unknown_sensitivity
 from toolkit.prediction.features import COM, feature_size
 from toolkit.prediction.network import load_network, network_path, training_summary
 
@@ -29,7 +30,8 @@ def samples(n=2500, seed=0):
     targets[:, 1:4] = features[:, COM] + 0.05 * unit[:, 2:5]
     targets[:, 4:7] = 0.1 * unit[:, 3:6]
     targets[~feasible] = 0
-    return Samples(features.astype(np.float32), feasible, targets.astype(np.float32))
+    unknown = unknown_sensitivity(CATEGORY, n)
+    return Samples(features.astype(np.float32), feasible, targets.astype(np.float32), unknown)
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +110,7 @@ def test_what_matters_less_takes_part_less_often():
     share = torch.where(torch.arange(600) < 300, 1.0, 1.0 / 3.0).double()
     generator, counts = torch.Generator().manual_seed(0), np.zeros(600)
     for _ in range(300):
-        drawn = _draw(share, generator)
+        drawn = draw(share, generator)
         assert len(drawn) in (399, 400, 401)
         counts[drawn.numpy()] += 1
     assert (counts[:300] == 300).all()

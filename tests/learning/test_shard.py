@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from toolkit.contacts.category import Category
-from toolkit.learning.dataset import Samples
+from toolkit.learning.collect_config import CollectConfig
+from toolkit.learning.quota import Quota
+from toolkit.learning.samples import Samples
 from toolkit.learning.sensitivity import sensitivity_size
-from toolkit.learning.shard import PALMS_BEFORE, CollectConfig, Quota, categories_of, collect_shard
+from toolkit.learning.shard import collect_shard
 from toolkit.learning.terrain import TerrainConfig, random_terrain
-from toolkit.prediction.features import CONTACT, contact_count, feature_size
+from toolkit.prediction.features import CONTACT, feature_size
 from toolkit.robot.loader import load_robot
 from toolkit.world.loader import load_world
 
@@ -48,7 +50,7 @@ def test_features_are_what_was_asked_for(shard, config):
         for values, bounds in ((shift, config.shift), (swing, config.swing), (friction, config.friction)):
             assert (values >= bounds[0] - 1e-6).all() and (values <= bounds[1] + 1e-6).all()
         assert len(np.unique(shift[others])) == len(np.unique(swing[others])) == others.sum()
-        axes = group.features[:, : CONTACT * contact_count(category)].reshape(len(group), -1, 3, 3)[:, :, 1:]
+        axes = group.features[:, : CONTACT * len(category.contact_limbs)].reshape(len(group), -1, 3, 3)[:, :, 1:]
         np.testing.assert_allclose(np.linalg.norm(axes, axis=-1), 1.0, rtol=0, atol=1e-5)  # float32
         assert len(np.unique(group.features, axis=0)) == len(group)  # no transition twice
 
@@ -62,16 +64,6 @@ def test_a_shard_is_a_function_of_its_arguments(shard, config):
             np.testing.assert_array_equal(getattr(again[category], name), getattr(group, name))
         for different in (other, another):
             assert not np.array_equal(different[category].features[:10], group.features[:10])
-
-
-def test_a_robot_without_arms_moves_its_feet_only():
-    robot = load_robot(None)
-    assert categories_of(robot) == list(Category)
-    assert categories_of(replace(robot, arms={})) == [Category.MOVE_FOOT]
-    one = dict(list(robot.arms.items())[:1])
-    assert categories_of(replace(robot, arms=one)) == [c for c in Category if PALMS_BEFORE[c] == 0] + [
-        c for c in Category if PALMS_BEFORE[c] == 1 and c != Category.ADD_OTHER_PALM
-    ]
 
 
 def test_a_quota_counts():

@@ -8,9 +8,8 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_about_z
-from toolkit.prediction.features import LAYOUT, MIRROR, encode, feature_size
+from toolkit.prediction.features import MIRROR, encode, feature_size
 from toolkit.world.timing import Timing
-from validation.encodings import tait_bryan
 
 REFLECT = np.diag(MIRROR)
 
@@ -23,14 +22,13 @@ def random_rotation(rng):
 
 def random_case(category, rng):
     """A stance, CoM, velocity and transition of a category, moving a left limb."""
-    limbs, makes = LAYOUT[category]
 
     def contact(limb):
         return Contact(limb, Pose(random_rotation(rng), rng.normal(size=3)), 0.5)
 
-    moving = Limb.LEFT_FOOT if "FOOT" in category.name else Limb.LEFT_PALM
-    stance = Stance(tuple(contact(limb) for limb in sorted(limbs)))
-    transition = ContactTransition(moving, contact(moving) if makes else None, Timing(0.7, 0.4))
+    moving = category.moving
+    stance = Stance(tuple(contact(limb) for limb in category.before))
+    transition = ContactTransition(moving, contact(moving) if category.makes else None, Timing(0.7, 0.4))
     return stance, rng.normal(size=3), rng.normal(size=3), transition
 
 
@@ -104,14 +102,3 @@ def test_transitions_of_two_limbs_are_refused():
     right = ContactTransition(Limb.RIGHT_FOOT, Contact(Limb.RIGHT_FOOT, transition.contact.pose, 0.5))
     with pytest.raises(ValueError, match="share their limb and category"):
         encode(stance, com, velocity, [transition, right])
-
-
-def test_tait_bryan_angles_give_the_axes_back():
-    rng = np.random.default_rng(5)
-    stance, com, velocity, transition = random_case(Category.MOVE_ONE_PALM, rng)
-    features = encode(stance, com, velocity, [transition])[1]
-    yaw, pitch, roll = tait_bryan(features, Category.MOVE_ONE_PALM)[0, 3:6]
-    cy, sy, cp, sp, cr, sr = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
-    np.testing.assert_allclose(features[0, 3:6], [cy * cp, sy * cp, -sp], rtol=0, atol=1e-12)
-    expected = [cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr]
-    np.testing.assert_allclose(features[0, 6:9], expected, rtol=0, atol=1e-12)

@@ -13,6 +13,16 @@ LEG = (  # joint, axis, lower, upper, N m, offset of its body
     ("ankle_pitch", "0 1 0", -1.0, 0.8, 120, "0 0 0"),
 )
 
+ARM = (  # joint, axis, lower, upper, N m, offset of its body
+    ("shoulder_yaw", "0 0 1", -1.5, 0.8, 100, "0 {y} 0.36"),
+    ("shoulder_roll", "1 0 0", 0.0, 2.8, 100, "0 0 0"),
+    ("upper_arm_yaw", "0 0 1", -2.4, 2.4, 70, "0 0 0"),
+    ("elbow", "0 1 0", -2.2, 0.0, 70, "0 0 -0.28"),
+    ("forearm_yaw", "0 0 1", -2.5, 2.5, 20, "0 0 -0.26"),
+    ("wrist_roll", "1 0 0", -1.3, 1.3, 20, "0 0 0"),
+    ("wrist_pitch", "0 1 0", -0.6, 0.6, 20, "0 0 0"),
+)
+
 TOML = """
 licence = "CC0-1.0"
 source = "tests"
@@ -41,9 +51,30 @@ patch = [0.20, 0.10]
 """
 
 
-def biped_mjcf() -> str:
-    """Legs and a trunk; hips pitch first, ankles roll first, no actuators but limits at the joints."""
+def arm_toml(side: str) -> str:
+    """What the robot file says besides of the arm of one side."""
+    roll = 0.4 if side == "left" else -0.4
+    return TOML.replace(
+        "[home]",
+        f"""[limbs.{side}_palm]
+body = "{side}_hand"
+position = [0.0, 0.0, -0.09]
+patch = [0.08, 0.08]
+max_force = 200.0
+
+[home]
+"{side}_shoulder_roll" = {roll}
+"{side}_elbow" = -1.0""",
+    )
+
+
+def biped_mjcf(arm: str | None = None) -> str:
+    """Legs and a trunk; hips pitch first, ankles roll first, no actuators but limits at the joints.
+
+    With the arm of one side ("left" or "right") where that is given.
+    """
     legs = "".join(_mjcf_leg(side, sign) for side, sign in (("left", 1), ("right", -1)))
+    legs += "" if arm is None else _mjcf_arm(arm)
     return f"""<mujoco model="biped">
   <compiler angle="radian"/>
   <worldbody>
@@ -64,14 +95,28 @@ def _mjcf_leg(side: str, sign: int) -> str:
         "hip_yaw": '<geom type="capsule" size="0.05" fromto="0 0 -0.08 0 0 -0.28" mass="3"/>',
         "ankle_pitch": '<geom type="box" size="0.1 0.05 0.01" pos="0.02 0 -0.07" mass="1"/>',
     }
+    return _mjcf_chain(LEG, side, 0.1 * sign, shapes, {"ankle_pitch": f"{side}_foot_link"})
+
+
+def _mjcf_arm(side: str) -> str:
+    shapes = {
+        "upper_arm_yaw": '<geom type="capsule" size="0.04" fromto="0 0 -0.10 0 0 -0.22" mass="1.5"/>',
+        "elbow": '<geom type="capsule" size="0.035" fromto="0 0 -0.06 0 0 -0.2" mass="1"/>',
+        "wrist_pitch": '<geom type="box" size="0.04 0.04 0.009" pos="0 0 -0.081" mass="0.4"/>',
+    }
+    return _mjcf_chain(ARM, side, 0.25 if side == "left" else -0.25, shapes, {"wrist_pitch": f"{side}_hand"})
+
+
+def _mjcf_chain(chain, side: str, y: float, shapes: dict[str, str], names: dict[str, str]) -> str:
+    """Bodies one in the other, mirrored on the right; joints without a shape of their own carry a small sphere."""
     text, end = "", ""
-    for joint, axis, lower, upper, torque, offset in LEG:
-        body = f"{side}_foot_link" if joint == "ankle_pitch" else f"{side}_{joint}_link"
-        if sign < 0 and "yaw" in joint:
+    for joint, axis, lower, upper, torque, offset in chain:
+        body = names.get(joint, f"{side}_{joint}_link")
+        if side == "right" and ("yaw" in joint or joint == "shoulder_roll"):
             lower, upper = -upper, -lower
         shape = shapes.get(joint, '<geom size="0.02" mass="0.2" contype="0" conaffinity="0"/>')
         text += (
-            f'<body name="{body}" pos="{offset.format(y=0.1 * sign)}"><joint name="{side}_{joint}" axis="{axis}" '
+            f'<body name="{body}" pos="{offset.format(y=y)}"><joint name="{side}_{joint}" axis="{axis}" '
             f'range="{lower} {upper}" actuatorfrcrange="-{torque} {torque}" armature="0.01"/>{shape}'
         )
         end += "</body>"

@@ -21,7 +21,7 @@ import numpy as np
 
 from toolkit.contacts.projection_kernels import project_palms, project_soles
 from toolkit.contacts.surface_table import surface_table
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.world.source import RAY_GROUPS
 from toolkit.world.surface import Surface
@@ -97,8 +97,8 @@ class Projector:
     ):
         self.config = config or ProjectionConfig()
         self.half_sizes = robot.half_sizes + self.config.margin
-        self.half_sizes[2:] = robot.half_sizes[2:] + self.config.palm_margin
-        self.table = surface_table(surfaces, reach=float(np.linalg.norm(self.half_sizes[:2], axis=1).max()))
+        self.half_sizes[list(PALMS)] = robot.half_sizes[list(PALMS)] + self.config.palm_margin
+        self.table = surface_table(surfaces, reach=float(np.linalg.norm(self.half_sizes[list(FEET)], axis=1).max()))
         self.offsets = shifts(self.config.shift, self.config.shift_step)
         self._model = model
         self._data = mujoco.MjData(model)

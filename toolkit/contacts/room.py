@@ -152,7 +152,7 @@ def moved_sequence(
         sequence: as planned.
         schedule: its schedule.
         times: (N + 1,) s; knots of the motion.
-        position: (N, 4, 3) m; of the contacts in the motion's steps.
+        position: (N, len(Limb), 3) m; of the contacts in the motion's steps.
 
     Returns:
         The same transitions; surfaces, orientation and timing as planned.

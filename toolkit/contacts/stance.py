@@ -38,7 +38,7 @@ class Stance:
 
     def __post_init__(self):
         limbs = [contact.limb for contact in self.contacts]
-        if limbs != sorted(set(limbs)) or limbs[:2] != list(FEET):
+        if limbs != sorted(set(limbs)) or limbs[: len(FEET)] != list(FEET):
             raise ValueError(f"a stance needs both feet, each limb once and in order; got {[x.label for x in limbs]}")
 
     def __getitem__(self, limb: Limb) -> Contact:
@@ -56,6 +56,11 @@ class Stance:
         return tuple(contact.limb for contact in self.contacts)
 
     @property
+    def feet(self) -> tuple[Contact, ...]:
+        """Contacts of the feet, the left one first."""
+        return self.contacts[: len(FEET)]
+
+    @property
     def palms(self) -> tuple[Limb, ...]:
         """Palms in contact, in order."""
         return tuple(limb for limb in PALMS if limb in self)
@@ -63,7 +68,7 @@ class Stance:
     @property
     def mean_feet(self) -> Pose:
         """Upright frame at the mean of the feet with the circular mean of their headings (world_from_feet)."""
-        return mean_pose(*(self[limb].pose for limb in FEET))
+        return mean_pose(*(contact.pose for contact in self.feet))
 
     def replace(self, contact: Contact) -> Stance:
         """The stance with `contact` made, in place of the limb's old one if there is one."""

@@ -1,4 +1,4 @@
-"""The contact limbs of a humanoid."""
+"""The contact limbs of a humanoid: the one table of them, from which everything else about limbs is derived."""
 
 from __future__ import annotations
 
@@ -6,12 +6,29 @@ from enum import IntEnum
 
 
 class Limb(IntEnum):
-    """Contact limb; the value indexes the limb axis of every (..., 4, ...) array in the toolkit."""
+    """Contact limb; its number indexes the limb axis of every (..., len(Limb), ...) array in the toolkit.
 
-    LEFT_FOOT = 0
-    RIGHT_FOOT = 1
-    LEFT_PALM = 2
-    RIGHT_PALM = 3
+    Each row of the table holds the number, the side and the kind. Feet come first, as the contacts of every stance do.
+
+    Attributes:
+        is_left: whether the limb is on the left.
+        is_foot: whether the limb is a foot; the others are palms.
+    """
+
+    is_left: bool
+    is_foot: bool
+
+    LEFT_FOOT = 0, "left", "foot"
+    RIGHT_FOOT = 1, "right", "foot"
+    LEFT_PALM = 2, "left", "palm"
+    RIGHT_PALM = 3, "right", "palm"
+
+    def __new__(cls, number: int, side: str, kind: str) -> Limb:
+        """Make the member of one row."""
+        limb = int.__new__(cls, number)
+        limb._value_ = number
+        limb.is_left, limb.is_foot = side == "left", kind == "foot"
+        return limb
 
     @property
     def label(self) -> str:
@@ -19,19 +36,9 @@ class Limb(IntEnum):
         return self.name.lower()
 
     @property
-    def is_foot(self) -> bool:
-        """Whether the limb is a foot."""
-        return self < 2
-
-    @property
-    def is_left(self) -> bool:
-        """Whether the limb is on the left."""
-        return self % 2 == 0
-
-    @property
     def mirrored(self) -> Limb:
         """The same limb of the other side."""
-        return Limb(self ^ 1)
+        return _MIRROR[self]
 
     @classmethod
     def from_label(cls, label: str) -> Limb:
@@ -39,5 +46,9 @@ class Limb(IntEnum):
         return cls[label.upper()]
 
 
-FEET = (Limb.LEFT_FOOT, Limb.RIGHT_FOOT)
-PALMS = (Limb.LEFT_PALM, Limb.RIGHT_PALM)
+FEET = tuple(limb for limb in Limb if limb.is_foot)
+PALMS = tuple(limb for limb in Limb if not limb.is_foot)
+_MIRROR = {
+    limb: next(other for other in Limb if other.is_foot == limb.is_foot and other.is_left != limb.is_left)
+    for limb in Limb
+}

@@ -3,62 +3,50 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import NamedTuple
 
-import numpy as np
-
-from toolkit.contacts.category import Category
-from toolkit.learning.dataset import (
-    SCHEMA,
-    Manifest,
-    Samples,
-    begin,
-    plain_settings,
-    read_shard,
-    shard_path,
-    write_shard,
-)
+from toolkit.contacts.category import Category, categories_of
+from toolkit.learning.collect_config import CollectConfig
+from toolkit.learning.dataset import SCHEMA, Manifest, begin, plain_settings, read_shard, shard_path, write_shard
 from toolkit.learning.jobs import run_jobs
-from toolkit.learning.shard import CollectConfig, categories_of, collect_shard
+from toolkit.learning.samples import Samples
+from toolkit.learning.shard import collect_shard
 from toolkit.robot.model import RobotModel
 
-Counts = dict[Category, tuple[int, int]]
 PACKAGES = ("humanoid-contact-toolkit", "numpy", "numba", "mujoco")
-
-
-class Progress(NamedTuple):
-    """How far a collection is: shards and transitions in the data set, seconds since the call."""
-
-    shards: int
-    labelled: int
-    seconds: float
+Counts = Counter[tuple[Category, bool]]
+"""Numbers of transitions by category and label."""
 
 
 @dataclass(frozen=True)
-class CollectSummary:
-    """How a collection went.
+class Collected:
+    """How far a collection is.
 
     Attributes:
-        labelled: transitions in the data set now.
-        resumed: of them from before.
-        seconds: wall-clock.
-        counts: (feasible, all) transitions of each category.
+        shards: number of shards in the data set.
+        labelled: number of transitions in the data set.
+        resumed: number of those that were there before.
+        feasible: number of those that are feasible.
+        fewest: number of transitions of the rarest category.
+        seconds: wall-clock time of this call.
     """
 
+    shards: int
     labelled: int
     resumed: int
+    feasible: int
+    fewest: int
     seconds: float
-    counts: dict[Category, tuple[int, int]]
 
     @property
     def feasible_share(self) -> float:
         """Share of all transitions that are feasible."""
-        return sum(feasible for feasible, _ in self.counts.values()) / max(self.labelled, 1)
+        return self.feasible / max(self.labelled, 1)
 
     @property
     def rate(self) -> float:
@@ -67,7 +55,7 @@ class CollectSummary:
 
 
 def _job(config: CollectConfig, index: int, folder: str) -> Counts:
-    """Make and write a shard where it runs; returns (feasible, all) by category."""
+    """Make and write a shard where it runs; what it counts."""
     samples = collect_shard(config, index)
     write_shard(Path(folder), index, samples)
     return _count(samples)
@@ -78,68 +66,60 @@ def collect(
     robot: RobotModel,
     config: CollectConfig,
     executor: Executor,
-    progress: Callable[[Progress], None] = lambda state: None,
+    progress: Callable[[Collected], None] = lambda state: None,
     *,
     ahead: int = 16,
-) -> CollectSummary:
+) -> Collected:
     """Fill a data set, going on where an earlier call ended or was killed.
 
     Args:
         folder: the data set, seen under the same path by every worker.
-        robot: that `config.robot` names.
+        robot: the robot that `config.robot` names.
         config: what to collect.
         executor: where shards are made, through the `concurrent.futures` interface.
-        progress: told how far it is.
+        progress: is told how far it is.
         ahead: shards handed to the executor at a time.
 
     Returns:
-        Counts and rates.
+        How far it came.
 
     Raises:
         DatasetError: the folder holds something else, or data of other settings or of another robot.
     """
     began = time.perf_counter()
     begin(folder, _manifest(robot, config))
-    counts = {category: np.zeros(2, int) for category in categories_of(robot)}
-    missing = []
+    counts, missing = Counts(), []
     for index in range(config.shards):
         path = shard_path(folder, index)
         if path.is_file():
-            _add(counts, _count(read_shard(path)))  # a broken one is refused by name, not kept in silence
+            counts += _count(read_shard(path))  # a broken one is refused by name, not kept in silence
         else:
             missing.append(index)
-    resumed = labelled = _total(counts)
-    done = config.shards - len(missing)
-    progress(Progress(done, labelled, 0.0))
+    resumed, done = counts.total(), config.shards - len(missing)
+
+    def state() -> Collected:
+        feasible = sum(number for (_, label), number in counts.items() if label)
+        fewest = min(counts[category, True] + counts[category, False] for category in categories_of(robot))
+        return Collected(done, counts.total(), resumed, feasible, fewest, time.perf_counter() - began)
 
     def take(more: Counts) -> None:
-        nonlocal done, labelled
-        _add(counts, more)
-        done, labelled = done + 1, _total(counts)
-        progress(Progress(done, labelled, time.perf_counter() - began))
+        nonlocal done
+        counts.update(more)
+        done += 1
+        progress(state())
 
+    progress(state())
     jobs = [(config, index, str(folder.resolve())) for index in missing]
     run_jobs(executor, _job, jobs, take, ahead=ahead)
-    return CollectSummary(
-        labelled,
-        resumed,
-        time.perf_counter() - began,
-        {category: (int(pair[0]), int(pair[1])) for category, pair in counts.items()},
-    )
+    return state()
 
 
 def _count(samples: dict[Category, Samples]) -> Counts:
-    """(feasible, all) by category."""
-    return {category: (int(group.feasible.sum()), len(group)) for category, group in samples.items()}
-
-
-def _add(counts: dict[Category, np.ndarray], more: Counts) -> None:
-    for category, pair in more.items():
-        counts[category] += pair
-
-
-def _total(counts: dict[Category, np.ndarray]) -> int:
-    return int(sum(pair[1] for pair in counts.values()))
+    counts = Counts()
+    for category, group in samples.items():
+        feasible = int(group.feasible.sum())
+        counts[category, True], counts[category, False] = feasible, len(group) - feasible
+    return counts
 
 
 def _manifest(robot: RobotModel, config: CollectConfig) -> Manifest:

@@ -5,8 +5,7 @@
                            sensitivity_c (n, k) float32
 
 Shard i depends on the manifest and on i alone. So a collection that was killed goes on with the shards that are
-missing, and nothing is lost or doubled. Older shards have no sensitivities: they are unknown there, and
-`learning.differentiate` adds them.
+missing, and nothing is lost or doubled.
 """
 
 from __future__ import annotations
@@ -22,11 +21,12 @@ import numpy as np
 
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
+from toolkit.learning.samples import Samples, join
 from toolkit.learning.sensitivity import sensitivity_size
 from toolkit.prediction.features import TARGETS, feature_size
 
 SCHEMA = "transition-data-2"
-READABLE = ("transition-data-1", SCHEMA)  # the first had no sensitivities
+PARTS = ("features", "feasible", "targets", "sensitivity")
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,11 @@ class Manifest:
     """What a data set was asked for.
 
     Attributes:
-        schema: of the files.
-        robot: name; fingerprint: of its dynamics.
-        seed: of all shards.
-        settings: of the collection, as plain values.
-        versions: of the libraries at the start.
+        schema: version of the files' layout.
+        robot: name of the robot; fingerprint: of its dynamics.
+        seed: seed of all shards.
+        settings: settings of the collection, as plain values.
+        versions: versions of the libraries at the start.
     """
 
     schema: str
@@ -53,54 +53,6 @@ class Manifest:
         temporary = folder / "manifest.json.part"
         temporary.write_text(json.dumps(asdict(self), indent=2))
         os.replace(temporary, folder / "manifest.json")
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Labelled transitions of one category.
-
-    Attributes:
-        features: (n, d) float32, canonical, see `features.encode`.
-        feasible: (n,) bool.
-        targets: (n, 7) float32; objective, CoM (m), CoM velocity (m/s); zero where not feasible.
-        sensitivity: (n, k) float32, derivatives of the objective, see `learning.sensitivity`; NaN where unknown. None:
-            all unknown.
-    """
-
-    features: np.ndarray
-    feasible: np.ndarray
-    targets: np.ndarray
-    sensitivity: np.ndarray | None = None
-
-    def __len__(self) -> int:
-        return len(self.features)
-
-    def select(self, rows: np.ndarray | slice) -> Samples:
-        """The samples of these rows."""
-        known = None if self.sensitivity is None else self.sensitivity[rows]
-        return Samples(self.features[rows], self.feasible[rows], self.targets[rows], known)
-
-
-def no_samples(category: Category) -> Samples:
-    """No samples of a category, with the columns that they have."""
-    features, targets = np.zeros((0, feature_size(category)), np.float32), np.zeros((0, TARGETS), np.float32)
-    return Samples(features, np.zeros(0, bool), targets, np.zeros((0, sensitivity_size(category)), np.float32))
-
-
-def join(groups: list[Samples], category: Category) -> Samples:
-    """Samples of a category one after the other; sensitivities that some lack are NaN there."""
-    known = None
-    if any(group.sensitivity is not None for group in groups):
-        unknown = np.full((1, sensitivity_size(category)), np.nan, np.float32)
-        known = np.concatenate(
-            [np.repeat(unknown, len(g), 0) if g.sensitivity is None else g.sensitivity for g in groups]
-        )
-    return Samples(
-        np.concatenate([group.features for group in groups]),
-        np.concatenate([group.feasible for group in groups]),
-        np.concatenate([group.targets for group in groups]),
-        known,
-    )
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -118,7 +70,7 @@ def read_manifest(folder: Path) -> Manifest:
         manifest = Manifest(**json.loads(path.read_text()))
     except (json.JSONDecodeError, TypeError) as error:
         raise DatasetError(f"{path}: not a manifest ({error}); collect into another folder") from None
-    if manifest.schema not in READABLE:
+    if manifest.schema != SCHEMA:
         raise DatasetError(f"{path}: schema {manifest.schema!r}, expected {SCHEMA!r}; collect the data again")
     return manifest
 
@@ -184,13 +136,7 @@ def shard_index(path: Path) -> int:
 
 def write_shard(folder: Path, index: int, samples: dict[Category, Samples]) -> None:
     """Write a shard, whole or not at all."""
-    arrays = {}
-    for category, group in samples.items():
-        arrays[f"features_{int(category)}"] = group.features
-        arrays[f"feasible_{int(category)}"] = group.feasible
-        arrays[f"targets_{int(category)}"] = group.targets
-        if group.sensitivity is not None:
-            arrays[f"sensitivity_{int(category)}"] = group.sensitivity
+    arrays = {f"{part}_{int(category)}": getattr(group, part) for category, group in samples.items() for part in PARTS}
     path = shard_path(folder, index)
     temporary = path.with_suffix(".part")
     with temporary.open("wb") as file:
@@ -214,24 +160,19 @@ def read_shard(path: Path) -> dict[Category, Samples]:
         raise DatasetError(f"{path}: truncated or not a shard ({error}); {remedy}") from None
     samples = {}
     for category in Category:
-        names = [f"{part}_{int(category)}" for part in ("features", "feasible", "targets")]
+        names = [f"{part}_{int(category)}" for part in PARTS]
         if not any(name in arrays for name in names):
             continue
         if not all(name in arrays for name in names):
             raise DatasetError(f"{path}: incomplete arrays for category {int(category)}; {remedy}")
-        known = arrays.get(f"sensitivity_{int(category)}")
-        features, feasible, targets = (arrays[name] for name in names)
-        group = Samples(features, feasible, targets, known)
+        group = Samples(*(arrays[name] for name in names))
         n = len(group.feasible)
-        expected = [(n, feature_size(category)), (n,), (n, TARGETS)]
-        shapes = [array.shape for array in (group.features, group.feasible, group.targets)]
-        if known is not None:
-            expected.append((n, sensitivity_size(category)))
-            shapes.append(known.shape)
+        expected = [(n, feature_size(category)), (n,), (n, TARGETS), (n, sensitivity_size(category))]
+        shapes = [arrays[name].shape for name in names]
         if shapes != expected:
             raise DatasetError(f"{path}: category {int(category)} has shapes {shapes}, expected {expected}; {remedy}")
-        infinite = known is not None and bool(np.isinf(known).any())
-        if infinite or not (np.isfinite(group.features).all() and np.isfinite(group.targets).all()):
+        finite = np.isfinite(group.features).all() and np.isfinite(group.targets).all()
+        if not finite or np.isinf(group.sensitivity).any():
             raise DatasetError(f"{path}: category {int(category)} holds NaN or infinite values; {remedy}")
         samples[category] = group
     return samples
@@ -261,4 +202,4 @@ def read_datasets(folders: list[Path], fingerprint: str, *, limit: int | None = 
     for path in sorted(paths, key=lambda path: path.name):
         for category, samples in read_shard(path).items():
             groups.setdefault(category, []).append(samples)
-    return {category: join(items, category).select(slice(limit)) for category, items in sorted(groups.items())}
+    return {category: join(items).select(slice(limit)) for category, items in sorted(groups.items())}

@@ -1,32 +1,32 @@
-"""More samples of what is rare and costly: variations of stored transitions.
+"""More samples of what is rare and costly: transitions put together from those of a data set, displaced and labelled.
 
 What nearly fails costs a hundred times more than what a planner mostly meets. So it decides how far off predictions are
-on average, and it is rare. A data set is enriched by transitions near those that it holds, the costly ones most often:
-the new contact is another's, contacts and state are displaced a little. They serve to learn from, never to test on.
+on average, and it is rare. A data set is enriched by transitions made of its own, the costly ones most often:
 
-Networks that were trained already find more: of many transitions put together from parts of stored ones
-(`learning.recombine`) those are labelled which they call feasible and costly.
+- variations keep near a stored transition: its new contact is another's, contacts and state are displaced a little;
+- combinations take feet and state from any category, palms from the category itself. Where feet may stand is what
+  decides how far a network's errors on new terrain exceed those on what it has seen. Most of what is put together so
+  is infeasible or cheap; networks that were trained already tell which part is worth a label.
+
+Both serve to learn from, never to test on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from toolkit.contacts.category import Category
-from toolkit.contacts.sequence import ContactTransition
-from toolkit.contacts.stance import Contact, Stance
+from toolkit.contacts.category import Category, performs
+from toolkit.geometry.limb import FEET
 from toolkit.learning.dataset import (
     SCHEMA,
     Manifest,
-    Samples,
     begin,
-    join,
-    no_samples,
     plain_settings,
     read_manifest,
     read_shard,
@@ -35,36 +35,30 @@ from toolkit.learning.dataset import (
     shards_of,
     write_shard,
 )
-from toolkit.learning.evaluate import at_default
 from toolkit.learning.jobs import run_jobs
 from toolkit.learning.label import label, samples_of
-from toolkit.learning.recombine import RecombineConfig, recombined
+from toolkit.learning.samples import AT_DEFAULT, Samples, join, no_samples
 from toolkit.learning.sensitivity import decode
 from toolkit.learning.shard import robot_of
+from toolkit.prediction.features import COM, CONTACT, MIRROR, TIMING_AND_FRICTION, feature_size
 from toolkit.prediction.network import TransitionNetwork, load_network, network_path
 from toolkit.robot.model import RobotModel
 
-_CANDIDATES = 12  # transitions put together for each that is labelled
+LIMIT = 5e3  # transitions with a larger objective are left out
+COSTLY = 0.7  # what is labelled is drawn in proportion to its objective to this power
+_CANDIDATES = 12  # combinations put together for each that is labelled
 
 
 @dataclass(frozen=True)
 class EnrichConfig:
-    """How transitions are varied.
+    """What is made of a data set.
 
     Attributes:
         robot: name of the robot; robots: folder that holds it.
-        seed: of everything random.
-        categories: which ones.
-        draws: transitions that are tried for each category and shard, of those at the paper's timing and friction.
-        power: they are drawn in proportion to their objective to this power.
-        exchange: share of them that get the new contact of another one.
-        foot: m and rad, standard deviations of a foot's displacement;
-        palm: the same of a palm.
-        com: m, and
-        velocity: m/s; the same of the state.
-        limit: transitions with a larger objective are left out.
-        networks: folder of networks that choose among transitions put together from parts; None: variations. Then only
-            `seed`, `categories`, `draws`, `power` and `limit` of the above count.
+        seed: seed of every random draw.
+        categories: numbers of the categories.
+        draws: number of transitions that are labelled for each category and shard.
+        networks: folder of networks that choose among combinations; None for variations.
     """
 
     robot: str
@@ -72,96 +66,183 @@ class EnrichConfig:
     seed: int = 0
     categories: tuple[int, ...] = tuple(int(category) for category in Category)
     draws: int = 200
-    power: float = 0.7
-    exchange: float = 0.5
-    foot: tuple[float, float] = (0.01, 0.04)
-    palm: tuple[float, float] = (0.03, 0.08)
-    com: float = 0.02
-    velocity: float = 0.08
-    limit: float = 5e3
     networks: str | None = None
 
 
-def variations(
-    robot: RobotModel, category: Category, samples: Samples, config: EnrichConfig, rng: np.random.Generator
-) -> Samples:
-    """Feasible variations of samples, `config.draws` at most.
+@dataclass(frozen=True)
+class Displacement:
+    """How far transitions lie from those that they are made of.
 
-    Args:
-        robot: the robot.
-        category: of the samples.
-        samples: labelled transitions; only those with the paper's timing and friction are varied.
-        config: how.
-        rng: randomness.
+    Attributes:
+        power: transitions lend their parts in proportion to their objective to this power.
+        exchange: share of parts that come from another transition.
+        foot: standard deviations of a foot's displacement, m and rad.
+        palm: the same of a palm.
+        com: standard deviation of the CoM's displacement, m.
+        velocity: the same of its velocity, m/s.
     """
-    group = at_default(samples)
-    group = group.select(np.flatnonzero(group.feasible))
-    parts = [samples.select(slice(0))]
-    weight = np.maximum(group.targets[:, 0].astype(float), 1e-3) ** config.power
-    for row in rng.choice(len(group), config.draws, p=weight / weight.sum()) if len(group) else ():
-        stance, com, velocity, transition = decode(group.features[row], category)
-        if rng.random() < config.exchange:
-            transition = decode(group.features[rng.integers(len(group))], category)[3]
-        if transition.contact is not None:
-            transition = replace(transition, contact=_displaced(transition.contact, config, rng))
-        stance = Stance(tuple(_displaced(contact, config, rng) for contact in stance.contacts))
-        com = com + config.com * rng.normal(size=3)
-        velocity = velocity + config.velocity * rng.normal(size=3)
-        parts.append(_labelled(robot, stance, com, velocity, transition, config.limit))
-    return join(parts, category)
+
+    power: float
+    exchange: float
+    foot: tuple[float, float]
+    palm: tuple[float, float]
+    com: float = 0.02
+    velocity: float = 0.08
 
 
-def combinations(
-    robot: RobotModel,
+VARIED = Displacement(power=COSTLY, exchange=0.5, foot=(0.01, 0.04), palm=(0.03, 0.08))
+COMBINED = Displacement(power=0.35, exchange=0.4, foot=(0.02, 0.08), palm=(0.05, 0.12))
+
+
+@dataclass(frozen=True)
+class _Lenders:
+    """Transitions of one category that lend their parts.
+
+    Attributes:
+        contacts: (n, k, 3, 3) place, x and z axis of each contact.
+        state: (n, 2, 3) CoM and velocity.
+        chance: (n,) how likely each is drawn; the sum is one.
+    """
+
+    contacts: np.ndarray
+    state: np.ndarray
+    chance: np.ndarray
+
+    @classmethod
+    def of(cls, category: Category, samples: Samples, power: float) -> _Lenders:
+        """The feasible samples with the paper's timing and friction."""
+        group = samples.at_default()
+        group = group.select(np.flatnonzero(group.feasible))
+        count, features = len(category.contact_limbs), group.features.astype(float)
+        weight = np.maximum(group.targets[:, 0].astype(float), 1e-3) ** power
+        return cls(
+            features[:, : CONTACT * count].reshape(-1, count, 3, 3),
+            features[:, COM.start : TIMING_AND_FRICTION.start].reshape(-1, 2, 3),
+            weight / max(weight.sum(), 1e-300),
+        )
+
+    def __len__(self) -> int:
+        return len(self.chance)
+
+    def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """(count,) random rows."""
+        return rng.choice(len(self), count, p=self.chance / self.chance.sum())
+
+
+def varied(
+    category: Category, samples: Samples, count: int, rng: np.random.Generator, how: Displacement = VARIED
+) -> np.ndarray:
+    """(count, d) features of variations of samples of a category; no rows where none is feasible."""
+    own = _Lenders.of(category, samples, how.power)
+    if not len(own):
+        return np.zeros((0, feature_size(category)))
+    rows = own.draw(count, rng)
+    contacts, state = own.contacts[rows], own.state[rows]
+    if category.makes:
+        swapped = rng.random(count) < how.exchange
+        contacts[swapped, -1] = own.contacts[rng.integers(len(own), size=count), -1][swapped]
+    return _displaced(category, contacts, state, how, rng)
+
+
+def combined(
     category: Category,
     shard: Mapping[Category, Samples],
-    network: TransitionNetwork,
-    config: EnrichConfig,
+    count: int,
     rng: np.random.Generator,
-) -> Samples:
-    """Feasible transitions put together from parts, `config.draws` at most; the costlier, the rather.
+    how: Displacement = COMBINED,
+) -> np.ndarray:
+    """Features of transitions put together from parts of those of all categories.
+
+    Feet and state come from any category, each as often, half of them mirrored; palms and new contacts come from the
+    category itself. Tiles are tilted each by itself, so feet may be turned as others are, each by itself.
 
     Args:
-        robot: the robot.
-        category: of the result.
+        category: category of the result.
         shard: labelled transitions by category.
-        network: what it calls feasible is labelled, in proportion to the objective that it predicts.
-        config: how.
-        rng: randomness.
+        count: number of transitions.
+        rng: source of every random draw.
+        how: how far they lie from their parts.
+
+    Returns:
+        (count, d) features; no rows where the shard has no feasible transition of the category.
     """
-    features = recombined(shard, category, _CANDIDATES * config.draws, RecombineConfig(), rng)
+    lenders = {other: _Lenders.of(other, samples, how.power) for other, samples in shard.items()}
+    lenders = {other: group for other, group in lenders.items() if len(group)}
+    if category not in lenders:
+        return np.zeros((0, feature_size(category)))
+    every = _Lenders(
+        np.concatenate([group.contacts[:, : len(FEET)] for group in lenders.values()]),
+        np.concatenate([group.state for group in lenders.values()]),
+        np.concatenate([group.chance for group in lenders.values()]),
+    )
+
+    def draw() -> tuple[np.ndarray, np.ndarray]:
+        rows, mirrored = every.draw(count, rng), rng.random(count) < 0.5
+        feet, state = every.contacts[rows], every.state[rows]
+        feet[mirrored] = feet[mirrored, ::-1] * MIRROR
+        state[mirrored] *= MIRROR
+        return feet, state
+
+    feet, state = draw()
+    swapped = rng.random(count) < how.exchange
+    state[swapped] = draw()[1][swapped]
+    for foot in FEET:
+        swapped = rng.random(count) < how.exchange
+        feet[swapped, foot, 1:] = draw()[0][swapped, foot, 1:]
+    own = lenders[category].contacts[:, len(FEET) :]
+    contacts = np.concatenate([feet, own[rng.integers(len(own), size=count)]], axis=1)
+    return _displaced(category, contacts, state, how, rng)
+
+
+def _displaced(
+    category: Category, contacts: np.ndarray, state: np.ndarray, how: Displacement, rng: np.random.Generator
+) -> np.ndarray:
+    """(n, d) canonical features of contacts (n, k, 3, 3) and states (n, 2, 3) after random displacements."""
+    n, k = contacts.shape[:2]
+    place, turn = np.array([how.foot if limb.is_foot else how.palm for limb in category.contact_limbs]).T
+    contacts, state = contacts.copy(), state + np.array([how.com, how.velocity])[:, None] * rng.normal(size=(n, 2, 3))
+    contacts[:, :, 0] += place[:, None] * rng.normal(size=(n, k, 3))
+    turns = Rotation.from_rotvec((turn[:, None] * rng.normal(size=(n, k, 3))).reshape(-1, 3)).as_matrix()
+    contacts[:, :, 1:] = np.einsum("nkij,nkaj->nkai", turns.reshape(n, k, 3, 3), contacts[:, :, 1:])
+
+    feet = contacts[:, : len(FEET)]
+    ahead = feet[:, :, 1, :2] / np.linalg.norm(feet[:, :, 1, :2], axis=2, keepdims=True)
+    cosine, sine = (ahead.sum(1) / np.linalg.norm(ahead.sum(1), axis=1, keepdims=True)).T
+    canonical = np.zeros((n, 3, 3))
+    canonical[:, 0, 0], canonical[:, 0, 1] = cosine, sine
+    canonical[:, 1, 0], canonical[:, 1, 1] = -sine, cosine
+    canonical[:, 2, 2] = 1.0
+    middle = feet[:, :, 0].mean(1)
+    contacts[:, :, 0] -= middle[:, None]
+    state[:, 0] -= middle
+    contacts = np.einsum("nij,nkaj->nkai", canonical, contacts)
+    state = np.einsum("nij,naj->nai", canonical, state)
+    return np.concatenate([contacts.reshape(n, -1), state.reshape(n, -1), np.tile(AT_DEFAULT, (n, 1))], axis=1)
+
+
+def chosen(features: np.ndarray, network: TransitionNetwork, count: int, rng: np.random.Generator) -> np.ndarray:
+    """At most `count` of the features (n, d) that a network calls feasible, the costlier the likelier."""
     features = features[network.feasible(features)]
     objective = network.predict(features)[:, 0].astype(float)
-    features, objective = features[objective <= config.limit], objective[objective <= config.limit]
-    weight = np.maximum(objective, 1.0) ** config.power
-    count = min(config.draws, len(features))
-    rows = rng.choice(len(features), count, replace=False, p=weight / weight.sum()) if count else ()
-    parts = [_labelled(robot, *decode(features[row], category), config.limit) for row in rows]
-    return join([no_samples(category), *parts], category)
+    features, objective = features[objective <= LIMIT], objective[objective <= LIMIT]
+    weight = np.maximum(objective, 1.0) ** COSTLY
+    count = min(count, len(features))
+    return features[rng.choice(len(features), count, replace=False, p=weight / weight.sum())] if count else features
 
 
-def _labelled(
-    robot: RobotModel,
-    stance: Stance,
-    com: np.ndarray,
-    velocity: np.ndarray,
-    transition: ContactTransition,
-    limit: float,
-) -> Samples:
-    """One sample; none where the transition is infeasible or its objective above the limit."""
-    labels = label(robot, stance, com[None], velocity[None], [transition])
-    found = samples_of(stance, com[None], velocity[None], [transition], labels)
-    return found.select(labels.feasible & (labels.objective <= limit))
-
-
-def _displaced(contact: Contact, config: EnrichConfig, rng: np.random.Generator) -> Contact:
-    place, turn = config.foot if contact.limb.is_foot else config.palm
-    rotation_vector = turn * rng.normal(size=3)
-    return replace(contact, pose=contact.pose.moved(place * rng.normal(size=3), rotation_vector))
+def labelled(robot: RobotModel, category: Category, features: np.ndarray) -> Samples:
+    """Samples of transitions with features (n, d): the feasible ones whose objective is not above the limit."""
+    parts, mirrored = [no_samples(category)], not performs(robot, category)
+    for row in features:
+        stance, com, velocity, transition = decode(row, category, mirrored=mirrored)
+        labels = label(robot, stance, com[None], velocity[None], [transition])
+        found = samples_of(stance, com[None], velocity[None], [transition], labels)
+        parts.append(found.select(labels.feasible & (labels.objective <= LIMIT)))
+    return join(parts)
 
 
 def _job(source: Path, folder: Path, config: EnrichConfig) -> int:
-    """Write the variations of one shard; their number."""
+    """Write what is made of one shard; the number of its transitions."""
     index = shard_index(source)
     robot, shard = robot_of(config.robot, config.robots), read_shard(source)
     found = {}
@@ -170,10 +251,11 @@ def _job(source: Path, folder: Path, config: EnrichConfig) -> int:
             continue
         rng = np.random.default_rng([config.seed, index, int(category)])
         if config.networks is None:
-            found[category] = variations(robot, category, shard[category], config, rng)
+            features = varied(category, shard[category], config.draws, rng)
         else:
             network = load_network(network_path(Path(config.networks), category), category, robot.fingerprint)
-            found[category] = combinations(robot, category, shard, network, config, rng)
+            features = chosen(combined(category, shard, _CANDIDATES * config.draws, rng), network, config.draws, rng)
+        found[category] = labelled(robot, category, features)
     write_shard(folder, index, found)
     return sum(len(group) for group in found.values())
 
@@ -186,15 +268,15 @@ def enrich(
     executor: Executor,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> int:
-    """Write a data set of variations beside a data set; goes on where it was stopped, shard by shard.
+    """Write a data set of what is made of another one; goes on where it was stopped, shard by shard.
 
     Args:
-        source: the data set that is varied.
+        source: the data set that lends its transitions.
         folder: the new one, or one begun with the same configuration.
-        robot: that both are for.
-        config: how.
+        robot: the robot that both are for.
+        config: what is made.
         executor: where shards are worked on.
-        progress: told how many shards of how many are done.
+        progress: is told how many shards of how many are done.
 
     Returns:
         Number of transitions that this call added.
@@ -203,11 +285,10 @@ def enrich(
         DatasetError: another robot's data, no shards, a broken one, or a folder with something else in it.
         NetworkError: a network that should choose is missing or another robot's.
     """
-    paths, varied = shards_of(source, robot.fingerprint), read_manifest(source)
-    settings = plain_settings(config, "robots", "networks") | {"varied_seed": varied.seed}
-    if config.networks is not None:
-        settings["recombined"] = plain_settings(RecombineConfig())
-    begin(folder, Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, varied.versions))
+    paths, lent = shards_of(source, robot.fingerprint), read_manifest(source)
+    how = plain_settings(VARIED if config.networks is None else COMBINED)
+    settings = plain_settings(config, "robots", "networks") | how | {"lent_seed": lent.seed}
+    begin(folder, Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, lent.versions))
     missing = [path for path in paths if not shard_path(folder, shard_index(path)).is_file()]
     done, added = len(paths) - len(missing), 0
 

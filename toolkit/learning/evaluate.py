@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from toolkit.errors import DatasetError
-from toolkit.learning.dataset import Samples
+from toolkit.learning.samples import Samples
 from toolkit.prediction.network import TransitionNetwork
-from toolkit.world.timing import Timing
-
-DEFAULT_FRICTION = 0.5
-AT_DEFAULT = (Timing().shift, Timing().swing, DEFAULT_FRICTION)
-"""Last features of transitions with the paper's timing and friction."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +61,6 @@ def score(network: TransitionNetwork, samples: Samples) -> Score:
     )
 
 
-def at_default(samples: Samples) -> Samples:
-    """The samples with the paper's timing (1 s + 1 s) and friction (0.5)."""
-    wanted = np.array(AT_DEFAULT, np.float32)
-    return samples.select(np.flatnonzero(np.isclose(samples.features[:, -3:], wanted, rtol=0, atol=1e-5).all(1)))
-
-
 def balanced(samples: Samples, count: int, rng: np.random.Generator, *, least_share: float = 0.25) -> Samples:
     """A test set of `count` transitions in which neither label falls under `least_share`.
 
@@ -82,3 +72,16 @@ def balanced(samples: Samples, count: int, rng: np.random.Generator, *, least_sh
     least = int(np.ceil(least_share * count))
     wanted = int(np.clip(head.sum(), least, count - least))
     return samples.select(np.concatenate([order[labels][:wanted], order[~labels][: count - wanted]]))
+
+
+def query_seconds(network: TransitionNetwork, batch: int, *, repeats: int = 200) -> float:
+    """Median seconds of judging a batch: feasibility, objective and CoM state of every transition in it."""
+    features = np.random.default_rng(0).uniform(network.lower, network.upper, (batch, len(network.lower)))
+    features = features.astype(np.float32)
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        network.feasible(features)
+        network.predict(features)
+        times.append(time.perf_counter() - start)
+    return float(np.median(times))

@@ -13,8 +13,8 @@ from toolkit.centroidal.residual import evaluate
 from toolkit.contacts.category import category_of
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
-from toolkit.learning.dataset import Samples
-from toolkit.learning.sensitivity import canonical, sensitivity_size
+from toolkit.learning.samples import Samples
+from toolkit.learning.sensitivity import canonical, unknown_sensitivity
 from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.prediction.features import TARGETS, encode
 from toolkit.prediction.reach import within_reach
@@ -93,7 +93,7 @@ def samples_of(
     targets[good, 0] = labels.objective[good]
     targets[good, 1:4] = frame.point(labels.com[good])
     targets[good, 4:7] = frame.vector(labels.com_velocity[good])
-    known = np.full((n, sensitivity_size(category)), np.nan, np.float32)
+    known = unknown_sensitivity(category, n)
     for row, found in enumerate(labels.sensitivity):
         if found is not None:
             known[row] = canonical(frame, category, found)

@@ -14,20 +14,21 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
-from toolkit.prediction.features import COM, CONTACT, LAYOUT, TIMING_AND_FRICTION, Canonical, contact_count
+from toolkit.prediction.features import MIRROR, STATE, TIMING_AND_FRICTION, Canonical
 from toolkit.world.timing import Timing
 
 PART = 6  # numbers per contact
-_NEW = 4  # row of the new contact in `fast.Sensitivity.contacts`
-# The limb that moves, in canonical form.
-MOVING: dict[Category, Limb] = {
-    category: Limb.LEFT_FOOT if "FOOT" in category.name else Limb.LEFT_PALM for category in Category
-}
+_NEW = len(Limb)  # row of the new contact in `fast.Sensitivity.contacts`
 
 
 def sensitivity_size(category: Category) -> int:
     """Number of derivatives of a category."""
-    return PART * contact_count(category) + 9
+    return PART * len(category.contact_limbs) + STATE
+
+
+def unknown_sensitivity(category: Category, count: int) -> np.ndarray:
+    """(count, sensitivity_size) float32; derivatives of which none is known."""
+    return np.full((count, sensitivity_size(category)), np.nan, np.float32)
 
 
 def canonical(frame: Canonical, category: Category, found: fast.Sensitivity) -> np.ndarray:
@@ -38,8 +39,7 @@ def canonical(frame: Canonical, category: Category, found: fast.Sensitivity) -> 
         category: of the transition.
         found: derivatives in the world.
     """
-    limbs, makes = LAYOUT[category]
-    rows = [int(limb.mirrored if frame.mirrored else limb) for limb in limbs] + [_NEW] * makes
+    rows = [int(limb.mirrored if frame.mirrored else limb) for limb in category.before] + [_NEW] * category.makes
     parts = found.contacts[rows].reshape(-1, 2, 3)
     turned = frame.vector(parts)
     if frame.mirrored:
@@ -49,27 +49,30 @@ def canonical(frame: Canonical, category: Category, found: fast.Sensitivity) -> 
     return np.concatenate([turned.ravel(), others])
 
 
-def decode(features: np.ndarray, category: Category) -> tuple[Stance, np.ndarray, np.ndarray, ContactTransition]:
+def decode(
+    features: np.ndarray, category: Category, *, mirrored: bool = False
+) -> tuple[Stance, np.ndarray, np.ndarray, ContactTransition]:
     """The transition that has given features: `features.encode` the other way round.
 
     Args:
-        features: (d,) of one transition; axes are made orthonormal again.
-        category: of the transition.
+        features: (d,) features of one transition; axes are made orthonormal again.
+        category: category of the transition.
+        mirrored: whether a right limb is to move: the mirror image, which has the same features.
 
     Returns:
         Stance, CoM (3,) in m, its velocity (3,) in m/s, and the transition, in the canonical frame.
     """
-    limbs, makes = LAYOUT[category]
+    limbs = [limb.mirrored if mirrored else limb for limb in category.contact_limbs]
     values = np.asarray(features, float)
-    rows = values[: CONTACT * contact_count(category)].reshape(-1, 3, 3)
+    vectors = values[: TIMING_AND_FRICTION.start].reshape(-1, 3) * (MIRROR if mirrored else 1.0)
     shift, swing, friction = values[TIMING_AND_FRICTION].tolist()
     contacts = []
-    for limb, (place, x, z) in zip([*limbs, MOVING[category]], rows, strict=False):
+    for limb, (place, x, z) in zip(limbs, vectors[:-2].reshape(-1, 3, 3), strict=True):
         z = z / np.linalg.norm(z)
         x = x - (x @ z) * z
         x /= np.linalg.norm(x)
         contacts.append(Contact(limb, Pose(np.column_stack([x, np.cross(z, x), z]), place), friction))
-    new = contacts.pop() if makes else None
-    velocity = values[COM.stop : TIMING_AND_FRICTION.start]
-    transition = ContactTransition(MOVING[category], new, Timing(shift, swing))
-    return Stance(tuple(contacts)), values[COM], velocity, transition
+    new = contacts.pop() if category.makes else None
+    stance = Stance(tuple(sorted(contacts, key=lambda contact: contact.limb)))
+    moving = category.moving.mirrored if mirrored else category.moving
+    return stance, vectors[-2], vectors[-1], ContactTransition(moving, new, Timing(shift, swing))

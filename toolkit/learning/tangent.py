@@ -7,13 +7,13 @@ means something only along it, so rotations are taken as rotation vectors, and w
 from __future__ import annotations
 
 import torch
-from torch import nn
 
+from toolkit.geometry.limb import FEET
 from toolkit.learning.sensitivity import PART
-from toolkit.prediction.features import CONTACT
+from toolkit.prediction.features import CONTACT, STATE
 
 TURN = 0.15  # rad; unit of rotations, about as much as surfaces differ; the unit of anything else is its spread
-_FEET = 2
+_FEET = len(FEET)
 
 
 class TangentSpace:
@@ -24,7 +24,7 @@ class TangentSpace:
     """
 
     def __init__(self, features: torch.Tensor):
-        self._contacts = (features.shape[1] - 9) // CONTACT
+        self._contacts = (features.shape[1] - STATE) // CONTACT
         spread = features.std(0)
         places = spread[: CONTACT * self._contacts].reshape(-1, CONTACT)[:, :3]
         units = torch.cat([places, torch.full_like(places, TURN)], 1)
@@ -55,20 +55,3 @@ class TangentSpace:
         level = x[..., 0] ** 2 + x[..., 1] ** 2
         change = torch.stack([-x[..., 0] * x[..., 2], -x[..., 1] * x[..., 2], level], -1) / level[..., None]
         return change / change.flatten(1).norm(dim=1)[:, None, None]
-
-
-def with_gradient(net: nn.Sequential, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Outputs (n, k) of a perceptron with ReLU units, and the gradient (n, d) of the first one in the inputs.
-
-    The gradient is a product of the layers' weights with the units that are on, so that a loss of it can be
-    differentiated like any other.
-    """
-    linear = [layer for layer in net if isinstance(layer, nn.Linear)]
-    x, active = inputs, []
-    for layer in linear[:-1]:
-        x = torch.relu(layer(x))
-        active.append(x > 0)
-    gradient = linear[-1].weight[0].expand(len(inputs), -1)
-    for layer, on in zip(reversed(linear[:-1]), reversed(active), strict=True):
-        gradient = (gradient * on) @ layer.weight
-    return linear[-1](x), gradient

@@ -16,44 +16,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.contacts.category import Category, category_of
+from toolkit.contacts.category import Category, category_rows
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.geometry.heading import joint_heading
-from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 
 MIRROR = np.array([1.0, -1.0, 1.0])
 CONTACT = 9  # numbers per contact
+STATE = 9  # numbers after the contacts: CoM, CoM velocity, shift, swing, friction
 TARGETS = 7  # objective, CoM, CoM velocity
 COM = slice(-9, -6)  # columns of the initial CoM
 TIMING_AND_FRICTION = slice(-3, None)
 
-# Limbs in contact before the transition, in canonical (mirrored) form, and the limb that moves; None: broken.
-LAYOUT: dict[Category, tuple[tuple[Limb, ...], bool]] = {
-    Category.MOVE_FOOT: (FEET, True),
-    Category.ADD_PALM: (FEET, True),
-    Category.MOVE_INNER_FOOT_WITH_PALM: ((*FEET, Limb.LEFT_PALM), True),
-    Category.MOVE_OUTER_FOOT_WITH_PALM: ((*FEET, Limb.RIGHT_PALM), True),
-    Category.BREAK_ONLY_PALM: ((*FEET, Limb.LEFT_PALM), False),
-    Category.MOVE_ONLY_PALM: ((*FEET, Limb.LEFT_PALM), True),
-    Category.ADD_OTHER_PALM: ((*FEET, Limb.RIGHT_PALM), True),
-    Category.MOVE_FOOT_WITH_PALMS: ((*FEET, Limb.LEFT_PALM, Limb.RIGHT_PALM), True),
-    Category.BREAK_ONE_PALM: ((*FEET, Limb.LEFT_PALM, Limb.RIGHT_PALM), False),
-    Category.MOVE_ONE_PALM: ((*FEET, Limb.LEFT_PALM, Limb.RIGHT_PALM), True),
-}
-
-
-def contact_count(category: Category) -> int:
-    """Contacts in a transition: those before it, and the new one if there is one."""
-    limbs, makes = LAYOUT[category]
-    return len(limbs) + makes
-
 
 def feature_size(category: Category) -> int:
     """Length of the feature vector of a category."""
-    return CONTACT * contact_count(category) + 9
+    return CONTACT * len(category.contact_limbs) + STATE
 
 
 @dataclass(frozen=True)
@@ -99,7 +80,7 @@ class Canonical:
 
 def parent_frame(stance: Stance) -> Pose:
     """`stance.mean_feet` in plain floats, which is several times faster: it is needed for every query."""
-    left, right = (contact.pose for contact in stance.contacts[:2])
+    left, right = (contact.pose for contact in stance.feet)
     x, y = joint_heading(left.rotation, right.rotation)
     length = math.hypot(x, y)
     c, s = (x / length, y / length) if length > 0.0 else (1.0, 0.0)
@@ -125,13 +106,12 @@ def encode(
         ValueError: the transitions are of several categories or limbs.
     """
     new = TransitionRows.of(transitions)
-    first = new[0]
-    category = category_of(stance, first)
-    limbs, makes = LAYOUT[category]
-    if (new.limb != first.limb).any() or (new.makes != makes).any():
+    numbers = category_rows(stance, new)
+    limb, category = Limb(new.limb[0]), Category(numbers[0])
+    if (new.limb != limb).any() or (numbers != category).any():
         raise ValueError("transitions of one call must share their limb and category")
-    frame = Canonical(parent_frame(stance), not first.limb.is_left)
-    contacts = [stance[limb.mirrored if frame.mirrored else limb] for limb in limbs]
+    frame = Canonical(parent_frame(stance), not limb.is_left)
+    contacts = [stance[limb.mirrored if frame.mirrored else limb] for limb in category.before]
     before = frame.contacts(
         np.array([contact.pose.position for contact in contacts]),
         np.array([contact.pose.rotation for contact in contacts]),
@@ -140,7 +120,7 @@ def encode(
     features = np.empty((len(new), feature_size(category)))
     column = before.size
     features[:, :column] = before.ravel()
-    if makes:
+    if category.makes:
         features[:, column : column + CONTACT] = frame.contacts(new.position, new.rotation)
         column += CONTACT
         friction = np.minimum(friction, new.friction)

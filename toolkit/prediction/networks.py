@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from toolkit.contacts.category import Category, category_of
+from toolkit.contacts.category import Category, categories_of, category_rows
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.errors import NetworkError
+from toolkit.geometry.limb import Limb
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.prediction.features import encode
 from toolkit.prediction.network import TransitionNetwork, load_network, network_path
@@ -30,9 +31,9 @@ def load_networks(robot: RobotModel, folder: Path | None = None) -> dict[Categor
         NetworkError: see `load_network`.
     """
     folder = folder or robot.folder / "networks"
-    categories = list(Category) if robot.arms else [Category.MOVE_FOOT]
     return {
-        category: load_network(network_path(folder, category), category, robot.fingerprint) for category in categories
+        category: load_network(network_path(folder, category), category, robot.fingerprint)
+        for category in categories_of(robot)
     }
 
 
@@ -60,14 +61,15 @@ class NetworkEvaluator(TransitionEvaluator):
         feasible, objective = np.zeros(n, bool), np.zeros(n)
         end_com, end_velocity = np.zeros((n, 3)), np.zeros((n, 3))
         untrained = 0
-        group = 2 * all_rows.limb + all_rows.makes
+        numbers = category_rows(stance, all_rows)
+        group = len(Limb) * numbers + all_rows.limb
         for code in dict.fromkeys(group.tolist()):
             rows = np.flatnonzero(group == code)
             same = all_rows if len(rows) == n else all_rows.select(rows)
-            category = category_of(stance, same[0])
+            category = Category(numbers[rows[0]])
             network = self.networks.get(category)
             if network is None:
-                raise NetworkError(f"no network for category {int(category)} ({category.name.lower()}) is loaded")
+                raise NetworkError(f"no network for category {int(category)} ({category.words}) is loaded")
             frame, features = encode(stance, com, com_velocity, same)
             if not np.isfinite(features).all():
                 raise NetworkError(f"a query of category {int(category)} holds NaN or infinite values")

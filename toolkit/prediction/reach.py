@@ -49,7 +49,7 @@ def within_reach(
             arm = robot.arms[limb]
             centres.append(contact.pose.position - turn @ arm.shoulder_in_com)
             radii.append(arm.max_reach)
-    least = min(contact.pose.position[2] for contact in stance.contacts[:2])
+    least = min(contact.pose.position[2] for contact in stance.feet)
     least += (config or ProblemConfig()).min_height * robot.com_height
 
     def violation(points: np.ndarray) -> np.ndarray:

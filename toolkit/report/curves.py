@@ -30,7 +30,7 @@ def draw_curves(curves: Mapping[Category, Mapping[str, Losses]], path: Path) -> 
     for row, (category, networks) in enumerate(curves.items()):
         for column, name in enumerate(columns):
             axes = panels[row, column]
-            axes.set_title(f"{int(category)} {category.name.lower().replace('_', ' ')}: {name}", fontsize=8)
+            axes.set_title(f"{int(category)} {category.words}: {name}", fontsize=8)
             if name in networks:
                 _draw(axes, networks[name])
     for axes in panels[-1]:

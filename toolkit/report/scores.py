@@ -20,7 +20,7 @@ def score_table(scores: Mapping[Category, Score]) -> Table:
         table.add_column(name, justify="right")
     for category, score in scores.items():
         table.add_row(
-            f"{int(category)} {category.name.lower().replace('_', ' ')}",
+            f"{int(category)} {category.words}",
             str(score.samples),
             f"{100 * score.feasible_share:.1f} %",
             f"{100 * score.accuracy:.1f} %",

@@ -1,0 +1,70 @@
+"""Robots with one arm, or with feet only: a plan, every command of the training, and a plan judged by what it made."""
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+import pytest
+
+from tests.robot.samples import TOML, arm_toml, biped_mjcf, write_robot
+from toolkit import plan, train
+from toolkit.contacts.category import categories_of
+from toolkit.learning import fit
+from toolkit.learning.collect_config import CollectConfig
+from toolkit.learning.dataset import read_dataset
+from toolkit.prediction.networks import load_networks
+from toolkit.robot.loader import load_robot
+from toolkit.robots import main as show_robots
+
+WORLD = """<mujoco><worldbody>
+  <geom type="plane" size="0 0 1" friction="0.7"/>
+  <geom type="box" pos="0.3 0.62 1.1" size="1.0 0.02 0.5" friction="0.7"/>
+  <geom type="box" pos="0.3 -0.62 1.1" size="1.0 0.02 0.5" friction="0.7"/>
+  <site name="start" pos="0 0 0"/>
+  <site name="goal" type="cylinder" pos="0.6 0 0" size="0.15 0.01"/>
+</worldbody></mujoco>"""
+ROBOTS = {
+    "feet_only": (biped_mjcf(), TOML),
+    "left_arm": (biped_mjcf("left"), arm_toml("left")),
+    "right_arm": (biped_mjcf("right"), arm_toml("right")),
+}
+
+
+@pytest.mark.parametrize("name", ["feet_only", "left_arm", pytest.param("right_arm", marks=pytest.mark.slow)])
+def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
+    model, toml = ROBOTS[name]
+    robot = load_robot(str(write_robot(tmp_path / "robots" / name, model, toml)))
+    categories = categories_of(robot)
+    options = ["--robot", name, "--robots", str(tmp_path / "robots")]
+    world = tmp_path / "walls.xml"
+    world.write_text(WORLD)
+
+    def planned(planner):
+        out = ["--out", str(tmp_path / planner), "--no-recording"]
+        return plan.main([str(world), *options, *out, "--planner", planner, "--expansions", "30"])
+
+    def trained(command, *more):
+        return train.main([command, *options, *more])
+
+    assert show_robots([name, *options[2:]]) == 0
+    assert planned("kinematic") == 0
+
+    # Few samples, made in this process; the commands themselves are as they are.
+    monkeypatch.setattr(train, "executor", lambda workers, cluster: ThreadPoolExecutor(1))
+    monkeypatch.setattr(train, "CollectConfig", partial(CollectConfig, per_shard=30, default_share=0.7))
+    monkeypatch.setattr(fit, "MINIMUM", 3)
+    data, rich, mixed = (str(tmp_path / folder) for folder in ("data", "rich", "mixed"))
+    assert trained("collect", "--out", data, "--samples", "30") == 0
+    samples = read_dataset(tmp_path / "data", robot.fingerprint)
+    assert list(samples) == categories and min(len(group) for group in samples.values()) >= 30
+    assert trained("enrich", "--data", data, "--out", rich, "--draws", "6") == 0
+    more = read_dataset(tmp_path / "rich", robot.fingerprint)
+    assert list(more) == categories and sum(len(group) for group in more.values()) > 0
+    assert trained("fit", "--data", data, rich, "--epochs", "2") == 0
+    assert list(load_networks(robot)) == categories
+    networks = str(robot.folder / "networks")
+    assert trained("enrich", "--data", data, "--out", mixed, "--draws", "3", "--networks", networks) == 0
+    assert trained("evaluate", "--data", data, "--count", "20") == 0
+    assert planned("learned") in (0, 1)  # what so little training says of a plan is open
+    for group in samples.values():
+        assert np.isfinite(group.features).all()

@@ -1,0 +1,158 @@
+"""Gradient descent: one network learns one task, with early stopping."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import torch
+from torch import nn
+
+from toolkit.learning.layers import linear_layers
+
+WEIGHT_DECAY = 1e-4
+HELD_OUT = 0.05  # share of the samples that watch for early stopping: the last ones, which come from other terrain
+COARSE = 0.8  # share of the epochs that compute in bfloat16, twice as fast on processors that have it
+
+
+@dataclass(frozen=True)
+class FitConfig:
+    """Settings of the training.
+
+    Attributes:
+        epochs: most passes over the data for the regressor; the learning rate falls to zero over them.
+        classifier_share: the same for the classifier, as a part of `epochs`: it learns faster.
+        batch: number of samples per gradient step.
+        learning_rate: peak of the one-cycle schedule.
+        sensitivity_weight: weight of the loss of the objective's derivatives, where samples have them: their mean,
+            scaled by the features' spreads, see `learning.tangent`. They tell as much as many more labels.
+        patience: epochs without a better validation loss before stopping.
+        device: torch's name of where to compute.
+        seed: seed of the initial weights and the shuffling.
+    """
+
+    epochs: int = 120
+    classifier_share: float = 0.2
+    batch: int = 512
+    learning_rate: float = 4e-3
+    sensitivity_weight: float = 20.0
+    patience: int = 40
+    device: str = "cpu"
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Learning curve: (epochs,) losses on the training and the validation set, and the epoch that was kept."""
+
+    training: np.ndarray
+    validation: np.ndarray
+    best: int
+
+
+class Task(Protocol):
+    """What a network learns from numbered samples.
+
+    Attributes:
+        share: (n,) share of the epochs that each sample takes part in.
+    """
+
+    share: torch.Tensor
+
+    def loss(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
+        """What training lowers."""
+        ...
+
+    def error(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
+        """What is watched on samples that were held out."""
+        ...
+
+
+def _optimisers(net: nn.Sequential, config: FitConfig, orthogonal: bool) -> list[torch.optim.Optimizer]:
+    """AdamW; Muon for the matrices of all layers but the last where that is asked for."""
+    hidden = [layer.weight for layer in linear_layers(net)[:-1]] if orthogonal else []
+    others = [part for part in net.parameters() if not any(part is weight for weight in hidden)]
+    rate, decay = config.learning_rate, WEIGHT_DECAY
+    result: list[torch.optim.Optimizer] = [torch.optim.AdamW(others, rate, weight_decay=decay, fused=True)]
+    if hidden:
+        result.append(torch.optim.Muon(hidden, rate, weight_decay=decay, adjust_lr_fn="match_rms_adamw"))
+    return result
+
+
+def draw(share: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+    """Rows in random order, each with its share as probability; the sum of the shares, rounded down, or one more."""
+    order = torch.randperm(len(share), generator=generator, device=share.device)
+    wheel = share[order].cumsum(0) + torch.rand(1, generator=generator, device=share.device, dtype=share.dtype)
+    return order[wheel.floor() > (wheel - share[order]).floor()]
+
+
+def descend(
+    net: nn.Sequential,
+    task: Task,
+    config: FitConfig,
+    progress: Callable[[int, float, float], None],
+    *,
+    orthogonal: bool = False,
+) -> Curve:
+    """Train in place with early stopping; the weights of the best epoch are kept.
+
+    Args:
+        net: the network; on the processor and in evaluation mode afterwards.
+        task: what it learns.
+        config: settings.
+        progress: is told epoch, training loss and validation loss.
+        orthogonal: whether the hidden layers are trained with Muon, which needs fewer steps; else by AdamW.
+
+    Returns:
+        The learning curve.
+    """
+    samples = len(task.share)
+    device = torch.device(config.device)
+    net.to(device)
+    generator = torch.Generator(device).manual_seed(config.seed)
+    count = samples - max(1, int(HELD_OUT * samples))
+    held_out = torch.arange(count, samples, device=device)
+    share = task.share[:count]
+    drawn = int(share.sum() - 1e-6 * count) if bool((share < 1.0).any()) else count
+    size = max(1, min(config.batch, drawn))
+    steps = max(1, drawn // size)
+    optimisers = _optimisers(net, config, orthogonal)
+    schedules = [
+        torch.optim.lr_scheduler.OneCycleLR(
+            each, config.learning_rate, total_steps=steps * config.epochs, pct_start=0.15, cycle_momentum=False
+        )
+        for each in optimisers
+    ]
+    best, best_epoch, kept = float("inf"), 0, {k: v.clone() for k, v in net.state_dict().items()}
+    training, validation = [], []
+    for epoch in range(config.epochs):
+        net.train()
+        order = draw(share, generator)
+        total = torch.zeros((), device=device)
+        coarse = device.type == "cpu" and epoch < COARSE * config.epochs
+        for step in range(steps):
+            rows = order[step * size : (step + 1) * size]
+            net.zero_grad(set_to_none=True)
+            with torch.autocast("cpu", torch.bfloat16, enabled=coarse):
+                value = task.loss(net, rows)
+            value.backward()
+            for optimiser, schedule in zip(optimisers, schedules, strict=True):
+                optimiser.step()
+                schedule.step()
+            total += value.detach()
+        net.eval()
+        with torch.no_grad():
+            held = float(task.error(net, held_out))
+        training.append(float(total) / steps)
+        validation.append(held)
+        progress(epoch, training[-1], held)
+        if held < best:
+            best, best_epoch = held, epoch
+            kept = {k: v.clone() for k, v in net.state_dict().items()}
+        elif epoch - best_epoch >= config.patience:
+            break
+    net.load_state_dict(kept)
+    net.cpu().eval()
+    return Curve(np.array(training), np.array(validation), best_epoch)
