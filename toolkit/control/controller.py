@@ -6,12 +6,12 @@ import numpy as np
 
 from toolkit.centroidal.problem import Margins
 from toolkit.control.config import ControllerConfig, TaskGains, TouchdownConfig
+from toolkit.control.corrector import Cones, Corrector, MotionTarget
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.joint_box import JointBox
 from toolkit.control.limb_target import LimbTargets
 from toolkit.control.qp import FORCE_UNIT, ContactQP
 from toolkit.control.reference import Reference
-from toolkit.control.target import Cones, Corrector, MotionTarget
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel

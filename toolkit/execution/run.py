@@ -83,7 +83,7 @@ def execute(
     reference = sample_reference(period * np.arange(ticks), sequence, schedule, motion, trajectory, paths, robot)
     replanner = None
     if config.replanning.enabled and motion.problem.margins.friction <= config.replanning.max_friction:
-        nominal = Nominal.of(motion, reference, robot, config.replanning)
+        nominal = Nominal.of(motion, reference, robot, config.replanning.horizon)
         replanner = Replanner(reference, nominal, robot, world.surfaces, config.replanning)
     controller = Controller(
         robot, reference, motion.problem.margins, period, config.controller, config.touchdown, replanner

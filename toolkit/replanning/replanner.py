@@ -7,19 +7,23 @@ from time import process_time
 import numpy as np
 
 from toolkit.centroidal.problem import STANDARD_GRAVITY
+from toolkit.control.corrector import PENDULUM_RATE, Cones, MotionTarget
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.limb_target import LimbTargets
 from toolkit.control.reference import Reference, Swing
-from toolkit.control.target import Cones, MotionTarget
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.replanning.config import ReplanConfig
-from toolkit.replanning.contacts import Situation
-from toolkit.replanning.kernel import solve
 from toolkit.replanning.nominal import Nominal
-from toolkit.replanning.problem import Replan, ReplanProblem
+from toolkit.replanning.replan import Replan, ReplanProblem
+from toolkit.replanning.situation import Situation
 from toolkit.robot.model import RobotModel
 from toolkit.world.surface import Surface
+
+PACE = 1.9  # of the plan's; a swing goes on at most so much faster where its contact is needed earlier...
+PACE_RATE = 12.0  # 1/s; ... changing its pace by this much per second...
+SHORTEST = 0.3  # s; ... unless the whole swing would be shorter than this: legs are not faster
+KEPT_FROM = 0.75  # of the swing, after which the landing point is kept: the foot comes down
 
 
 class Replanner:
@@ -113,7 +117,7 @@ class Replanner:
             self._goal.clear()
             return
         began = process_time()
-        plan = self._problem.solve(self._situation(time, displaced, dynamics, tracker, cones), solve)
+        plan = self._problem.solve(self._situation(time, displaced, dynamics, tracker, cones))
         self.departures += 1
         if plan is None:
             self.failures += 1
@@ -142,7 +146,7 @@ class Replanner:
         """In m, from the plan moved with the feet that bear it."""
         off = dynamics.com - self._reference.com[index] - self.com_shift
         speed = dynamics.com_velocity - self._reference.com_velocity[index]
-        return float(np.linalg.norm(off + speed / self._config.frequency))
+        return float(np.linalg.norm(off + speed / PENDULUM_RATE))
 
     def _follow_feet(self, index: int, period: float) -> None:
         """Let the plan's shift follow the feet that bear it."""
@@ -150,7 +154,7 @@ class Replanner:
         total = float(load.sum())
         if total > 0.0:
             wanted = load @ self._moved[:2] / total
-            self.com_shift += period * self._config.frequency * (wanted - self.com_shift)
+            self.com_shift += period * PENDULUM_RATE * (wanted - self.com_shift)
 
     @property
     def mean_seconds(self) -> float:
@@ -176,7 +180,7 @@ class Replanner:
             if tracker.state[limb] is LimbState.SWING and limb.is_foot:
                 earliest[index] = time + (swing.end - time - lead) / self._most(swing) + 0.02
                 landing[index] = min(max(self._ends.get(index, np.inf), earliest[index]), swing.end - lead)
-            if tracker.state[limb] is not LimbState.SWING or over > self._config.fraction:
+            if tracker.state[limb] is not LimbState.SWING or over > KEPT_FROM:
                 fixed[index] = self._goal.get(index, np.zeros(3))
             else:
                 moving[index] = self._shift[limb].copy()
@@ -198,7 +202,7 @@ class Replanner:
 
     def _most(self, swing: Swing) -> float:
         """Fastest pace of a swing."""
-        return min(max((swing.end - swing.start) / self._config.shortest, 1.0), self._config.pace)
+        return min(max((swing.end - swing.start) / SHORTEST, 1.0), PACE)
 
     def _track(self, time: float, target: MotionTarget) -> None:
         """Move what to track by the last replan, where it reaches so far; else with the feet that bear it."""
@@ -230,7 +234,7 @@ class Replanner:
             end = self._ends.get(event, swing.end)
             pace = (swing.end - time - tracker.lead[foot]) / max(end - time, 0.02) if end < swing.end else 1.0
             pace = min(max(pace, 1.0), self._most(swing))
-            change = self._config.pace_rate * period
+            change = PACE_RATE * period
             tracker.pace[foot] += min(max(pace - tracker.pace[foot], -change), change)
             goal = self._goal.get(event, self._shift[foot])
             left = max(min(end, swing.start + 0.9 * (swing.end - swing.start)) - 0.03 - time, 0.05)
