@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from toolkit.control.corrector import Cones
-from toolkit.control.reference import sample_reference
+from toolkit.control.sampled_plan import sample_reference
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.geometry.limb import Limb

@@ -11,8 +11,8 @@ from toolkit.geometry.limb import Limb
 from toolkit.wholebody.check import CheckConfig, check
 from toolkit.wholebody.collision import CollisionConfig, first_collision
 from toolkit.wholebody.limb_paths import limb_paths
+from toolkit.wholebody.motion_dynamics import contact_wrenches, inverse_dynamics
 from toolkit.wholebody.plan import whole_body
-from toolkit.wholebody.torque import contact_wrenches, inverse_dynamics
 
 
 @pytest.fixture(scope="module")

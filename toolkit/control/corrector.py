@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.limb_target import LimbTargets
-from toolkit.control.reference import Reference
+from toolkit.control.sampled_plan import Reference
 from toolkit.control.touchdown import ContactTracker
 
 PENDULUM_RATE = 3.4

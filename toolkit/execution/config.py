@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from toolkit.control.config import ControllerConfig, TouchdownConfig
+from toolkit.control.config import ControllerConfig
 from toolkit.errors import InputError
 from toolkit.execution.disturbance import Disturbance
 from toolkit.replanning.config import ReplanConfig
@@ -25,7 +25,7 @@ class ExecutionConfig:
         min_height: fraction of the home CoM height above the lowest foot, below which the robot has fallen.
         slip_limit, com_rms_limit: m; of the verdict.
         range_tolerance: rad; of the verdict on joint ranges.
-        controller, touchdown, replanning, disturbance: see the classes.
+        controller, replanning, disturbance: see the classes.
     """
 
     timestep: float = 0.002
@@ -40,7 +40,6 @@ class ExecutionConfig:
     com_rms_limit: float = 0.02
     range_tolerance: float = 1e-3
     controller: ControllerConfig = field(default_factory=ControllerConfig)
-    touchdown: TouchdownConfig = field(default_factory=TouchdownConfig)
     replanning: ReplanConfig = field(default_factory=ReplanConfig)
     disturbance: Disturbance = field(default_factory=Disturbance)
 

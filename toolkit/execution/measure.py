@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.control.reference import Reference
+from toolkit.control.sampled_plan import Reference
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Execution

@@ -12,7 +12,7 @@ from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.control.controller import Controller
-from toolkit.control.reference import LimbPathSampler, sample_reference
+from toolkit.control.sampled_plan import LimbPathSampler, sample_reference
 from toolkit.errors import ExecutionError
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import StateFilter
@@ -85,9 +85,7 @@ def execute(
     if config.replanning.enabled and motion.problem.margins.friction <= config.replanning.max_friction:
         nominal = Nominal.of(motion, reference, robot, config.replanning.horizon)
         replanner = Replanner(reference, nominal, robot, world.surfaces, config.replanning)
-    controller = Controller(
-        robot, reference, motion.problem.margins, period, config.controller, config.touchdown, replanner
-    )
+    controller = Controller(robot, reference, motion.problem.margins, period, config.controller, replanner)
     recorder = Recorder(ticks, scene, robot, index, config)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(schedule.duration, rng)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.contacts.stance import Contact
-from toolkit.control.reference import Swing
+from toolkit.control.sampled_plan import Swing
 from toolkit.geometry.pose import Pose
 from toolkit.replanning.situation import Situation
 from toolkit.world.surface import Surface

@@ -9,10 +9,11 @@ import numpy as np
 from toolkit.centroidal.body import TORQUE_ROLES, BodyMargins, knot_contacts, leg_torques, swing_ankles
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion, CentroidalProblem
 from toolkit.contacts.reach import ReachMargins, leg_clearances, leg_posture
-from toolkit.control.reference import Reference, Swing, planned_wrench
+from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.geometry.limb import FEET, PALMS
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
+from toolkit.wholebody.motion_dynamics import planned_wrench
 
 LIMITS = ("leg length", "hip roll", "hip pitch", "ankle pitch", "ankle roll")
 DIFFERENCE = 1e-5  # m; of the CoM, for gradients of clearances

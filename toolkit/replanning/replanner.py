@@ -10,7 +10,7 @@ from toolkit.centroidal.problem import STANDARD_GRAVITY
 from toolkit.control.corrector import PENDULUM_RATE, Cones, MotionTarget
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.limb_target import LimbTargets
-from toolkit.control.reference import Reference, Swing
+from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.replanning.config import ReplanConfig

@@ -13,7 +13,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.wholebody.collision import CollisionConfig, first_collision
 from toolkit.wholebody.finding import Finding
 from toolkit.wholebody.limb_paths import LimbPaths
-from toolkit.wholebody.torque import inverse_dynamics, velocities
+from toolkit.wholebody.motion_dynamics import inverse_dynamics, velocities
 from toolkit.world.world import World
 
 

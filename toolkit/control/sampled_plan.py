@@ -14,7 +14,7 @@ from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_from_quaternion
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.momentum import posture_momentum
+from toolkit.wholebody.motion_dynamics import planned_wrench, posture_momentum
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 
@@ -184,19 +184,6 @@ def swings_of(sequence: ContactSequence, schedule: ContactSchedule) -> tuple[Swi
         for phase in schedule.phases
         if phase.swing is not None
     )
-
-
-def planned_wrench(motion: CentroidalMotion) -> np.ndarray:
-    """Planned wrenches in the contact frames.
-
-    Returns:
-        (N, 4, 6); force, and moment about the patch's centre: CoP times force plus the yaw torque.
-    """
-    force = np.einsum("nlji,nlj->nli", motion.problem.rotation, motion.force)
-    lever = np.concatenate([motion.cop, np.zeros_like(motion.cop[..., :1])], axis=-1)
-    moment = np.cross(lever, force)
-    moment[..., 2] += motion.yaw_torque
-    return np.where(motion.problem.active[..., None], np.concatenate([force, moment], axis=-1), 0.0)
 
 
 def _posture(times: np.ndarray, trajectory: WholeBodyTrajectory) -> tuple[np.ndarray, ...]:
