@@ -15,11 +15,11 @@ from toolkit.replanning.config import ReplanConfig
 from toolkit.replanning.linear_motion import G
 from toolkit.replanning.nominal import MAX_DT, Nominal
 from toolkit.replanning.replan import ReplanProblem
+from toolkit.replanning.replanner import ReplanCounts
 from toolkit.replanning.situation import Situation
 from toolkit.wholebody.limb_paths import limb_paths
 
 CONFIG = ReplanConfig()
-WITH = ExecutionConfig(replanning=CONFIG)
 
 
 @pytest.fixture(scope="module")
@@ -153,39 +153,43 @@ def test_a_small_push_moves_no_landing(walking, nominal, problem):
     assert large is not None and large.landing[0][0] > 0.005
 
 
-def test_an_undisturbed_run_is_the_same_with_replanning(walking):
-    run = walking.run(config=WITH)
-    assert run.replans >= 20 * (run.simulated_seconds - CONFIG.horizon)
-    assert run.replan_landings == run.replan_failures == 0
-    assert all(check.result.value == "PASS" for check in run.checks if check.name != "goal")
-    without = walking.run(config=replace(WITH, replanning=replace(CONFIG, enabled=False)))
-    if not run.replan_departures:
-        np.testing.assert_array_equal(run.ctrl, without.ctrl)
-    assert run.com_rms_error < without.com_rms_error + 1e-3
+@pytest.fixture(scope="module")
+def without(walking):
+    """The walk without replanning; `walked` has it."""
+    return walking.run(config=ExecutionConfig(replanning=replace(CONFIG, enabled=False)))
+
+
+def test_an_undisturbed_run_is_the_same_with_replanning(walked, without):
+    counts = walked.replanning
+    assert counts.replans >= 20 * (walked.simulated_seconds - CONFIG.horizon)
+    assert counts.replan_landings == counts.replan_failures == 0
+    assert all(check.result.value == "PASS" for check in walked.checks if check.name != "goal")
+    if not counts.replan_departures:
+        np.testing.assert_array_equal(walked.controls.ctrl, without.controls.ctrl)
+    assert walked.com_rms_error < without.com_rms_error + 1e-3
 
 
 def test_a_push_is_replanned_and_the_error_counts_from_there(walking):
-    run = walking.run(config=replace(WITH, disturbance=Disturbance(push=120.0, push_time=0.3, push_direction=1.5)))
-    assert not run.fell and run.replan_departures > 0 and run.replan_failures == 0
-    error = np.sqrt(((run.com - run.com_planned) ** 2).sum(1).mean())
+    run = walking.run(config=ExecutionConfig(disturbance=Disturbance(push=120.0, push_time=0.3, push_direction=1.5)))
+    assert not run.fell and run.replanning.replan_departures > 0 and run.replanning.replan_failures == 0
+    error = np.sqrt(((run.samples.com - run.samples.com_planned) ** 2).sum(1).mean())
     assert 0.0 < run.com_rms_error < error
 
 
-def test_a_run_without_it_counts_none(walking):
-    run = walking.run(config=replace(WITH, replanning=replace(CONFIG, enabled=False)))
-    assert run.replans == run.replan_failures == 0 and run.replan_seconds == 0.0
+def test_a_run_without_it_counts_none(without):
+    assert without.replanning == ReplanCounts()
 
 
 @pytest.mark.slow
 def test_a_pushed_run_is_the_same_twice(walking):
-    config = replace(WITH, disturbance=Disturbance(push=150.0, push_time=0.9, push_direction=1.5))
+    config = ExecutionConfig(disturbance=Disturbance(push=150.0, push_time=0.9, push_direction=1.5))
     first, second = walking.run(config=config), walking.run(config=config)
     assert not first.fell
-    np.testing.assert_array_equal(first.ctrl, second.ctrl)
+    np.testing.assert_array_equal(first.controls.ctrl, second.controls.ctrl)
 
 
 def test_an_answer_that_fails_is_counted_and_the_last_goes_on(walking, monkeypatch):
     monkeypatch.setattr(ReplanProblem, "solve", lambda *_: None)
-    run = walking.run(config=replace(WITH, disturbance=Disturbance(push=60.0, push_time=0.3, push_direction=1.5)))
-    assert run.replan_failures == run.replan_departures > 0
+    run = walking.run(config=ExecutionConfig(disturbance=Disturbance(push=60.0, push_time=0.3, push_direction=1.5)))
+    assert run.replanning.replan_failures == run.replanning.replan_departures > 0
     assert not run.fell

@@ -21,7 +21,7 @@ from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Execution
 from toolkit.execution.scene_index import SceneIndex
 from toolkit.replanning.nominal import Nominal
-from toolkit.replanning.replanner import Replanner
+from toolkit.replanning.replanner import ReplanCounts, Replanner
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
@@ -31,6 +31,7 @@ from toolkit.world.world import World
 Observer = Callable[[float, str], None]
 """Told of progress: the share of the run that is done, and a word on it."""
 
+EXTRA_REST = 0.5  # s; on the last stance, beyond the plan's own rest: a robot that topples does so within it
 _DEFAULT = ExecutionConfig()
 
 
@@ -50,7 +51,7 @@ def execute(
     """Simulate a plan under the controller.
 
     The robot starts in the trajectory's first state and is driven by joint torques alone, within its limits (but for a
-    push that `config.disturbance` asks for). The run ends `config.extra_rest` after the plan, or with a fall.
+    push that `config.disturbance` asks for). The run ends `EXTRA_REST` after the plan, or with a fall.
 
     Args:
         robot: the robot, as the controller knows it.
@@ -78,7 +79,7 @@ def execute(
     qpos0, qvel0 = trajectory.qpos[0].copy(), trajectory.qvel[0].copy()
     config.disturbance.disturb_model(scene, index.robot_geom, _touched(scene, index, qpos0), rng)
     period = config.control_period
-    ticks = int(np.ceil((schedule.duration + config.extra_rest) / period - 1e-9))
+    ticks = int(np.ceil((schedule.duration + EXTRA_REST) / period - 1e-9))
     paths = limb_paths(robot, world, schedule, motion) if paths is None else paths
     reference = sample_reference(period * np.arange(ticks), sequence, schedule, motion, trajectory, paths, robot)
     replanner = None
@@ -86,7 +87,7 @@ def execute(
         nominal = Nominal.of(motion, reference, robot, config.replanning.horizon)
         replanner = Replanner(reference, nominal, robot, world.surfaces, config.replanning)
     controller = Controller(robot, reference, motion.problem.margins, period, config.controller, replanner)
-    recorder = Recorder(ticks, scene, robot, index, config)
+    recorder = Recorder(ticks, scene, robot, index)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(schedule.duration, rng)
     data = mujoco.MjData(scene)
@@ -131,11 +132,7 @@ def execute(
         finished=recorder.count == ticks and not recorder.fall,
         solver_failures=controller.failures,
         com_aim=com_aim[: recorder.count],
-        replans=replanner.replans if replanner else 0,
-        replan_failures=replanner.failures if replanner else 0,
-        replan_departures=replanner.departures if replanner else 0,
-        replan_landings=replanner.moved if replanner else 0,
-        replan_seconds=replanner.mean_seconds if replanner else 0.0,
+        replanning=replanner.counts if replanner else ReplanCounts(),
     )
     return measure(log, recorder, reference, robot, world, sequence, config)
 

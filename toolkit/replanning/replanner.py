@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from time import process_time
 
 import numpy as np
@@ -26,6 +27,25 @@ SHORTEST = 0.3  # s; ... unless the whole swing would be shorter than this: legs
 KEPT_FROM = 0.75  # of the swing, after which the landing point is kept: the foot comes down
 
 
+@dataclass(frozen=True)
+class ReplanCounts:
+    """How a run was replanned.
+
+    Attributes:
+        replans: how many.
+        replan_failures: those that gave no answer, so that the one before went on.
+        replan_departures: those that had to leave the plan.
+        replan_landings: those that moved a landing point.
+        replan_seconds: of the processor for one that departs, on average (never decides anything).
+    """
+
+    replans: int = 0
+    replan_failures: int = 0
+    replan_departures: int = 0
+    replan_landings: int = 0
+    replan_seconds: float = 0.0
+
+
 class Replanner:
     """Solves a tracking problem over the next contacts at a fixed rate and says what to track.
 
@@ -33,9 +53,6 @@ class Replanner:
     itself is the optimum, which needs no solving.
 
     Attributes:
-        replans: how many. departures: how many of them had to leave the plan; failures: how many of these gave no
-            answer, so that the one before went on; moved: how many of these moved a landing point.
-        seconds: of all of them together (of the processor; never decides anything).
         com_shift: (3,) m; by how much the feet that bear the plan stand off it, where that is more than the deadband.
     """
 
@@ -66,8 +83,8 @@ class Replanner:
         self._goal: dict[int, np.ndarray] = {}
         self._ends: dict[int, float] = {}
         self._shift, self._rate, self._moved = np.zeros((3, 4, 3))
-        self.replans = self.departures = self.failures = self.moved = 0
-        self.seconds = 0.0
+        self._replans = self._departures = self._failures = self._landings = 0
+        self._seconds = 0.0
         self.com_shift = np.zeros(3)
 
     def update(
@@ -111,22 +128,22 @@ class Replanner:
         time, displaced = float(self._reference.times[index]), self._displaced(tracker)
         if time >= self._nominal.times[-1] - self._config.horizon:
             return
-        self.replans += 1
+        self._replans += 1
         if not displaced and self._divergence(index, dynamics) <= self._config.deadband:
             self._plan, self._ends = None, {}
             self._goal.clear()
             return
         began = process_time()
         plan = self._problem.solve(self._situation(time, displaced, dynamics, tracker, cones))
-        self.departures += 1
+        self._departures += 1
         if plan is None:
-            self.failures += 1
+            self._failures += 1
         else:
             self._plan = plan
             self._goal.update(plan.landing)
             self._ends = plan.ends
-            self.moved += bool(plan.landing)
-        self.seconds += process_time() - began
+            self._landings += bool(plan.landing)
+        self._seconds += process_time() - began
 
     def _displaced(self, tracker: ContactTracker) -> bool:
         """Whether feet stand elsewhere than planned, or are on their way there, or to come earlier."""
@@ -157,9 +174,10 @@ class Replanner:
             self.com_shift += period * PENDULUM_RATE * (wanted - self.com_shift)
 
     @property
-    def mean_seconds(self) -> float:
-        """Seconds of the processor for one that departs from the plan, on average; 0 before the first."""
-        return self.seconds / self.departures if self.departures else 0.0
+    def counts(self) -> ReplanCounts:
+        """What was done so far."""
+        mean = self._seconds / max(self._departures, 1)
+        return ReplanCounts(self._replans, self._failures, self._departures, self._landings, mean)
 
     def _situation(
         self, time: float, displaced: bool, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones
