@@ -26,6 +26,8 @@ class Solids:
         edges: (k, 2) int; pairs of vertices. All of a solid's convex edges are among them.
         edge_solid: (k,) int; solid of each edge, ascending.
         point_solid: (n,) int; solid of each vertex, ascending.
+        triangles: (t, 3) int; their faces as triangles of vertices, counterclockwise from outside. Of half spaces and
+            height fields the upper side only.
     """
 
     points: np.ndarray
@@ -34,6 +36,7 @@ class Solids:
     edges: np.ndarray
     edge_solid: np.ndarray
     point_solid: np.ndarray
+    triangles: np.ndarray
 
     def shadow(self, frame: Pose, bounds: tuple[float, ...], low: float, high: float) -> np.ndarray:
         """Projections on a plane of what the solids fill between two heights above it.
@@ -74,12 +77,17 @@ class Solids:
         hulls = np.asarray(shapely.convex_hull(points))
         return hulls[(shapely.get_type_id(hulls) == 3) & (shapely.area(hulls) > 1e-10)]
 
+    @property
+    def corners(self) -> np.ndarray:
+        """(t, 3, 3) float; corners of the solids' triangles in the world frame."""
+        return self.points[self.triangles]
+
 
 def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
     """Convex solids of all colliding geoms of a world.
 
     Planes are half spaces whatever size they are drawn with, because MuJoCo collides them so; here they are wide and
-    deep. Cylinders become prisms around the circle, spheres, capsules and
+    deep, and their triangles are cut to a square. Cylinders become prisms around the circle, spheres, capsules and
     ellipsoids polyhedra around them, a height field one prism per triangle, as MuJoCo collides it.
 
     Args:
@@ -91,23 +99,26 @@ def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    meshes: list[tuple[np.ndarray, np.ndarray]] = []
+    meshes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for index in np.flatnonzero((model.geom_contype | model.geom_conaffinity) != 0).tolist():
         pose = Pose(data.geom_xmat[index].reshape(3, 3), data.geom_xpos[index])
-        for points, edges in _local_solids(model, index, pose, square):
-            meshes.append((pose @ points, edges))
+        for points, faces, edges in _local_solids(model, index, pose, square):
+            meshes.append((pose @ points, faces, edges))
     if not meshes:
         empty = np.zeros((0, 3))
-        return Solids(empty, empty, empty, np.zeros((0, 2), int), np.zeros(0, int), np.zeros(0, int))
-    counts = np.array([len(points) for points, _ in meshes])
+        return Solids(
+            empty, empty, empty, np.zeros((0, 2), int), np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3), int)
+        )
+    counts = np.array([len(points) for points, _, _ in meshes])
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     return Solids(
-        np.concatenate([points for points, _ in meshes]),
-        np.array([points.min(axis=0) for points, _ in meshes]),
-        np.array([points.max(axis=0) for points, _ in meshes]),
-        np.concatenate([edges + at for at, (_, edges) in zip(first, meshes, strict=True)]),
-        np.repeat(np.arange(len(meshes)), [len(edges) for _, edges in meshes]),
+        np.concatenate([points for points, _, _ in meshes]),
+        np.array([points.min(axis=0) for points, _, _ in meshes]),
+        np.array([points.max(axis=0) for points, _, _ in meshes]),
+        np.concatenate([edges + at for at, (_, _, edges) in zip(first, meshes, strict=True)]),
+        np.repeat(np.arange(len(meshes)), [len(edges) for _, _, edges in meshes]),
         np.repeat(np.arange(len(meshes)), counts),
+        np.concatenate([faces + at for at, (_, faces, _) in zip(first, meshes, strict=True)]),
     )
 
 
@@ -145,16 +156,20 @@ def _ranks(ascending: np.ndarray) -> np.ndarray:
 
 
 def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
-    """(points, edges) of the convex solids of a geom, in the geom's frame."""
+    """(points, triangles, edges) of the convex solids of a geom, in the geom's frame."""
     kind, size = model.geom_type[index], model.geom_size[index]
     types = mujoco.mjtGeom
     if kind == types.mjGEOM_PLANE:
-        # Wherever the half space reaches it buries other geoms.
+        # Wherever the half space reaches it buries other geoms; its triangles end with the square.
         x0, y0, x1, y1 = square
         wide = plane_rectangle(model, index, pose, (x0 - _WIDE, y0 - _WIDE, x1 + _WIDE, y1 + _WIDE))
-        return [_hull(_extruded(wide, -_WIDE, 0.0))]
+        points, _, edges = _hull(_extruded(wide, -_WIDE, 0.0))
+        shown = plane_rectangle(model, index, pose, square)
+        first = len(points)
+        faces = np.array([[0, 1, 2], [0, 2, 3]]) + first
+        return [(np.concatenate([points, np.column_stack([shown, np.zeros(4)])]), faces, edges)]
     if kind == types.mjGEOM_BOX:
-        return [(_CUBE * size, _CUBE_EDGES)]
+        return [(_CUBE * size, _CUBE_FACES, _CUBE_EDGES)]
     if kind == types.mjGEOM_CYLINDER:
         angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
         circle = size[0] / np.cos(np.pi / _SIDES) * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -187,19 +202,27 @@ def _extruded(ring: np.ndarray, low: float, high: float) -> np.ndarray:
     return np.concatenate([np.column_stack([ring, np.full(len(ring), z)]) for z in (low, high)])
 
 
-def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and edges of a convex hull."""
+def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices, triangles (counterclockwise from outside) and edges of a convex hull."""
     hull = ConvexHull(points)
-    index = np.full(len(points), -1)
+    points, index = points[hull.vertices], np.full(len(points), -1)
     index[hull.vertices] = np.arange(len(hull.vertices))
-    edges = np.sort(index[hull.simplices][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    return points[hull.vertices], np.unique(edges, axis=0)
+    faces = index[hull.simplices]
+    corners = points[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inwards = (normal * hull.equations[:, :3]).sum(axis=1) < 0
+    faces[inwards] = faces[inwards, ::-1]
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    return points, faces, np.unique(edges, axis=0)
 
 
 _CUBE = np.array([[x, y, z] for z in (-1.0, 1.0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 _CUBE_EDGES = np.array([[i, (i + 1) % 4] for i in range(4)] * 2 + [[i, i + 4] for i in range(4)])
 _CUBE_EDGES[4:8] += 4
+_CUBE_QUADS = [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+_CUBE_FACES = np.array([[a, b, c] for a, b, c, _ in _CUBE_QUADS] + [[a, c, d] for a, _, c, d in _CUBE_QUADS])
 _PRISM_EDGES = np.array([[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]])
+_PRISM_TOP = np.array([[3, 4, 5]])
 
 
 def _height_field_prisms(model: mujoco.MjModel, field: int):
@@ -208,7 +231,7 @@ def _height_field_prisms(model: mujoco.MjModel, field: int):
     base = -model.hfield_size[field, 3]
     prisms = []
     for corners in points[triangles]:
-        prisms.append((np.concatenate([corners * [1, 1, 0] + [0, 0, base], corners]), _PRISM_EDGES))
+        prisms.append((np.concatenate([corners * [1, 1, 0] + [0, 0, base], corners]), _PRISM_TOP, _PRISM_EDGES))
     return prisms
 
 
