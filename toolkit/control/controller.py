@@ -86,10 +86,7 @@ class Controller:
             for urgent, shrink in ((False, nesting), (True, URGENT_NESTING))
         }
         self._urgent, self._calm = False, 1.0
-        legs = np.zeros(len(robot.joint_names), bool)
-        for limb in self.limbs:
-            if limb.is_foot:
-                legs[robot.joints_to(limb)] = True
+        legs = robot.carrying(limb for limb in self.limbs if limb.is_foot)
         gains, nv = config, self.dynamics.nv
         self._posture_weight = np.where(legs, LEG_POSTURE, 1.0) * gains.posture.weight
         self._arms = {limb: robot.arm_joints(limb) for limb in self.limbs if not limb.is_foot}

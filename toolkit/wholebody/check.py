@@ -72,7 +72,8 @@ def check(
     """
     position, orientation, tracking = _tracking(robot, paths, motion, times, qpos)
     torque, residual = inverse_dynamics(robot, motion, times, qpos)
-    limits = _limits(robot, times, qpos, torque, _bearing(robot, motion))
+    bearing = robot.carrying(limb for limb in robot.limbs if motion.problem.active[:, limb].any())
+    limits = _limits(robot, times, qpos, torque, bearing)
     hit = first_collision(robot, world, times, qpos)
     findings = tracking + limits + ([hit] if hit else [])
     return CheckReport(position, orientation, torque, residual, not limits, tuple(findings))
@@ -130,15 +131,6 @@ def _angle(limb: Limb, actual: np.ndarray, planned: np.ndarray) -> float:
         return float(np.arctan2(np.linalg.norm(np.cross(actual[:, 2], planned[:, 2])), actual[:, 2] @ planned[:, 2]))
     # |R - I|_F = 2 sqrt(2) sin(angle / 2): accurate for small angles, unlike the trace.
     return float(2.0 * np.arcsin(min(np.linalg.norm(actual - planned) / (2.0 * np.sqrt(2.0)), 1.0)))
-
-
-def _bearing(robot: RobotModel, motion: CentroidalMotion) -> np.ndarray:
-    """(n,) bool; joints between the base and a limb that is in contact at any time."""
-    bearing = np.zeros(len(robot.joint_names), bool)
-    for limb in robot.limbs:
-        if motion.problem.active[:, limb].any():
-            bearing[robot.joints_to(limb)] = True
-    return bearing
 
 
 def _limits(

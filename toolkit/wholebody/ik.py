@@ -95,14 +95,19 @@ class WholeBodyIK:
     def _groups(self) -> list[tuple[list[str], float]]:
         """Joint names with the weight of their posture: arms, trunk, legs."""
         robot = self.robot
-        legs = {joint for foot in FEET for joint in robot.joints_to(foot).tolist()}
-        arms = {joint for palm in self.palms for joint in self.arm_joints[palm].tolist()}
-        reaching = {joint for palm in self.palms for joint in robot.joints_to(palm).tolist()}
+        legs, reaching = robot.carrying(FEET), robot.carrying(self.palms)
+        arms = np.zeros(len(robot.joint_names), bool)
+        for joints in self.arm_joints.values():
+            arms[joints] = True
+        trunk = reaching & ~arms if self.palms else ~reaching
         groups: dict[float, list[str]] = {}
         for joint, name in enumerate(robot.joint_names):
-            in_trunk = joint in reaching - arms or not reaching
-            weight = weights.LEGS if joint in legs else weights.ARMS if joint in arms else weights.REST
-            weight = weights.TRUNK if in_trunk and joint not in legs else weight
+            if legs[joint]:
+                weight = weights.LEGS
+            elif trunk[joint]:
+                weight = weights.TRUNK
+            else:
+                weight = weights.ARMS if arms[joint] else weights.REST
             groups.setdefault(weight, []).append(name)
         return [(names, weight) for weight, names in groups.items()]
 
