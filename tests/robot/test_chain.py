@@ -18,7 +18,7 @@ def test_legs_carry_feet_and_arms_do_not(robot):
     assert not (left & right).any()
     assert left.sum() == right.sum() >= 5
     for palm in (limb for limb in robot.limbs if not limb.is_foot):
-        arm = carries(robot, palm)
+        arm = robot.carrying([palm])
         assert arm.any() and not (arm & (left | right)).any()
 
 
