@@ -8,7 +8,7 @@ from toolkit.control.corrector import PENDULUM_RATE
 from toolkit.replanning.linear_motion import FreeLandings, Window
 from toolkit.replanning.sweep import GIVEN
 
-# Weights, tuned on pushed walks. Of the CoM per m^2 s and its velocity per m^2/s, horizontal and vertical: the height
+# Weights: of the CoM per m^2 s and its velocity per m^2/s, horizontal and vertical: the height
 # has no landing point to help it.
 COM, VELOCITY, CLIMB = 200.0, 5.0, 40.0
 # Of the angular momentum per mass, per (m^2/s)^2 s, and of its rate, per (m^2/s^2)^2 s: arms and trunk must follow.

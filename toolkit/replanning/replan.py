@@ -34,7 +34,7 @@ SOFTNESS = 0.05  # m or rad; excess by which a price doubles
 ROOM = 1e-3  # of the plan's own wrenches inside their rows
 FORCE, MOMENT = 1.0, 5.0  # weights of the wrenches' deviations, per weight and per weight times 1 m, squared, and s
 PALM_MOMENT = 1e3  # weight that keeps a palm's moments as planned: the controller has none
-MAX_ITERATIONS, TOLERANCE = 25, 1e-6  # of the solver, which takes about ten
+MAX_ITERATIONS, TOLERANCE = 25, 1e-6  # of the solver
 
 # Landing points stay where they are planned while the divergence left when the next foot lands is at most SETTLED m
 # and the body's limits exceeded on the way cost at most EXCESS: the controller's gains bring that back by themselves.

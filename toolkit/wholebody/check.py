@@ -16,7 +16,7 @@ from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.motion_dynamics import inverse_dynamics, velocities
 from toolkit.world.world import World
 
-# What a whole-body motion may deviate by from its plan: the controller brings back less than this within a step.
+# What a whole-body motion may deviate by from its plan.
 COM_ERROR = 0.02  # m; of the CoM
 FOOT_ERROR, PALM_ERROR = 0.005, 0.01  # m; of a patch in contact
 SWING_ERROR = 0.02  # m; of a foot in the air

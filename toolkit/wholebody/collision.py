@@ -10,7 +10,7 @@ from toolkit.wholebody.finding import Finding
 from toolkit.world.scene import compose_scene
 from toolkit.world.world import World
 
-RATE = 25.0  # Hz; at most this many postures per second are looked at: a limb moves 4 cm between two of them
+RATE = 25.0  # Hz; at most this many postures per second are looked at: at 1 m/s a limb moves 4 cm between two
 PATCH_DEPTH = 4e-3  # m; a limb's last link may press this deep into the world: it makes the planned contacts
 BODY_DEPTH = 1e-3  # m; any other link into the world
 SELF_DEPTH = 2e-3  # m; links of the robot into each other

@@ -16,9 +16,9 @@ Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
 THICKNESS = 0.08  # m; height of the swept box above the patch: what a foot or a hand has there
-SPACING = 0.03  # m; largest way between two poses that are checked: a third of a sole
+SPACING = 0.03  # m; largest way between two poses that are checked: less than the swept box is wide
 
-RAISE_STEP, MAX_RAISE = 0.03, 0.36  # m; what the path is raised by until it is clear, and the most that legs can do
+RAISE_STEP, MAX_RAISE = 0.03, 0.36  # m; what the path is raised by until it is clear, and the most it may be
 EASY_RAISE = 0.04  # m; paths raised by more than that are first tried with the steep timing
 MODERATE_RAISE = 0.12  # m; higher paths come after lower ones with less margin
 
