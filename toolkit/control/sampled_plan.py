@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -12,22 +11,11 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
-from toolkit.geometry.pose import Pose, rotation_from_quaternion
+from toolkit.geometry.pose import rotation_from_quaternion
 from toolkit.robot.model import RobotModel
+from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.motion_dynamics import planned_wrench, posture_momentum
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
-
-
-class LimbPathSampler(Protocol):
-    """Planned motion of the limbs' patches."""
-
-    def sample(self, limb: Limb, time: float) -> tuple[Pose | None, np.ndarray, np.ndarray, bool]:
-        """World pose (None: hangs free), (6,) velocity and (6,) acceleration of a patch, and whether it rests."""
-        ...
-
-    def authority(self, limb: Limb, time: float) -> float:
-        """How binding that pose is, in [0, 1]."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -104,7 +92,7 @@ def sample_reference(
     schedule: ContactSchedule,
     motion: CentroidalMotion,
     trajectory: WholeBodyTrajectory,
-    paths: LimbPathSampler,
+    paths: LimbPaths,
     robot: RobotModel,
 ) -> Reference:
     """Sample a plan.

@@ -12,7 +12,7 @@ from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.control.controller import Controller
-from toolkit.control.sampled_plan import LimbPathSampler, sample_reference
+from toolkit.control.sampled_plan import sample_reference
 from toolkit.errors import ExecutionError
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import StateFilter
@@ -23,7 +23,7 @@ from toolkit.execution.scene_index import SceneIndex
 from toolkit.replanning.nominal import Nominal
 from toolkit.replanning.replanner import ReplanCounts, Replanner
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.limb_paths import limb_paths
+from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.scene import compose_scene
 from toolkit.world.world import World
@@ -44,7 +44,7 @@ def execute(
     trajectory: WholeBodyTrajectory,
     *,
     config: ExecutionConfig = _DEFAULT,
-    paths: LimbPathSampler | None = None,
+    paths: LimbPaths | None = None,
     rng: np.random.Generator | None = None,
     observer: Observer | None = None,
 ) -> Execution:
