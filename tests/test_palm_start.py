@@ -58,18 +58,18 @@ def test_a_start_on_a_palm_is_planned_executed_and_replayed(name):
     break_time = next(
         (phase.start for phase in trial.schedule.phases if PALM not in [item.limb for item in phase.contacts]), np.inf
     )
-    held = execution.tick_times < break_time - 0.1
-    assert held.sum() * np.diff(execution.tick_times).mean() > 0.4
-    force = execution.wrench[held, PALM, :3] @ contact.pose.normal
-    planned = execution.wrench_planned[held, PALM, :3] @ contact.pose.normal
+    held = execution.samples.tick_times < break_time - 0.1
+    assert held.sum() * np.diff(execution.samples.tick_times).mean() > 0.4
+    force = execution.samples.wrench[held, PALM, :3] @ contact.pose.normal
+    planned = execution.samples.wrench_planned[held, PALM, :3] @ contact.pose.normal
     assert force.mean() == pytest.approx(planned.mean(), abs=10.0)  # N: it bears what the plan says
     assert force.max() < 2.0 * planned.max() + 20.0  # without an impact
-    away = execution.limb_pose[held, PALM, :3] - contact.pose.position
+    away = execution.samples.limb_pose[held, PALM, :3] - contact.pose.position
     assert np.abs(away @ contact.pose.normal).max() < 5e-3 and np.linalg.norm(away, axis=1).max() < 0.02
 
     replay = mujoco.MjData(execution.scene)
-    replay.qpos[:], replay.qvel[:] = execution.qpos0, execution.qvel0
-    for ctrl in execution.ctrl:
+    replay.qpos[:], replay.qvel[:] = execution.controls.qpos0, execution.controls.qvel0
+    for ctrl in execution.controls.ctrl:
         replay.ctrl[:] = ctrl
         mujoco.mj_step(execution.scene, replay)
-    np.testing.assert_array_equal(replay.qpos, execution.final_qpos)
+    np.testing.assert_array_equal(replay.qpos, execution.controls.final_qpos)

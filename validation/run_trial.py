@@ -133,10 +133,10 @@ def stage_reached(result: pipeline.PipelineResult) -> str:
 def executed(execution: Execution) -> dict[str, Any]:
     """What is told of an execution; `held`: everything that a run has to keep to be counted as a success."""
     arrived = execution.completed and not execution.fell and execution.goal_reached
-    final = replay_controls(execution.scene, execution.qpos0, execution.qvel0, execution.ctrl)
+    final = replay_controls(execution.scene, execution.controls)
     figures = {
         "arrived": arrived,
-        "replays": bool(np.array_equal(final, execution.final_qpos)),
+        "replays": bool(np.array_equal(final, execution.controls.final_qpos)),
         "fell": execution.fell,
         "fall_reason": execution.fall_reason,
         "simulated_seconds": execution.simulated_seconds,
@@ -150,9 +150,9 @@ def executed(execution: Execution) -> dict[str, Any]:
         "final_goal_distance": execution.final_goal_distance,
         "solver_failures": execution.solver_failures,
         "real_time_factor": execution.real_time_factor,
-        "tick_median": float(np.median(execution.tick_seconds)),
-        "tick_99": float(np.percentile(execution.tick_seconds, 99)),
-        "palm_force_error": palm_force_error(execution.wrench, execution.wrench_planned),
+        "tick_median": float(np.median(execution.samples.tick_seconds)),
+        "tick_99": float(np.percentile(execution.samples.tick_seconds, 99)),
+        "palm_force_error": palm_force_error(execution.samples.wrench, execution.samples.wrench_planned),
         "failed_checks": [check.name for check in execution.checks if check.result != "PASS"],
     }
     return figures | {"held": holds(figures)}

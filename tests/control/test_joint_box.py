@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from toolkit.control.config import ControllerConfig
+from toolkit.control import joint_box
 from toolkit.control.joint_box import JointBox
 
 
 def test_a_joint_pushed_as_hard_as_allowed_stays_within_range_and_speed(robot):
-    box, period = JointBox(robot, ControllerConfig()), 0.002
+    box, period = JointBox(robot), 0.002
     for way in (1.0, -1.0):
         joints = 0.5 * (robot.lower + robot.upper)
         velocity = np.zeros_like(joints)
@@ -23,7 +23,7 @@ def test_a_joint_pushed_as_hard_as_allowed_stays_within_range_and_speed(robot):
 
 def test_bounds_never_cross(robot):
     rng = np.random.default_rng(0)
-    box = JointBox(robot, ControllerConfig())
+    box = JointBox(robot)
     for _ in range(200):
         joints = rng.uniform(robot.lower - 0.5, robot.upper + 0.5)
         box.update(joints, 40.0 * rng.normal(size=len(joints)))
@@ -31,12 +31,11 @@ def test_bounds_never_cross(robot):
 
 
 def test_a_joint_at_rest_in_mid_range_is_free(robot):
-    config = ControllerConfig()
-    box = JointBox(robot, config)
+    box = JointBox(robot)
     box.update(0.5 * (robot.lower + robot.upper), np.zeros_like(robot.lower))
-    room = 0.5 * (robot.upper - robot.lower) - np.minimum(config.range_margin, 0.1 * (robot.upper - robot.lower))
-    braking = config.range_rate**2 * room
-    starting = config.velocity_fraction * robot.velocity_limit / config.velocity_time
-    expected = np.minimum(np.minimum(braking, starting), config.max_acceleration)
+    room = 0.5 * (robot.upper - robot.lower) - np.minimum(joint_box.RANGE_MARGIN, 0.1 * (robot.upper - robot.lower))
+    braking = joint_box.RANGE_RATE**2 * room
+    starting = joint_box.VELOCITY_FRACTION * robot.velocity_limit / joint_box.VELOCITY_TIME
+    expected = np.minimum(np.minimum(braking, starting), joint_box.MAX_ACCELERATION)
     np.testing.assert_allclose(box.upper, expected, rtol=1e-9)
     np.testing.assert_allclose(box.lower, -expected, rtol=1e-9)

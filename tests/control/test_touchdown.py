@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 from toolkit.contacts.stance import Contact
-from toolkit.control.config import ControllerConfig, TouchdownConfig
-from toolkit.control.reference import Reference, Swing
+from toolkit.control import touchdown
+from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 
 PERIOD, WEIGHT = 0.002, 700.0
-TOUCH = TouchdownConfig()
 
 
 def tracker(swings, resting=(0, 1)):
@@ -20,7 +19,7 @@ def tracker(swings, resting=(0, 1)):
     empty = dict.fromkeys(Reference.__dataclass_fields__)
     reference = Reference(**(empty | {"in_contact": contact, "swings": tuple(swings)}))
     limits = np.array([np.inf, np.inf, 150.0, 150.0])
-    return ContactTracker(reference, tuple(Limb), WEIGHT, limits, ControllerConfig(), TOUCH)
+    return ContactTracker(reference, tuple(Limb), WEIGHT, limits)
 
 
 def swing(limb, start=1.0, end=2.0, makes=True, breaks=True):
@@ -57,9 +56,9 @@ def test_a_foot_that_finds_no_ground_goes_on_but_not_for_ever():
     state = tracker([swing(Limb.LEFT_FOOT)])
     follow(state, 0, lambda t: 0.0, 2.1)
     assert state.state[Limb.LEFT_FOOT] is LimbState.SEARCH
-    assert state.depth[0] == pytest.approx(0.1 * TOUCH.late_foot_speed, rel=0.05)
+    assert state.depth[0] == pytest.approx(0.1 * touchdown.LATE_FOOT_SPEED, rel=0.05)
     follow(state, 0, lambda t: 0.0, 5.0, start=2.1)
-    assert state.depth[0] == TOUCH.max_depth and state.search_speed(Limb.LEFT_FOOT) == 0.0
+    assert state.depth[0] == touchdown.MAX_DEPTH and state.search_speed(Limb.LEFT_FOOT) == 0.0
     assert follow(state, 0, lambda t: 16.0, 5.1, start=5.0) and state.in_contact[0]
 
 
@@ -80,7 +79,7 @@ def test_a_broken_palm_hangs_free():
 
 
 def test_the_bound_on_the_normal_force_falls_before_the_swing_and_rises_after_it():
-    state, config = tracker([swing(Limb.LEFT_FOOT)]), ControllerConfig()
+    state = tracker([swing(Limb.LEFT_FOOT)])
     bounds = {}
     for k in range(1200):
         time = k * PERIOD
@@ -89,12 +88,12 @@ def test_the_bound_on_the_normal_force_falls_before_the_swing_and_rises_after_it
         bounds[k] = state.max_force[0]
     full = bounds[0]
     assert full > 2.0 * WEIGHT
-    assert bounds[499] < config.release_force + 0.05 * full and bounds[450] == full
+    assert bounds[499] < touchdown.RELEASE_FORCE + 0.05 * full and bounds[450] == full
     assert bounds[700] == 0.0
-    assert bounds[1001] < config.settle_force + 0.05 * full and bounds[1040] == full
+    assert bounds[1001] < touchdown.SETTLE_FORCE + 0.05 * full and bounds[1040] == full
     # From one tick to the next while in contact: never more than the ramp's slope.
     steps = [abs(bounds[k + 1] - bounds[k]) for k in range(499)]
-    assert max(steps) <= 1.01 * full * PERIOD / config.release_ramp
+    assert max(steps) <= 1.01 * full * PERIOD / touchdown.RELEASE_RAMP
 
 
 def test_palms_keep_their_own_limit():

@@ -22,7 +22,7 @@ MILD = {
 def test_a_mild_disturbance_is_survived_and_felt(walking, walked, name):
     execution = walking.run(config=ExecutionConfig(disturbance=MILD[name]), rng=np.random.default_rng(1))
     assert execution.completed, execution.fall_reason
-    differs = not np.array_equal(execution.final_qpos, walked.final_qpos)
+    differs = not np.array_equal(execution.controls.final_qpos, walked.controls.final_qpos)
     # Less friction is not felt where no contact is near its limit; the scene tells.
     assert differs or execution.scene.geom_friction[-1, 0] != walked.scene.geom_friction[-1, 0]
     assert execution.replayable == (name != "push")
@@ -31,7 +31,7 @@ def test_a_mild_disturbance_is_survived_and_felt(walking, walked, name):
 def test_the_same_seed_gives_the_same_run(walking):
     config = ExecutionConfig(disturbance=Disturbance(push=30.0, state_noise=1e-4))
     first, second = (walking.run(config=config, rng=np.random.default_rng(5)) for _ in range(2))
-    np.testing.assert_array_equal(first.ctrl, second.ctrl)
+    np.testing.assert_array_equal(first.controls.ctrl, second.controls.ctrl)
 
 
 def test_models_are_changed_as_declared(robot, flat):

@@ -24,7 +24,7 @@ def test_a_standing_robot_stands_still(standing):
     assert execution.com_rms_error < 2e-3
     assert execution.slip == (execution.max_slip,) and execution.max_slip < 1e-3
     weight = standing.robot.mass * 9.81
-    np.testing.assert_allclose(execution.wrench[-1, :, 2].sum(), weight, rtol=1e-3)
+    np.testing.assert_allclose(execution.samples.wrench[-1, :, 2].sum(), weight, rtol=1e-3)
 
 
 def test_a_short_walk_arrives(walking, walked):
@@ -41,23 +41,23 @@ def test_a_short_walk_arrives(walking, walked):
 
 def test_measured_forces_carry_the_measured_motion(walking, walked):
     """Newton: contact forces and gravity change the momentum by just what was measured."""
-    force = walked.wrench[:, :, :3].sum(1) + walking.robot.mass * np.array([0.0, 0.0, -9.81])
-    period = walked.tick_times[1] - walked.tick_times[0]
+    force = walked.samples.wrench[:, :, :3].sum(1) + walking.robot.mass * np.array([0.0, 0.0, -9.81])
+    period = walked.samples.tick_times[1] - walked.samples.tick_times[0]
     gained = np.cumsum(force[:-1], axis=0) * period
-    change = walked.momentum[1:, :3] - walked.momentum[0, :3]
+    change = walked.samples.momentum[1:, :3] - walked.samples.momentum[0, :3]
     # Implicit damping moves some impulse between neighbouring steps; 1 N s of 700 N is 1.5 ms of weight.
     np.testing.assert_allclose(change, gained, atol=1.0)
 
 
 def test_replay_of_the_controls_ends_in_the_same_state_exactly(walked, tmp_path):
-    again = replay_controls(walked.scene, walked.qpos0, walked.qvel0, walked.ctrl)
-    assert np.abs(again - walked.final_qpos).max() == 0.0
+    again = replay_controls(walked.scene, walked.controls)
+    assert np.abs(again - walked.controls.final_qpos).max() == 0.0
     mujoco.mj_saveModel(walked.scene, str(tmp_path / "scene.mjb"), None)
     names = ("timestep", "qpos0", "qvel0", "ctrl")
-    arrays = {name: getattr(walked, name) for name in names} | {"qpos": walked.final_qpos[None]}
+    arrays = {name: getattr(walked.controls, name) for name in names} | {"qpos": walked.controls.final_qpos[None]}
     np.savez(tmp_path / "execution.npz", **arrays)
     assert replay(tmp_path / "scene.mjb", tmp_path / "execution.npz").difference == 0.0
-    arrays["ctrl"] = walked.ctrl + 1e-3
+    arrays["ctrl"] = walked.controls.ctrl + 1e-3
     np.savez(tmp_path / "other.npz", **arrays)
     assert replay(tmp_path / "scene.mjb", tmp_path / "other.npz").difference > 0.0
 
@@ -66,26 +66,26 @@ def test_replay_refuses_what_is_not_a_run(walked, tmp_path):
     with pytest.raises(InputError, match="no such file"):
         replay(tmp_path / "scene.mjb", tmp_path / "execution.npz")
     mujoco.mj_saveModel(walked.scene, str(tmp_path / "scene.mjb"), None)
-    np.savez(tmp_path / "execution.npz", qpos0=walked.qpos0)
+    np.savez(tmp_path / "execution.npz", qpos0=walked.controls.qpos0)
     with pytest.raises(InputError, match="lacks timestep, qvel0, ctrl, qpos"):
         replay(tmp_path / "scene.mjb", tmp_path / "execution.npz")
 
 
 def test_only_limited_joint_torques_act(walking, walked):
     limit = walking.robot.torque_limit
-    assert (np.abs(walked.ctrl) <= limit).all()
-    assert (np.abs(walked.torque) <= limit).all() and walked.max_torque_ratio <= 1.0
-    np.testing.assert_array_equal(walked.torque[0], walked.ctrl[0])
+    assert (np.abs(walked.controls.ctrl) <= limit).all()
+    assert (np.abs(walked.samples.torque) <= limit).all() and walked.max_torque_ratio <= 1.0
+    np.testing.assert_array_equal(walked.samples.torque[0], walked.controls.ctrl[0])
 
 
 def test_sampled_poses_are_those_of_the_sampled_states(walking, walked):
     data = mujoco.MjData(walked.scene)
-    for k in (0, len(walked.qpos) // 2, len(walked.qpos) - 1):
-        data.qpos[:], data.qvel[:] = walked.qpos[k], walked.qvel[k]
+    for k in (0, len(walked.samples.qpos) // 2, len(walked.samples.qpos) - 1):
+        data.qpos[:], data.qvel[:] = walked.samples.qpos[k], walked.samples.qvel[k]
         mujoco.mj_forward(walked.scene, data)
         for limb, model in walking.robot.limbs.items():
-            np.testing.assert_allclose(walked.limb_pose[k, limb, :3], data.site(model.site).xpos, atol=1e-12)
-        np.testing.assert_allclose(walked.com[k], data.subtree_com[0], atol=1e-12)
+            np.testing.assert_allclose(walked.samples.limb_pose[k, limb, :3], data.site(model.site).xpos, atol=1e-12)
+        np.testing.assert_allclose(walked.samples.com[k], data.subtree_com[0], atol=1e-12)
 
 
 def test_a_robot_without_its_motors_falls(walking):
@@ -100,8 +100,8 @@ def test_a_push_that_is_too_strong_is_a_fall_and_is_not_replayable(walking):
     config = ExecutionConfig(disturbance=Disturbance(push=3000.0, push_time=0.3, push_duration=0.3))
     execution = walking.run(config=config)
     assert not execution.replayable and execution.fell
-    again = replay_controls(execution.scene, execution.qpos0, execution.qvel0, execution.ctrl)
-    assert np.abs(again - execution.final_qpos).max() > 0.0
+    again = replay_controls(execution.scene, execution.controls)
+    assert np.abs(again - execution.controls.final_qpos).max() > 0.0
 
 
 def test_a_foot_planned_below_the_floor_touches_early_and_is_missed_by_its_plan(walking):
@@ -154,5 +154,5 @@ def test_progress_is_told(standing):
 
 def test_palms_are_free_without_contacts(walked, walking):
     for palm in (limb for limb in walking.robot.limbs if not limb.is_foot):
-        assert (walked.wrench[:, palm] == 0.0).all()
-        assert np.isnan(walked.cop_margin[:, palm]).all()
+        assert (walked.samples.wrench[:, palm] == 0.0).all()
+        assert np.isnan(walked.samples.cop_margin[:, palm]).all()

@@ -4,7 +4,8 @@ import daqp
 import numpy as np
 import pytest
 
-from toolkit.replanning.kernel import GIVEN, Program, solve
+from toolkit.replanning.kernel import Program, solve
+from toolkit.replanning.sweep import GIVEN
 
 
 def random_program(rng, steps=5, free=4, rows=12, soft=3, push=1.0):

@@ -6,20 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from toolkit.control.reference import sample_reference
+from toolkit.control.corrector import Cones
+from toolkit.control.sampled_plan import sample_reference
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.geometry.limb import Limb
 from toolkit.replanning.config import ReplanConfig
-from toolkit.replanning.contacts import Cones, Situation
-from toolkit.replanning.dynamics import G
-from toolkit.replanning.kernel import solve
-from toolkit.replanning.nominal import Nominal
-from toolkit.replanning.problem import ReplanProblem
+from toolkit.replanning.linear_motion import G
+from toolkit.replanning.nominal import MAX_DT, Nominal
+from toolkit.replanning.replan import ReplanProblem
+from toolkit.replanning.replanner import ReplanCounts
+from toolkit.replanning.situation import Situation
 from toolkit.wholebody.limb_paths import limb_paths
 
-CONFIG = ReplanConfig(enabled=True)
-WITH = ExecutionConfig(replanning=CONFIG)
+CONFIG = ReplanConfig()
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def nominal(walking):
     paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion)
     times = np.arange(0.0, plan.schedule.duration, 0.01)
     reference = sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, paths, plan.robot)
-    return Nominal.of(plan.motion, reference, plan.robot, CONFIG)
+    return Nominal.of(plan.motion, reference, plan.robot, CONFIG.horizon)
 
 
 @pytest.fixture(scope="module")
@@ -80,13 +80,13 @@ def test_the_grid_is_the_plan(walking, nominal):
         np.testing.assert_allclose(nominal.com[k], com, rtol=0.0, atol=1e-9)
         if nominal.times[k] < walking.motion.problem.times[-1]:
             np.testing.assert_allclose(nominal.velocity[k], velocity, rtol=0.0, atol=1e-9)
-    assert np.diff(nominal.times).max() <= CONFIG.max_dt + 1e-9
+    assert np.diff(nominal.times).max() <= MAX_DT + 1e-9
     assert (nominal.rows.clearance >= 0.0).all() and np.isfinite(nominal.rows.gradient).all()
 
 
 def test_an_undisturbed_state_changes_nothing(walking, nominal, problem):
     for time in (0.0, mid_swing(nominal), 0.5 * nominal.times[-1]):
-        replan = problem.solve(situation(walking, nominal, time), solve)
+        replan = problem.solve(situation(walking, nominal, time))
         assert replan is not None
         # What the solver leaves of the distance to its rows at its tolerance.
         np.testing.assert_allclose(replan.com, 0.0, rtol=0.0, atol=2e-3)
@@ -95,7 +95,7 @@ def test_an_undisturbed_state_changes_nothing(walking, nominal, problem):
 
 def test_a_replan_obeys_the_dynamics(walking, nominal, problem):
     time = mid_swing(nominal)
-    replan = problem.solve(situation(walking, nominal, time, velocity=(0.05, 0.1, 0.0)), solve)
+    replan = problem.solve(situation(walking, nominal, time, velocity=(0.05, 0.1, 0.0)))
     dt = np.diff(replan.times)
     k = int(np.searchsorted(nominal.times, time + 1e-6)) - 1
     planned = [walking.motion.sample(float(each))[:2] for each in replan.times]
@@ -127,8 +127,8 @@ def test_a_replan_obeys_the_dynamics(walking, nominal, problem):
 
 def test_a_push_moves_the_landing_along(walking, nominal, problem):
     time = mid_swing(nominal)
-    ahead = problem.solve(situation(walking, nominal, time, velocity=(0.4, 0.0, 0.0)), solve)
-    back = problem.solve(situation(walking, nominal, time, velocity=(-0.4, 0.0, 0.0)), solve)
+    ahead = problem.solve(situation(walking, nominal, time, velocity=(0.4, 0.0, 0.0)))
+    back = problem.solve(situation(walking, nominal, time, velocity=(-0.4, 0.0, 0.0)))
     assert ahead.landing[0][0] > 0.005 and back.landing[0][0] < -0.005
     assert max(np.abs(shift).max() for shift in (*ahead.landing.values(), *back.landing.values())) < 0.16
 
@@ -137,55 +137,59 @@ def test_a_kept_landing_is_not_moved(walking, nominal, problem):
     time = mid_swing(nominal)
     fixed = {0: np.array([0.01, 0.0, 0.0])}
     kept = situation(walking, nominal, time, velocity=(0.25, 0.0, 0.0), moving={}, fixed=fixed)
-    assert 0 not in problem.solve(kept, solve).landing
+    assert 0 not in problem.solve(kept).landing
 
 
 def test_no_answer_is_none(walking, nominal, problem):
     broken = situation(walking, nominal, 0.0, com=(np.nan, 0.0, 0.0))
-    assert problem.solve(broken, solve) is None
+    assert problem.solve(broken) is None
 
 
 def test_a_small_push_moves_no_landing(walking, nominal, problem):
     time = mid_swing(nominal)
-    small = problem.solve(situation(walking, nominal, time, velocity=(0.01, 0.0, 0.0), displaced=False), solve)
+    small = problem.solve(situation(walking, nominal, time, velocity=(0.01, 0.0, 0.0), displaced=False))
     assert small is not None and not small.landing and not small.ends
-    large = problem.solve(situation(walking, nominal, time, velocity=(0.4, 0.0, 0.0), displaced=False), solve)
+    large = problem.solve(situation(walking, nominal, time, velocity=(0.4, 0.0, 0.0), displaced=False))
     assert large is not None and large.landing[0][0] > 0.005
 
 
-def test_an_undisturbed_run_is_the_same_with_replanning(walking):
-    run = walking.run(config=WITH)
-    assert run.replans >= 20 * (run.simulated_seconds - CONFIG.horizon)
-    assert run.replan_landings == run.replan_failures == 0
-    assert all(check.result.value == "PASS" for check in run.checks if check.name != "goal")
-    without = walking.run(config=replace(WITH, replanning=replace(CONFIG, enabled=False)))
-    if not run.replan_departures:
-        np.testing.assert_array_equal(run.ctrl, without.ctrl)
-    assert run.com_rms_error < without.com_rms_error + 1e-3
+@pytest.fixture(scope="module")
+def without(walking):
+    """The walk without replanning; `walked` has it."""
+    return walking.run(config=ExecutionConfig(replanning=replace(CONFIG, enabled=False)))
+
+
+def test_an_undisturbed_run_is_the_same_with_replanning(walked, without):
+    counts = walked.replanning
+    assert counts.replans >= 20 * (walked.simulated_seconds - CONFIG.horizon)
+    assert counts.replan_landings == counts.replan_failures == 0
+    assert all(check.result.value == "PASS" for check in walked.checks if check.name != "goal")
+    if not counts.replan_departures:
+        np.testing.assert_array_equal(walked.controls.ctrl, without.controls.ctrl)
+    assert walked.com_rms_error < without.com_rms_error + 1e-3
 
 
 def test_a_push_is_replanned_and_the_error_counts_from_there(walking):
-    run = walking.run(config=replace(WITH, disturbance=Disturbance(push=120.0, push_time=0.3, push_direction=1.5)))
-    assert not run.fell and run.replan_departures > 0 and run.replan_failures == 0
-    error = np.sqrt(((run.com - run.com_planned) ** 2).sum(1).mean())
+    run = walking.run(config=ExecutionConfig(disturbance=Disturbance(push=120.0, push_time=0.3, push_direction=1.5)))
+    assert not run.fell and run.replanning.replan_departures > 0 and run.replanning.replan_failures == 0
+    error = np.sqrt(((run.samples.com - run.samples.com_planned) ** 2).sum(1).mean())
     assert 0.0 < run.com_rms_error < error
 
 
-def test_a_run_without_it_counts_none(walking):
-    run = walking.run(config=replace(WITH, replanning=replace(CONFIG, enabled=False)))
-    assert run.replans == run.replan_failures == 0 and run.replan_seconds == 0.0
+def test_a_run_without_it_counts_none(without):
+    assert without.replanning == ReplanCounts()
 
 
 @pytest.mark.slow
 def test_a_pushed_run_is_the_same_twice(walking):
-    config = replace(WITH, disturbance=Disturbance(push=150.0, push_time=0.9, push_direction=1.5))
+    config = ExecutionConfig(disturbance=Disturbance(push=150.0, push_time=0.9, push_direction=1.5))
     first, second = walking.run(config=config), walking.run(config=config)
     assert not first.fell
-    np.testing.assert_array_equal(first.ctrl, second.ctrl)
+    np.testing.assert_array_equal(first.controls.ctrl, second.controls.ctrl)
 
 
 def test_an_answer_that_fails_is_counted_and_the_last_goes_on(walking, monkeypatch):
     monkeypatch.setattr(ReplanProblem, "solve", lambda *_: None)
-    run = walking.run(config=replace(WITH, disturbance=Disturbance(push=60.0, push_time=0.3, push_direction=1.5)))
-    assert run.replan_failures == run.replan_departures > 0
+    run = walking.run(config=ExecutionConfig(disturbance=Disturbance(push=60.0, push_time=0.3, push_direction=1.5)))
+    assert run.replanning.replan_failures == run.replanning.replan_departures > 0
     assert not run.fell

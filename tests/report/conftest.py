@@ -14,7 +14,7 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.execution.check import Check
-from toolkit.execution.result import Execution
+from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_from_quaternion
 from toolkit.report.run_report import RunReport
@@ -227,24 +227,29 @@ def make_run(steps: int = 4) -> MadeUpRun:
     )
     execution = Execution(
         scene=scene,
-        timestep=TIMESTEP,
-        qpos0=np.array(scene.qpos0),
-        qvel0=np.zeros(scene.nv),
-        ctrl=rng.standard_normal((2 * len(ticks), scene.nu)),
-        tick_times=ticks,
-        qpos=qpos,
-        qvel=np.zeros((len(ticks), scene.nv)),
-        final_qpos=qpos[-1] + 1e-3,
-        com=centre + noise,
-        com_planned=centre,
-        momentum=np.hstack([60 * noise, noise]),
-        momentum_planned=np.zeros((len(ticks), 6)),
-        wrench=wrench + np.where(wrench != 0, rng.standard_normal(wrench.shape), 0.0),
-        wrench_planned=wrench,
-        cop_margin=np.where(wrench[..., 2] > 0, 0.05, np.nan),
-        limb_pose=limb_pose + 1e-4,
-        torque=np.zeros((len(ticks), scene.nu)),
-        torque_ratio=0.5 + 0.1 * np.sin(ticks),
+        controls=Controls(
+            timestep=TIMESTEP,
+            qpos0=np.array(scene.qpos0),
+            qvel0=np.zeros(scene.nv),
+            ctrl=rng.standard_normal((2 * len(ticks), scene.nu)),
+            final_qpos=qpos[-1] + 1e-3,
+        ),
+        samples=Samples(
+            tick_times=ticks,
+            tick_seconds=np.full(len(ticks), 1e-3),
+            qpos=qpos,
+            qvel=np.zeros((len(ticks), scene.nv)),
+            com=centre + noise,
+            com_planned=centre,
+            momentum=np.hstack([60 * noise, noise]),
+            momentum_planned=np.zeros((len(ticks), 6)),
+            wrench=wrench + np.where(wrench != 0, rng.standard_normal(wrench.shape), 0.0),
+            wrench_planned=wrench,
+            cop_margin=np.where(wrench[..., 2] > 0, 0.05, np.nan),
+            limb_pose=limb_pose + 1e-4,
+            torque=np.zeros((len(ticks), scene.nu)),
+            torque_ratio=0.5 + 0.1 * np.sin(ticks),
+        ),
         touchdowns=touchdowns,
         slip=tuple(np.linspace(0, 0.01, len(sequence.transitions) + 1)),
         completed=True,
@@ -259,7 +264,6 @@ def make_run(steps: int = 4) -> MadeUpRun:
         com_rms_error=0.002,
         solver_failures=0,
         unplanned_contacts=(("trunk", "floor"),),
-        tick_seconds=np.full(len(ticks), 1e-3),
         simulated_seconds=float(schedule.duration),
         real_time_factor=1.2,
         checks=checks,

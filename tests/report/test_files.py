@@ -200,10 +200,13 @@ def test_the_execution_round_trips_with_its_scene(run, tmp_path):
     scene = read_scene(tmp_path / "scene.mjb")
     assert (scene.nq, scene.ngeom) == (run.execution.scene.nq, run.execution.scene.ngeom)
     again = read_execution(tmp_path / "execution.npz", scene)
-    for name in ("qpos0", "qvel0", "ctrl", "qpos", "final_qpos", "tick_times"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(run.execution, name))
-    assert_same_fields(run.execution, again, rtol=1e-6)  # measurements are kept in single precision
-    assert again.touchdowns == run.execution.touchdowns and again.timestep == run.execution.timestep
+    assert_same_fields(run.execution.controls, again.controls)
+    for name in ("qpos", "tick_times"):
+        np.testing.assert_array_equal(getattr(again.samples, name), getattr(run.execution.samples, name))
+    assert_same_fields(run.execution.samples, again.samples, rtol=1e-6)  # measurements are kept in single precision
+    assert_same_fields(run.execution, again, rtol=1e-6)
+    assert again.replanning == run.execution.replanning
+    assert again.touchdowns == run.execution.touchdowns
 
 
 def test_execution_npz_replays_in_plain_mujoco(run, tmp_path):
@@ -213,7 +216,9 @@ def test_execution_npz_replays_in_plain_mujoco(run, tmp_path):
     for row in ctrl:
         data.ctrl[:] = row
         mujoco.mj_step(scene, data)
-    execution = replace(run.execution, ctrl=ctrl, qpos=run.execution.qpos[:25], final_qpos=np.array(data.qpos))
+    controls = replace(run.execution.controls, ctrl=ctrl, final_qpos=np.array(data.qpos))
+    samples = replace(run.execution.samples, qpos=run.execution.samples.qpos[:25])
+    execution = replace(run.execution, controls=controls, samples=samples)
     write_execution(tmp_path / "execution.npz", execution)
     write_scene(tmp_path / "scene.mjb", scene)
 

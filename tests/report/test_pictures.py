@@ -36,9 +36,9 @@ def patches(run):
 
 
 def test_the_strip_shows_the_robot_moving(run, tmp_path, rendering):
-    execution = run.execution
+    scene, samples = run.execution.scene, run.execution.samples
     path = tmp_path / "strip.png"
-    strip(execution.scene, execution.qpos, execution.tick_times, path, 3, size=(120, 160), patches=patches(run))
+    strip(scene, samples.qpos, samples.tick_times, path, 3, size=(120, 160), patches=patches(run))
     picture = iio.imread(path)
     assert picture.shape == (160, 360, 3)
     first, middle, last = np.split(picture, 3, axis=1)
@@ -47,8 +47,8 @@ def test_the_strip_shows_the_robot_moving(run, tmp_path, rendering):
 
 def test_contact_patches_are_drawn_in_the_limb_s_colour(run, rendering):
     execution = run.execution
-    camera = follow(execution.scene, execution.qpos, execution.tick_times)[0]
-    away = execution.qpos[0] + np.eye(1, execution.scene.nq)[0] * 50  # the robot out of the picture
+    camera = follow(execution.scene, execution.samples.qpos, execution.samples.tick_times)[0]
+    away = execution.samples.qpos[0] + np.eye(1, execution.scene.nq)[0] * 50  # the robot out of the picture
     with OffscreenRenderer(execution.scene, 160, 120) as renderer:
         plain = renderer.render(away, camera)
         marked = renderer.render(away, camera, patches=patches(run))
@@ -60,8 +60,8 @@ def test_contact_patches_are_drawn_in_the_limb_s_colour(run, rendering):
 def test_the_video_plays(run, tmp_path, rendering):
     execution = run.execution
     path = tmp_path / "video.mp4"
-    times = execution.tick_times[execution.tick_times < 0.5]
-    video(execution.scene, execution.qpos[: len(times)], times, path, fps=10, size=(64, 48))
+    times = execution.samples.tick_times[execution.samples.tick_times < 0.5]
+    video(execution.scene, execution.samples.qpos[: len(times)], times, path, fps=10, size=(64, 48))
     decode = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     run_of_it = subprocess.run(decode, capture_output=True, check=True)
     pictures = np.frombuffer(run_of_it.stdout, np.uint8).reshape(-1, 48, 64, 3)
@@ -72,7 +72,7 @@ def test_the_video_plays(run, tmp_path, rendering):
 def test_the_model_is_not_changed_by_rendering_it_large(run, rendering):
     before = run.execution.scene.vis.global_.offwidth
     with OffscreenRenderer(run.execution.scene, 1300, 16) as renderer:
-        renderer.render(run.execution.qpos[0], mujoco.MjvCamera())
+        renderer.render(run.execution.samples.qpos[0], mujoco.MjvCamera())
     assert run.execution.scene.vis.global_.offwidth == before
 
 
@@ -118,7 +118,7 @@ def test_the_camera_avoids_a_wall(run):
 
 def test_the_plan_from_above_is_drawn_with_whatever_there_is(run, tmp_path):
     for solution, motion in ((None, None), (run.search.solutions[0], None), (run.search.solutions[0], run.motion)):
-        draw_top_view(tmp_path / "plan.png", run.world, run.robot, solution, motion, run.execution.com)
+        draw_top_view(tmp_path / "plan.png", run.world, run.robot, solution, motion, run.execution.samples.com)
         assert is_drawn(iio.imread(tmp_path / "plan.png"))
     draw_top_view(tmp_path / "bare.png", replace(run.world, surfaces=()), run.robot, None)
     assert is_drawn(iio.imread(tmp_path / "bare.png"))
@@ -127,5 +127,6 @@ def test_the_plan_from_above_is_drawn_with_whatever_there_is(run, tmp_path):
 def test_the_curves_are_drawn(run, tmp_path):
     draw_plots(tmp_path / "plots.png", run.execution, run.schedule)
     assert is_drawn(iio.imread(tmp_path / "plots.png"))
-    empty = {name: getattr(run.execution, name)[:0] for name in ("tick_times", "com", "com_planned", "torque_ratio")}
-    draw_plots(tmp_path / "empty.png", replace(run.execution, **empty, slip=()), run.schedule)
+    samples = run.execution.samples
+    empty = {name: getattr(samples, name)[:0] for name in ("tick_times", "com", "com_planned", "torque_ratio")}
+    draw_plots(tmp_path / "empty.png", replace(run.execution, samples=replace(samples, **empty), slip=()), run.schedule)

@@ -2,7 +2,7 @@
 
 import json
 from collections import defaultdict
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import mujoco
 import numpy as np
@@ -10,6 +10,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from toolkit.execution.check import Check
+from toolkit.execution.result import Samples
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.report import draw
@@ -130,11 +131,11 @@ def test_bodies_are_where_mujoco_puts_them(run, recording):
     execution = run.execution
     times, positions = recording.columns("/world/robot/left_leg", "translation")
     _, quaternions = recording.columns("/world/robot/left_leg", "quaternion")
-    assert times[0] == 0.0 and len(times) == pytest.approx(30 * execution.tick_times[-1], rel=0.05)
+    assert times[0] == 0.0 and len(times) == pytest.approx(30 * execution.samples.tick_times[-1], rel=0.05)
     body = mujoco.mj_name2id(execution.scene, mujoco.mjtObj.mjOBJ_BODY, "left_leg")
     data = mujoco.MjData(execution.scene)
     for row in (0, len(times) // 2, len(times) - 1):
-        data.qpos = execution.qpos[np.argmin(np.abs(execution.tick_times - times[row]))]
+        data.qpos = execution.samples.qpos[np.argmin(np.abs(execution.samples.tick_times - times[row]))]
         mujoco.mj_kinematics(execution.scene, data)
         # single precision in the recording
         np.testing.assert_allclose(positions[row][0], data.xpos[body], rtol=0, atol=1e-6)
@@ -152,8 +153,8 @@ def test_forces_have_the_stated_scale_and_vanish_without_contact(run, recording)
     drawn = [len(vector) for vector in vectors]
     assert 0 in drawn and max(drawn) == 1
     row = drawn.index(1)
-    tick = np.argmin(np.abs(run.execution.tick_times - times[row]))
-    force = run.execution.wrench_planned[tick, Limb.LEFT_FOOT, :3]
+    tick = np.argmin(np.abs(run.execution.samples.tick_times - times[row]))
+    force = run.execution.samples.wrench_planned[tick, Limb.LEFT_FOOT, :3]
     np.testing.assert_allclose(NEWTON_PER_METRE * vectors[row][0], force, rtol=1e-6)
 
 
@@ -200,14 +201,8 @@ def test_a_search_without_a_solution_and_a_motion_without_sense_are_recorded(run
 
 def test_a_fall_at_once_is_recorded(run, tmp_path):
     execution = run.execution
-    cut = {
-        name: getattr(execution, name)[:1]
-        for name in (
-            "tick_times qpos qvel com com_planned momentum momentum_planned wrench wrench_planned cop_margin limb_pose "
-            "torque torque_ratio tick_seconds"
-        ).split()
-    }
-    short = replace(execution, **cut, touchdowns=(), slip=(), fell=True, fall_reason="tilted by 60 degrees")
+    cut = Samples(**{item.name: getattr(execution.samples, item.name)[:1] for item in fields(Samples)})
+    short = replace(execution, samples=cut, touchdowns=(), slip=(), fell=True, fall_reason="tilted by 60 degrees")
     recording = write(run, tmp_path / "fall.rrd", execution=short)
     (chunk,) = recording.chunks["/events"]
     assert "tilted by 60 degrees" in str(chunk.to_record_batch().to_pydict())

@@ -13,18 +13,12 @@ def robot(request):
     return load_robot(request.param)
 
 
-def carries(robot, limb):
-    carrying = np.zeros(len(robot.joint_names), bool)
-    carrying[robot.joints_to(limb)] = True
-    return carrying
-
-
 def test_legs_carry_feet_and_arms_do_not(robot):
-    left, right = (carries(robot, limb) for limb in (Limb.LEFT_FOOT, Limb.RIGHT_FOOT))
+    left, right = (robot.carrying([limb]) for limb in (Limb.LEFT_FOOT, Limb.RIGHT_FOOT))
     assert not (left & right).any()
     assert left.sum() == right.sum() >= 5
     for palm in (limb for limb in robot.limbs if not limb.is_foot):
-        arm = carries(robot, palm)
+        arm = robot.carrying([palm])
         assert arm.any() and not (arm & (left | right)).any()
 
 
@@ -37,7 +31,7 @@ def test_a_limb_turns_with_the_joints_that_lead_to_it_and_no_others(robot):
     for limb, model in robot.limbs.items():
         mujoco.mj_jacSite(robot.mujoco_model, data, linear, angular, data.site(model.site).id)
         moving = np.any([linear, angular], axis=(0, 1))[6:]
-        np.testing.assert_array_equal(moving, carries(robot, limb))
+        np.testing.assert_array_equal(moving, robot.carrying([limb]))
 
 
 def test_an_arm_is_the_end_of_what_leads_to_its_palm(robot):

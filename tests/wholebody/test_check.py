@@ -8,11 +8,11 @@ import pytest
 
 from tests.wholebody.conftest import world_of
 from toolkit.geometry.limb import Limb
-from toolkit.wholebody.check import CheckConfig, check
-from toolkit.wholebody.collision import CollisionConfig, first_collision
+from toolkit.wholebody.check import check
+from toolkit.wholebody.collision import first_collision
 from toolkit.wholebody.limb_paths import limb_paths
+from toolkit.wholebody.motion_dynamics import contact_wrenches, inverse_dynamics
 from toolkit.wholebody.plan import whole_body
-from toolkit.wholebody.torque import contact_wrenches, inverse_dynamics
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +24,7 @@ def good(robot, flat_walk):
 
 def reasons(robot, walk, good, *, world=None, qpos=None, paths=None):
     kept, times, states = good
-    report = check(
-        robot, world or walk.world, paths or kept, walk.motion, times, states if qpos is None else qpos, CheckConfig()
-    )
+    report = check(robot, world or walk.world, paths or kept, walk.motion, times, states if qpos is None else qpos)
     return report, "; ".join(report.reasons)
 
 
@@ -90,11 +88,10 @@ def test_a_low_ceiling_collides(robot, flat_walk, good):
 
 def test_soles_may_rest_but_not_sink(robot, flat_walk, good):
     _, times, states = good
-    config = CollisionConfig()
     for depth, expected in ((0.003, ""), (0.006, "world/floor")):
         qpos = states.copy()
         qpos[:, 2] -= depth
-        hit = first_collision(robot, flat_walk.world, times, qpos, config)
+        hit = first_collision(robot, flat_walk.world, times, qpos)
         assert (hit is None) if expected == "" else (hit is not None and expected in hit.text and hit.time == 0.0)
 
 
@@ -104,7 +101,7 @@ def test_folding_the_body_into_itself_collides(robot, flat_walk, good):
     rng, qpos = np.random.default_rng(0), states.copy()
     qpos[:, 2] += 2.0  # off the ground
     qpos[:, 7:] = rng.uniform(robot.lower, robot.upper, size=qpos[:, 7:].shape)
-    hit = first_collision(robot, flat_walk.world, times, qpos, CollisionConfig())
+    hit = first_collision(robot, flat_walk.world, times, qpos)
     assert hit is not None and "collide at" in hit.text
 
 

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from toolkit.geometry.pose import Pose, rotation_exponential, rotation_on_surface, rotation_vector
-from toolkit.wholebody.profile import Window
-from toolkit.wholebody.swing import Move, SwingPath
+from toolkit.wholebody.swing import Move, SwingPath, Window
 
 
 def random_rotation(rng, angle):

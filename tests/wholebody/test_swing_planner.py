@@ -5,7 +5,7 @@ from tests.wholebody.conftest import FIRST, RISE, stairs, world_of
 from toolkit.geometry.pose import Pose, rotation_on_surface
 from toolkit.wholebody.detour import corners, gaps
 from toolkit.wholebody.limb_paths import box_collide
-from toolkit.wholebody.swing_planner import plan_swing
+from toolkit.wholebody.swing_planner import FAST_ACROSS, plan_swing
 from toolkit.wholebody.swing_task import EASY, SwingConfig, SwingTask
 
 HALF = np.array([0.11, 0.065])
@@ -87,7 +87,7 @@ def test_fast_swings_cross_over_the_full_time():
     slow = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), free(None), CONFIG)
     fast = plan_swing(task_of([0, 0.1, 0], [2.4, 0.1, 0]), free(None), CONFIG)
     assert slow.turn == EASY.across
-    assert fast.turn == CONFIG.fast_across
+    assert fast.turn == FAST_ACROSS
 
 
 def test_foot_goes_around_the_standing_foot():

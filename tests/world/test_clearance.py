@@ -1,12 +1,11 @@
-"""Heights, triangles and boxes against the world, each by a second route."""
+"""Boxes against the world, by a second route."""
 
 import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from toolkit.world.clearance import BoxCollider, collision_triangles, height_map
-from toolkit.world.source import RAY_GROUPS
+from toolkit.world.clearance import BoxCollider
 
 GEOMS = """
 <geom type="plane" size="0 0 1"/>
@@ -32,52 +31,6 @@ def world(tmp_path_factory):
     from toolkit.world.loader import load_world
 
     return load_world(tmp_path_factory.mktemp("world") / "made.xml", mjcf=mjcf_of(GEOMS, ASSETS))
-
-
-def ray_height(world, data, x, y, top):
-    geom = np.zeros(1, np.int32)
-    distance = mujoco.mj_ray(
-        world.mujoco_model, data, np.array([x, y, top]), np.array([0, 0, -1.0]), RAY_GROUPS, True, -1, geom
-    )
-    return top - distance if distance >= 0 else -np.inf
-
-
-@pytest.mark.parametrize("below", [np.inf, 1.0])
-def test_height_map_agrees_with_rays(world, below):
-    data = mujoco.MjData(world.mujoco_model)
-    mujoco.mj_kinematics(world.mujoco_model, data)
-    heights = height_map(world, 0.05, below=below)
-    x0, y0, x1, y1 = world.square
-    assert heights.height.shape == (round((x1 - x0) / 0.05), round((y1 - y0) / 0.05))
-    error, span = [], np.arange(-1.9, 2.0, 0.1)
-    for x in span:
-        for y in span:
-            cell = heights.origin + 0.05 * np.rint((np.array([x, y]) - heights.origin) / 0.05)
-            error.append(abs(heights.at(np.array([x, y])) - ray_height(world, data, *cell, min(below, 5.0))))
-    # Round geoms are polyhedra here: a few cells at their rims differ by more than their 2 mm.
-    assert np.quantile(error, 0.99) < 2e-3
-    assert heights.at(np.array([100.0, 0.0])) == -np.inf
-
-
-def test_triangles_look_outwards_and_lie_on_what_rays_hit(world):
-    data = mujoco.MjData(world.mujoco_model)
-    mujoco.mj_kinematics(world.mujoco_model, data)
-    triangles = collision_triangles(world)
-    assert triangles.shape[1:] == (3, 3) and np.isfinite(triangles).all()
-    assert triangles[..., :2].min() >= world.square[0] - 1e-9
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    area = np.linalg.norm(normals, axis=1)
-    checked = 0
-    for corners, normal, size in zip(triangles, normals, area, strict=True):
-        if size < 1e-3:
-            continue
-        start = corners.mean(axis=0) + 0.005 * normal / size
-        distance = mujoco.mj_ray(
-            world.mujoco_model, data, start, -normal / size, RAY_GROUPS, True, -1, np.zeros(1, np.int32)
-        )
-        checked += 1
-        assert distance <= 0.005 + 4e-3  # a polyhedron lies within 4 mm of the round geom it stands for
-    assert checked > 30
 
 
 def test_boxes_agree_with_mujoco_distances(world):

@@ -9,10 +9,10 @@ import pytest
 
 from tests.world.probe import area_of, ball_gap, random_points, ray_gap
 from toolkit.geometry.pose import Pose
-from toolkit.world.clearance import height_map
 from toolkit.world.generators import KINDS
 from toolkit.world.loader import load_world
 from toolkit.world.scene import compose_scene
+from toolkit.world.source import RAY_GROUPS
 
 WORLDS = sorted((Path(__file__).resolve().parents[2] / "worlds").glob("*.xml"))
 
@@ -71,9 +71,13 @@ def test_a_ball_rests_on_the_plane(world):
 
 
 def test_goal_and_start_are_on_the_ground(world):
-    heights = height_map(world, 0.05)
+    data = mujoco.MjData(world.mujoco_model)
+    mujoco.mj_kinematics(world.mujoco_model, data)
+    down, geom = np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
     for position in (world.start.position, world.goal.position):
-        assert abs(heights.at(position[:2]) - position[2]) < 0.06
+        above = position - 0.5 * down
+        distance = mujoco.mj_ray(world.mujoco_model, data, above, down, RAY_GROUPS, True, -1, geom)
+        assert abs(distance - 0.5) < 0.06
 
 
 def test_composed_scene_has_the_same_collision_geometry(world, stool):

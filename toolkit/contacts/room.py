@@ -14,7 +14,6 @@ from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
-from toolkit.world.polygon import region_of
 from toolkit.world.surface import Surface
 from toolkit.world.world import Goal
 
@@ -114,7 +113,7 @@ def _inside(
     allowed: Callable[[np.ndarray], bool] | None,
 ) -> np.ndarray:
     """The part of the box, grown evenly from zero, that is allowed and in which the sole stays on the surface."""
-    region = region_of(surface)
+    region = surface.region
     frame = surface.pose.inverse() @ contact.pose
     shapely.prepare(region)
 

@@ -5,16 +5,29 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.centroidal.problem import Margins
-from toolkit.control.config import ControllerConfig, TaskGains, TouchdownConfig
+from toolkit.control.config import ControllerConfig, TaskGains
+from toolkit.control.corrector import PENDULUM_RATE, Cones, Corrector, MotionTarget
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.joint_box import JointBox
 from toolkit.control.limb_target import LimbTargets
 from toolkit.control.qp import FORCE_UNIT, ContactQP
-from toolkit.control.reference import Reference
-from toolkit.control.target import Cones, Corrector, MotionTarget
+from toolkit.control.sampled_plan import Reference
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
+
+# A limb in contact is held still by its velocity only: where it rests is a measured fact. The patch of a palm aligns
+# itself with the surface.
+STANCE, STANCE_PALM_ROTATION = TaskGains(1e4, 0.0, 30.0), TaskGains(20.0, 0.0, 20.0)
+LEG_POSTURE = 0.005  # of the posture's weight for joints that carry a foot: feet and CoM place them
+ARM_POSTURE = 0.01  # the same for an arm whose palm is in contact, and not quite where it was planned to be
+MOMENTUM_SCALE = 10.0  # kg m^2/s per unit of the task of angular momentum
+FORCE, MOMENT = 1e-5, 2e-4  # weights on squared N and N m of deviation from the planned wrenches: they break ties
+ACCELERATION = 1e-4  # weight on squared joint accelerations: keeps the Hessian definite
+DIVERGENCE = 0.01  # m; divergence of the CoM that halves the weights of angular momentum and base orientation...
+URGENT_NESTING = 0.05  # ... and from which on the CoP may come that near the edge, instead of `nesting`
+MAX_FRICTION, MAX_YAW = 1.0, 0.9  # bounds on the factors on friction and yaw moment, also where the plan has no margin
+TORQUE_FRACTION = 0.98  # of the joint torque limits that may be used: the solver's tolerance stays within the limit
 
 
 class Controller:
@@ -37,7 +50,6 @@ class Controller:
         margins: Margins,
         period: float,
         config: ControllerConfig,
-        touchdown: TouchdownConfig,
         corrector: Corrector | None = None,
     ):
         """Prepare for a run.
@@ -48,7 +60,6 @@ class Controller:
             margins: the plan's margins; the controller's lie between them and none.
             period: s between control ticks.
             config: settings.
-            touchdown: when a moving limb is taken to be in contact.
             corrector: optimises motion and landing points anew; they stay as planned where None.
         """
         self._corrector, self.aim = corrector, MotionTarget.zeros()
@@ -61,32 +72,29 @@ class Controller:
         limit = np.zeros(4)
         for limb, model in robot.limbs.items():
             limit[limb] = model.max_normal_force
-        self.tracker = ContactTracker(reference, self.limbs, weight, limit, config, touchdown)
-        self.targets = LimbTargets(reference, self.tracker, config)
-        self._box = JointBox(robot, config)
-        self._torque_limit = config.torque_fraction * robot.torque_limit
-        nesting, urgent_nesting = config.nesting, config.urgent_nesting
+        self.tracker = ContactTracker(reference, self.limbs, weight, limit)
+        self.targets = LimbTargets(reference, self.tracker)
+        self._box = JointBox(robot)
+        self._torque_limit = TORQUE_FRACTION * robot.torque_limit
+        nesting = config.nesting
         self._limits = {
             urgent: Cones(
-                min(1.0 + nesting * (margins.friction - 1.0), config.max_friction),
-                min(1.0 + nesting * (margins.yaw - 1.0), config.max_yaw),
+                min(1.0 + nesting * (margins.friction - 1.0), MAX_FRICTION),
+                min(1.0 + nesting * (margins.yaw - 1.0), MAX_YAW),
                 robot.half_sizes - shrink * np.minimum(margins.cop, robot.half_sizes / 2.0),
             )
-            for urgent, shrink in ((False, nesting), (True, urgent_nesting))
+            for urgent, shrink in ((False, nesting), (True, URGENT_NESTING))
         }
         self._urgent, self._calm = False, 1.0
-        legs = np.zeros(len(robot.joint_names), bool)
-        for limb in self.limbs:
-            if limb.is_foot:
-                legs[robot.joints_to(limb)] = True
+        legs = robot.carrying(limb for limb in self.limbs if limb.is_foot)
         gains, nv = config, self.dynamics.nv
-        self._posture_weight = np.where(legs, gains.leg_posture, 1.0) * gains.posture.weight
+        self._posture_weight = np.where(legs, LEG_POSTURE, 1.0) * gains.posture.weight
         self._arms = {limb: robot.arm_joints(limb) for limb in self.limbs if not limb.is_foot}
         self._posture = self._posture_weight.copy()
-        self._diagonal = np.full(nv + 18, gains.acceleration)
+        self._diagonal = np.full(nv + 18, ACCELERATION)
         self._diagonal[3:6] += gains.base.weight
         self._diagonal[6:nv] += self._posture_weight
-        self._diagonal[nv:] = gains.force * FORCE_UNIT**2
+        self._diagonal[nv:] = FORCE * FORCE_UNIT**2
         self._target = np.zeros(nv + 18)
         self._tasks, self._wanted = np.zeros((6 + 24, nv)), np.zeros(6 + 24)
         self._qps: dict[tuple[Limb, ...], ContactQP] = {}
@@ -158,7 +166,7 @@ class Controller:
         error = gains.com.kp * (aim.com - dynamics.com)
         error += gains.com.kd * (aim.com_velocity - dynamics.com_velocity)
         wanted[:3] = root * (error + aim.com_acceleration - dynamics.com_drift)
-        root = (gains.angular_momentum.weight * self._calm) ** 0.5 / gains.angular_momentum_scale
+        root = (gains.angular_momentum.weight * self._calm) ** 0.5 / MOMENTUM_SCALE
         np.multiply(dynamics.momentum_jacobian, root, out=tasks[3:6])
         error = gains.angular_momentum.kp * (aim.angular_momentum - dynamics.angular_momentum)
         wanted[3:6] = root * (error + aim.angular_momentum_rate - dynamics.momentum_drift)
@@ -174,8 +182,8 @@ class Controller:
         diagonal = self._diagonal[: qp.size]
         for limb, slot in qp.slots.items():
             moments = slice(slot.start + 3, slot.stop)
-            diagonal[slot] = gains.force * FORCE_UNIT**2
-            diagonal[moments] = gains.moment * FORCE_UNIT**2
+            diagonal[slot] = FORCE * FORCE_UNIT**2
+            diagonal[moments] = MOMENT * FORCE_UNIT**2
             target[slot] = aim.wrench[limb, : slot.stop - slot.start] / FORCE_UNIT
         qp.set_objective(tasks[:rows], wanted[:rows], diagonal, target[: qp.size])
 
@@ -187,23 +195,22 @@ class Controller:
         saves nobody.
         """
         gains, dynamics = self._config, self.dynamics
-        x, y = (dynamics.com - self._com + (dynamics.com_velocity - self._com_velocity) / gains.divergence_rate)[:2]
-        squared = (x * x + y * y) / gains.divergence_scale**2
+        x, y = (dynamics.com - self._com + (dynamics.com_velocity - self._com_velocity) / PENDULUM_RATE)[:2]
+        squared = (x * x + y * y) / DIVERGENCE**2
         self._calm = 1.0 / (1.0 + squared)
         self._urgent = squared > (0.25 if self._urgent else 1.0)
-        self._diagonal[3:6] = gains.acceleration + gains.base.weight * self._calm
+        self._diagonal[3:6] = ACCELERATION + gains.base.weight * self._calm
         np.multiply(self._posture_weight, self._calm, out=self._posture)
         for limb, joints in self._arms.items():
             if self.tracker.in_contact[limb] and self.tracker.current[limb] is not None:
-                self._posture[joints] *= gains.arm_posture  # a palm of the start is where it was planned to be
-        np.add(self._posture, gains.acceleration, out=self._diagonal[6 : dynamics.nv])
+                self._posture[joints] *= ARM_POSTURE  # a palm of the start is where it was planned to be
+        np.add(self._posture, ACCELERATION, out=self._diagonal[6 : dynamics.nv])
 
     def _pursue_limb(self, limb: Limb, rows: int) -> int:
         """Append a limb's task rows after the first `rows`; returns their new number."""
         gains, dynamics, targets = self._config, self.dynamics, self.targets
         if self.tracker.in_contact[limb]:
-            linear = gains.stance
-            angular = gains.stance if limb.is_foot else gains.stance_palm_rotation
+            linear, angular = STANCE, STANCE if limb.is_foot else STANCE_PALM_ROTATION
         elif self.tracker.state[limb] is LimbState.FREE or targets.authority[limb] <= 0.0:
             return rows
         else:

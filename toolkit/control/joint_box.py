@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.control.config import ControllerConfig
 from toolkit.robot.model import RobotModel
+
+RANGE_MARGIN = 0.01  # rad; kept from each end of a joint's range
+RANGE_RATE = 25.0  # 1/s; how fast a joint may approach the end of its range, per rad of distance
+VELOCITY_FRACTION = 0.95  # of the joint velocity limits that may be used: a tick's error stays within the limit
+VELOCITY_TIME = 0.02  # s; over which a joint may reach its velocity limit
+MAX_ACCELERATION = 2000.0  # rad/s^2; bound on every joint's acceleration: keeps the QP's numbers alike
 
 
 class JointBox:
@@ -18,33 +23,31 @@ class JointBox:
         lower, upper: (n,) rad/s^2, lower <= upper.
     """
 
-    def __init__(self, robot: RobotModel, config: ControllerConfig):
-        self._config = config
-        margin = np.minimum(config.range_margin, 0.1 * (robot.upper - robot.lower))
+    def __init__(self, robot: RobotModel):
+        margin = np.minimum(RANGE_MARGIN, 0.1 * (robot.upper - robot.lower))
         self._low, self._high = robot.lower + margin, robot.upper - margin
-        self._speed = config.velocity_fraction * robot.velocity_limit
+        self._speed = VELOCITY_FRACTION * robot.velocity_limit
         count = len(robot.joint_names)
         self.lower, self.upper = np.zeros(count), np.zeros(count)
         self._work = np.zeros(count)
 
     def update(self, joints: np.ndarray, velocity: np.ndarray) -> None:
         """Evaluate at (n,) joint positions and velocities."""
-        config, work = self._config, self._work
-        rate, bound = config.range_rate, config.max_acceleration
+        work, rate = self._work, RANGE_RATE
         np.subtract(self._high, joints, out=self.upper)
         self.upper *= rate**2
         self.upper -= 2.0 * rate * velocity
         np.subtract(self._speed, velocity, out=work)
-        work /= config.velocity_time
+        work /= VELOCITY_TIME
         np.minimum(self.upper, work, out=self.upper)
         np.subtract(self._low, joints, out=self.lower)
         self.lower *= rate**2
         self.lower -= 2.0 * rate * velocity
         np.add(self._speed, velocity, out=work)
-        work /= -config.velocity_time
+        work /= -VELOCITY_TIME
         np.maximum(self.lower, work, out=self.lower)
-        np.clip(self.upper, -bound, bound, out=self.upper)
-        np.clip(self.lower, -bound, bound, out=self.lower)
+        np.clip(self.upper, -MAX_ACCELERATION, MAX_ACCELERATION, out=self.upper)
+        np.clip(self.lower, -MAX_ACCELERATION, MAX_ACCELERATION, out=self.lower)
         # Where a joint is pressed from both sides the middle is the best that can be done.
         np.add(self.lower, self.upper, out=work)
         work *= 0.5

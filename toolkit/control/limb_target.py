@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.control.config import ControllerConfig
 from toolkit.control.dynamics import RobotDynamics
-from toolkit.control.reference import Reference, Swing
+from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.control.touchdown import ContactTracker, LimbState
+
+FADE = 0.7  # of a swing, over which the offset that it started with is lost
+SWING_SHARE = 0.05
+"""Part of a foot's weights that counts until it prepares to land: where its joints are too slow the foot gives way, not
+the body."""
+REST_SPEED = 0.05  # m/s; at which a foot that bounced off goes back along the inward normal
 
 
 class LimbTargets:
@@ -23,11 +28,8 @@ class LimbTargets:
         shift: (4, 3) m; displacement of the landing point, and shift_velocity: (4, 3) m/s.
     """
 
-    fade = 0.7  # fraction of a swing over which the initial offset is lost
-
-    def __init__(self, reference: Reference, tracker: ContactTracker, config: ControllerConfig):
-        self._reference, self._tracker, self._rest_speed = reference, tracker, config.rest_speed
-        self._swing_share = config.swing_share
+    def __init__(self, reference: Reference, tracker: ContactTracker):
+        self._reference, self._tracker = reference, tracker
         self.error, self.velocity, self.acceleration = np.zeros((4, 6)), np.zeros((4, 6)), np.zeros((4, 6))
         self.authority = np.ones(4)
         self.shift, self.shift_velocity = np.zeros((4, 3)), np.zeros((4, 3))
@@ -42,7 +44,7 @@ class LimbTargets:
             self.error[limb] = self.velocity[limb] = self.acceleration[limb] = 0.0
             self.authority[limb] = reference.authority[index, limb]
             if state is LimbState.REST and tracker.loose[limb]:
-                self.velocity[limb, :3] = -self._rest_speed * dynamics.limb_rotation[limb, :, 2]
+                self.velocity[limb, :3] = -REST_SPEED * dynamics.limb_rotation[limb, :, 2]
             if state in (LimbState.REST, LimbState.FREE) or swing is None:
                 continue
             if tracker.begun[limb]:
@@ -57,7 +59,7 @@ class LimbTargets:
             self.acceleration[limb] = pace * pace * reference.limb_acceleration[row, limb]
             if limb.is_foot and state is LimbState.SWING:
                 late = min(max((reference.times[row] - swing.start) / (swing.end - swing.start) - 0.5, 0.0) / 0.4, 1.0)
-                self.authority[limb] = self._swing_share + (1.0 - self._swing_share) * late * late * (3.0 - 2.0 * late)
+                self.authority[limb] = SWING_SHARE + (1.0 - SWING_SHARE) * late * late * (3.0 - 2.0 * late)
             if state is LimbState.SEARCH and swing.contact is not None:
                 normal = swing.contact.pose.normal
                 target = target - tracker.depth[limb] * normal
@@ -73,7 +75,7 @@ class LimbTargets:
 
     def _remaining(self, swing: Swing, time: float) -> float:
         """Share of the initial offset that is left."""
-        share = min((time - swing.start) / (self.fade * (swing.end - swing.start)), 1.0)
+        share = min((time - swing.start) / (FADE * (swing.end - swing.start)), 1.0)
         return 1.0 - share * share * (3.0 - 2.0 * share)
 
 

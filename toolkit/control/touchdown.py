@@ -6,9 +6,22 @@ from enum import Enum
 
 import numpy as np
 
-from toolkit.control.config import ControllerConfig, TouchdownConfig
-from toolkit.control.reference import Reference, Swing
+from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.geometry.limb import Limb
+
+# When a moving limb is taken to be in contact.
+EARLY_FRACTION = 0.6  # of the swing, after which a measured force ends it: before, the foot still leaves its surface
+EARLY_FOOT_FORCE, LATE_FOOT_FORCE = 25.0, 15.0  # N; end a foot's swing before and after its planned end
+PALM_FORCE, CONFIRM_TICKS = 3.0, 2  # N in so many consecutive ticks make a palm's contact: arms bounce
+LATE_FOOT_SPEED, PALM_SPEED = 0.15, 0.08  # m/s; along the inward normal after the planned end
+MAX_DEPTH = 0.08  # m; how far a limb searches below the planned surface
+
+# How much force a limb in contact is asked to bear.
+MIN_FOOT_FORCE, MIN_PALM_FORCE = 10.0, 2.0  # N; in every settled contact, so that it stays one
+FOOT_RAMP, PALM_RAMP = 0.06, 0.4  # s; over which the bound on the normal force rises after contact is made
+RELEASE_RAMP = 0.06  # s; over which it falls before contact is broken
+SETTLE_FORCE, RELEASE_FORCE = 30.0, 5.0  # N; where the rising bound starts, and where the falling one ends
+LOOSE_FORCE = 15.0  # N; a limb in contact that is measured to bear less bounced off
 
 
 class LimbState(Enum):
@@ -45,8 +58,6 @@ class ContactTracker:
         limbs: tuple[Limb, ...],
         weight: float,
         max_normal_force: np.ndarray,
-        controller: ControllerConfig,
-        touchdown: TouchdownConfig,
     ):
         """Start in the planned contacts.
 
@@ -55,10 +66,7 @@ class ContactTracker:
             limbs: those the robot has.
             weight: N; of the robot.
             max_normal_force: (4,) N.
-            controller: settings of the force bounds.
-            touchdown: settings of making contact.
         """
-        self._config, self._touchdown = controller, touchdown
         self._cap = np.minimum(2.5 * weight, max_normal_force)
         self._pending = {limb: [swing for swing in reference.swings if swing.limb == limb] for limb in limbs}
         self.current: dict[Limb, Swing | None] = dict.fromkeys(limbs)
@@ -94,47 +102,47 @@ class ContactTracker:
                 self.lead[limb] += (self.pace[limb] - 1.0) * period
                 self._advance(limb, swing, time + self.lead[limb], period, normal_force[limb])
             self.in_contact[limb] = self.state[limb] is LimbState.REST
-            self.loose[limb] = self.in_contact[limb] and normal_force[limb] < self._config.loose_force
+            self.loose[limb] = self.in_contact[limb] and normal_force[limb] < LOOSE_FORCE
             self._bound(limb, time)
 
     def _advance(self, limb: Limb, swing: Swing, time: float, period: float, force: float) -> None:
         """Follow one limb through its swing; its time runs ahead by its lead."""
-        settings, over = self._touchdown, time >= swing.end - 1e-9
+        over = time >= swing.end - 1e-9
         if swing.contact is None:
             if over:
                 self.state[limb] = LimbState.FREE
             return
-        late_enough = time - swing.start >= settings.early_fraction * (swing.end - swing.start)
+        late_enough = time - swing.start >= EARLY_FRACTION * (swing.end - swing.start)
         if limb.is_foot:
-            met = force > (settings.late_foot_force if over else settings.early_foot_force)
+            met = force > (LATE_FOOT_FORCE if over else EARLY_FOOT_FORCE)
         else:
-            self._loaded_ticks[limb] = self._loaded_ticks[limb] + 1 if force > settings.palm_force else 0
-            met = self._loaded_ticks[limb] >= settings.confirm_ticks
+            self._loaded_ticks[limb] = self._loaded_ticks[limb] + 1 if force > PALM_FORCE else 0
+            met = self._loaded_ticks[limb] >= CONFIRM_TICKS
         if met and late_enough:
             self.state[limb], self._since[limb] = LimbState.REST, time - self.lead[limb]
             self.made[limb] = True
         elif over:
             self.state[limb] = LimbState.SEARCH
-            speed = settings.late_foot_speed if limb.is_foot else settings.palm_speed
-            self.depth[limb] = min(self.depth[limb] + speed * period, settings.max_depth)
+            speed = LATE_FOOT_SPEED if limb.is_foot else PALM_SPEED
+            self.depth[limb] = min(self.depth[limb] + speed * period, MAX_DEPTH)
 
     def search_speed(self, limb: Limb) -> float:
         """Speed in m/s along the inward normal of a limb that searches its contact."""
-        if self.depth[limb] >= self._touchdown.max_depth:
+        if self.depth[limb] >= MAX_DEPTH:
             return 0.0
-        return self._touchdown.late_foot_speed if limb.is_foot else self._touchdown.palm_speed
+        return LATE_FOOT_SPEED if limb.is_foot else PALM_SPEED
 
     def _bound(self, limb: Limb, time: float) -> None:
         """Range of the normal force."""
         if not self.in_contact[limb]:
             self.min_force[limb] = self.max_force[limb] = 0.0
             return
-        config, pending = self._config, self._pending[limb]
-        ramp = config.foot_ramp if limb.is_foot else config.palm_ramp
-        wanted = config.min_foot_force if limb.is_foot else config.min_palm_force
-        share, floor = (time - self._since[limb]) / ramp, config.settle_force
-        if pending and pending[0].breaks and (left := (pending[0].start - time) / config.release_ramp) < share:
-            share, floor = left, config.release_force
+        pending = self._pending[limb]
+        ramp = FOOT_RAMP if limb.is_foot else PALM_RAMP
+        wanted = MIN_FOOT_FORCE if limb.is_foot else MIN_PALM_FORCE
+        share, floor = (time - self._since[limb]) / ramp, SETTLE_FORCE
+        if pending and pending[0].breaks and (left := (pending[0].start - time) / RELEASE_RAMP) < share:
+            share, floor = left, RELEASE_FORCE
         share = min(max(share, 0.0), 1.0)
         floor = min(floor, self._cap[limb])
         self.max_force[limb] = floor + share * (self._cap[limb] - floor)

@@ -8,12 +8,13 @@ import mujoco
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.control.reference import Reference
+from toolkit.control.sampled_plan import Reference
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.recorder import Recorder
-from toolkit.execution.result import Execution
-from toolkit.execution.slip import ContactInterval, contact_intervals
+from toolkit.execution.result import Controls, Execution, Samples
+from toolkit.execution.slip import BEARING_FORCE, CONTACT_GAP, SETTLE_TIME, ContactInterval, contact_intervals
 from toolkit.execution.verdict import Measured, execution_checks
+from toolkit.replanning.replanner import ReplanCounts
 from toolkit.robot.model import RobotModel
 from toolkit.world.world import World
 
@@ -29,7 +30,7 @@ class RunLog:
         finished: the loop reached its end.
         solver_failures: ticks.
         com_aim: (C, 3) m; where the controller wanted the CoM: the plan, as replanned.
-        replans, replan_failures, replan_departures, replan_landings, replan_seconds: as in `Execution`.
+        replanning: as in `Execution`.
     """
 
     scene: mujoco.MjModel
@@ -43,11 +44,7 @@ class RunLog:
     finished: bool
     solver_failures: int
     com_aim: np.ndarray
-    replans: int = 0
-    replan_failures: int = 0
-    replan_departures: int = 0
-    replan_landings: int = 0
-    replan_seconds: float = 0.0
+    replanning: ReplanCounts
 
 
 def measure(
@@ -104,24 +101,23 @@ def measure(
     mass = float(log.scene.body_subtreemass[0])
     return Execution(
         scene=log.scene,
-        timestep=config.timestep,
-        qpos0=log.qpos0,
-        qvel0=log.qvel0,
-        ctrl=log.ctrl,
-        tick_times=times,
-        qpos=recorder.qpos[:count],
-        qvel=recorder.qvel[:count],
-        final_qpos=log.final_qpos,
-        com=recorder.com[:count],
-        com_planned=reference.com[:count],
-        momentum=recorder.momentum[:count],
-        momentum_planned=np.hstack([mass * reference.com_velocity[:count], reference.angular_momentum[:count]]),
-        wrench=recorder.wrench[:count],
-        wrench_planned=_world_wrench(reference, count),
-        cop_margin=recorder.cop_margin[:count],
-        limb_pose=recorder.limb_pose,
-        torque=recorder.torque[:count],
-        torque_ratio=torque_ratio,
+        controls=Controls(config.timestep, log.qpos0, log.qvel0, log.ctrl, log.final_qpos),
+        samples=Samples(
+            tick_times=times,
+            tick_seconds=log.tick_seconds,
+            qpos=recorder.qpos[:count],
+            qvel=recorder.qvel[:count],
+            com=recorder.com[:count],
+            com_planned=reference.com[:count],
+            momentum=recorder.momentum[:count],
+            momentum_planned=np.hstack([mass * reference.com_velocity[:count], reference.angular_momentum[:count]]),
+            wrench=recorder.wrench[:count],
+            wrench_planned=_world_wrench(reference, count),
+            cop_margin=recorder.cop_margin[:count],
+            limb_pose=recorder.limb_pose,
+            torque=recorder.torque[:count],
+            torque_ratio=torque_ratio,
+        ),
         touchdowns=touchdowns,
         slip=slip,
         completed=measured.completed,
@@ -135,18 +131,13 @@ def measure(
         max_velocity_ratio=measured.max_velocity_ratio,
         com_rms_error=measured.com_rms_error,
         solver_failures=log.solver_failures,
-        replans=log.replans,
-        replan_failures=log.replan_failures,
-        replan_departures=log.replan_departures,
-        replan_landings=log.replan_landings,
-        replan_seconds=log.replan_seconds,
         unplanned_contacts=recorder.meter.unplanned_names,
-        tick_seconds=log.tick_seconds,
         simulated_seconds=simulated,
         real_time_factor=simulated / log.wall_seconds,
         checks=execution_checks(measured, config),
         replayable=config.disturbance.replayable,
         failure_time=_failure_time(fell, recorder, slip, times, reference, config),
+        replanning=log.replanning,
     )
 
 
@@ -180,9 +171,9 @@ def _intervals(recorder: Recorder, robot: RobotModel, config: ExecutionConfig) -
             recorder.limb_position[:count, limb],
             recorder.limb_rotation[:count, limb],
             model.half_size,
-            threshold=config.slip_force,
-            gap=round(config.contact_gap / period),
-            settle=round(config.settle_time / period),
+            threshold=BEARING_FORCE,
+            gap=round(CONTACT_GAP / period),
+            settle=round(SETTLE_TIME / period),
         )
     return found
 
@@ -213,7 +204,7 @@ def _touchdowns(
     intervals: list[ContactInterval], recorder: Recorder, reference: Reference, config: ExecutionConfig
 ) -> tuple[dict, ...]:
     """The contact that each transition made: the first that begins after the middle of its swing."""
-    settle = round(config.settle_time / config.control_period)
+    settle = round(SETTLE_TIME / config.control_period)
     made = []
     for swing in reference.swings:
         if swing.contact is None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.contact_meter import ContactMeter
 from toolkit.execution.scene_index import SceneIndex
+from toolkit.execution.slip import BEARING_FORCE
 from toolkit.geometry.pose import quaternion_from_rotation
 from toolkit.robot.model import RobotModel
+
+MAX_TILT = np.radians(60.0)  # rad; of the base, beyond which the robot has fallen
+MIN_HEIGHT = 0.5  # of the home CoM height above the lowest foot, below which the robot has fallen
 
 
 class Recorder:
@@ -25,10 +28,8 @@ class Recorder:
         limb_rotation: (C, 4, 3, 3) world_from_limb.
     """
 
-    def __init__(
-        self, ticks: int, scene: mujoco.MjModel, robot: RobotModel, index: SceneIndex, config: ExecutionConfig
-    ):
-        self._scene, self._robot, self._index, self._config = scene, robot, index, config
+    def __init__(self, ticks: int, scene: mujoco.MjModel, robot: RobotModel, index: SceneIndex):
+        self._scene, self._robot, self._index = scene, robot, index
         self.meter = ContactMeter(index)
         self.count, self.fall = 0, ""
         self.qpos, self.qvel = np.zeros((ticks, scene.nq)), np.zeros((ticks, scene.nv))
@@ -55,7 +56,7 @@ class Recorder:
         for limb, site in index.sites.items():
             rotation = data.site_xmat[site].reshape(3, 3)
             self.limb_position[k, limb], self.limb_rotation[k, limb] = data.site_xpos[site], rotation
-            if meter.normal_force[limb] > self._config.slip_force:
+            if meter.normal_force[limb] > BEARING_FORCE:
                 moment = meter.wrench[limb, 3:] @ rotation
                 half = self._half_size[limb]
                 x, y = -moment[1] / meter.normal_force[limb], moment[0] / meter.normal_force[limb]
@@ -64,13 +65,13 @@ class Recorder:
 
     def _judge(self, data: mujoco.MjData) -> None:
         """See whether the robot has fallen."""
-        index, config, k = self._index, self._config, self.count - 1
+        index, k = self._index, self.count - 1
         upright = data.xmat[index.base, 8]
         height = self.com[k, 2] - np.nanmin(self.limb_position[k, :2, 2])
-        least = config.min_height * self._robot.com_height
+        least = MIN_HEIGHT * self._robot.com_height
         if self.meter.trunk_touched:
             self.fall = f"{self.meter.trunk_touched} touched the world"
-        elif upright < np.cos(config.max_tilt):
+        elif upright < np.cos(MAX_TILT):
             self.fall = f"the base tilted by {np.degrees(np.arccos(np.clip(upright, -1.0, 1.0))):.0f} degrees"
         elif height < least:
             self.fall = f"the CoM sank to {height:.2f} m above the lower foot, below {least:.2f} m"

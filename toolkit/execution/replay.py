@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from toolkit.errors import InputError
+from toolkit.execution.result import Controls
 
 _NAMES = ("timestep", "qpos0", "qvel0", "ctrl", "qpos")
 
@@ -52,15 +53,15 @@ def replay(scene_path: Path | str, execution_path: Path | str) -> Replay:
         raise InputError(f"{execution_path}: does not belong to {scene_path}; take both from the same run")
     if scene.opt.timestep != float(timestep):
         raise InputError(f"{scene_path}: steps of {scene.opt.timestep} s where the run made {float(timestep)} s")
-    final = replay_controls(scene, qpos0, qvel0, ctrl)
+    final = replay_controls(scene, Controls(float(timestep), qpos0, qvel0, ctrl, qpos[-1]))
     return Replay(final, float(np.abs(final - qpos[-1]).max()))
 
 
-def replay_controls(scene: mujoco.MjModel, qpos0: np.ndarray, qvel0: np.ndarray, ctrl: np.ndarray) -> np.ndarray:
-    """Final qpos (nq,) after one mj_step per row of (S, nu) controls from an initial state."""
+def replay_controls(scene: mujoco.MjModel, controls: Controls) -> np.ndarray:
+    """Final qpos (nq,) after one mj_step per row of controls from the initial state."""
     data = mujoco.MjData(scene)
-    data.qpos[:], data.qvel[:] = qpos0, qvel0
-    for row in ctrl:
+    data.qpos[:], data.qvel[:] = controls.qpos0, controls.qvel0
+    for row in controls.ctrl:
         data.ctrl[:] = row
         mujoco.mj_step(scene, data)
     return data.qpos.copy()

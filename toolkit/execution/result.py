@@ -2,26 +2,42 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from toolkit.execution.check import Check
+from toolkit.replanning.replanner import ReplanCounts
 
 
 @dataclass(frozen=True)
-class Execution:
-    """A simulated run, S physics steps, C control ticks. All measured in MuJoCo by code apart from the controller.
+class Controls:
+    """What replays a run of S physics steps in plain MuJoCo, and where it ends.
 
     Attributes:
-        scene: the compiled scene that ran (robot + world), as saved in scene.mjb.
         timestep: s, of the physics.
         qpos0, qvel0: (nq,), (nv,) initial state.
         ctrl: (S, nu) applied controls, one row per physics step.
-        tick_times: (C,) s, when the samples below were taken (each control tick).
-        qpos: (C, nq); qvel: (C, nv).
         final_qpos: (nq,) after the last step.
+    """
+
+    timestep: float
+    qpos0: np.ndarray
+    qvel0: np.ndarray
+    ctrl: np.ndarray
+    final_qpos: np.ndarray
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What was measured at the C control ticks of a run, beside what was planned.
+
+    Attributes:
+        tick_times: (C,) s, when the samples were taken.
+        tick_seconds: (C,) wall-clock of each control tick.
+        qpos: (C, nq); qvel: (C, nv).
         com: (C, 3) measured; com_planned: (C, 3).
         momentum: (C, 6) measured linear and angular momentum about the CoM; momentum_planned: (C, 6).
         wrench: (C, 4, 6) measured contact force and moment about the patch centre, world frame.
@@ -29,34 +45,12 @@ class Execution:
         cop_margin: (C, 4) m; distance of the measured CoP to the patch's edge, NaN without contact.
         limb_pose: (C, 4, 7) measured patch poses.
         torque: (C, nu) applied; torque_ratio (C,): largest |torque| / limit.
-        touchdowns: one dict per transition: `transition`, `limb`, `time`, `planned_time`, `position_error` m.
-        slip: one entry per stance: largest tangential displacement of any patch while it was in contact, m.
-        completed: the plan was run to its end.
-        fell: base too low, tilted, or body contact with the world.
-        fall_reason: one line, "" if it did not fall.
-        solver_failures: control ticks whose QP was not solved.
-        com_rms_error: m; from the plan as replanned: a robot that recovers from a push is not asked to be where it
-            would be without, and a run that nothing disturbs has no other plan than the first one.
-        replans, replan_failures: replans during the run; those that gave no answer, so that the one before went on.
-        replan_departures: those that had to leave the plan; replan_landings: those that moved a landing point.
-        replan_seconds: of the processor for one that departs, on average.
-        unplanned_contacts: distinct (robot geom, world geom) names that touched outside the patches.
-        tick_seconds: (C,) wall-clock of each control tick.
-        simulated_seconds, real_time_factor: of the whole loop.
-        checks: every check of the verdict that execution decides.
-        failure_time: s; the fall, the first unplanned contact or the stance that slipped too far; None without any.
-        replayable: the controls alone reproduce the run; False where it was pushed.
     """
 
-    scene: mujoco.MjModel = field(repr=False)
-    timestep: float
-    qpos0: np.ndarray
-    qvel0: np.ndarray
-    ctrl: np.ndarray
     tick_times: np.ndarray
+    tick_seconds: np.ndarray
     qpos: np.ndarray
     qvel: np.ndarray
-    final_qpos: np.ndarray
     com: np.ndarray
     com_planned: np.ndarray
     momentum: np.ndarray
@@ -67,6 +61,33 @@ class Execution:
     limb_pose: np.ndarray
     torque: np.ndarray
     torque_ratio: np.ndarray
+
+
+@dataclass(frozen=True)
+class Execution:
+    """A simulated run, all measured in MuJoCo by code apart from the controller.
+
+    Attributes:
+        scene: the compiled scene that ran (robot + world), as saved in scene.mjb.
+        controls, samples, replanning: see the classes.
+        touchdowns: one dict per transition: `transition`, `limb`, `time`, `planned_time`, `position_error` m.
+        slip: one entry per stance: largest tangential displacement of any patch while it was in contact, m.
+        completed: the plan was run to its end.
+        fell: base too low, tilted, or body contact with the world.
+        fall_reason: one line, "" if it did not fall.
+        solver_failures: control ticks whose QP was not solved.
+        com_rms_error: m; from the plan as replanned: a robot that recovers from a push is not asked to be where it
+            would be without, and a run that nothing disturbs has no other plan than the first one.
+        unplanned_contacts: distinct (robot geom, world geom) names that touched outside the patches.
+        simulated_seconds, real_time_factor: of the whole loop.
+        checks: every check of the verdict that execution decides.
+        failure_time: s; the fall, the first unplanned contact or the stance that slipped too far; None without any.
+        replayable: the controls alone reproduce the run; False where it was pushed.
+    """
+
+    scene: mujoco.MjModel = field(repr=False)
+    controls: Controls
+    samples: Samples
     touchdowns: tuple[dict, ...]
     slip: tuple[float, ...]
     completed: bool
@@ -81,14 +102,20 @@ class Execution:
     com_rms_error: float
     solver_failures: int
     unplanned_contacts: tuple[tuple[str, str], ...]
-    tick_seconds: np.ndarray
     simulated_seconds: float
     real_time_factor: float
     checks: tuple[Check, ...]
     replayable: bool = True
     failure_time: float | None = None
-    replans: int = 0
-    replan_failures: int = 0
-    replan_departures: int = 0
-    replan_landings: int = 0
-    replan_seconds: float = 0.0
+    replanning: ReplanCounts = ReplanCounts()
+
+    def named(self) -> dict[str, Any]:
+        """Everything but the scene by its name, as report.json and execution.npz have it: the groups taken apart."""
+        values: dict[str, Any] = {}
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, (Controls, Samples, ReplanCounts)):
+                values |= {part.name: getattr(value, part.name) for part in fields(value)}
+            elif item.name != "scene":
+                values[item.name] = value
+        return values

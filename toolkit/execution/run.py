@@ -12,7 +12,7 @@ from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.control.controller import Controller
-from toolkit.control.reference import LimbPathSampler, sample_reference
+from toolkit.control.sampled_plan import sample_reference
 from toolkit.errors import ExecutionError
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import StateFilter
@@ -21,9 +21,9 @@ from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Execution
 from toolkit.execution.scene_index import SceneIndex
 from toolkit.replanning.nominal import Nominal
-from toolkit.replanning.replanner import Replanner
+from toolkit.replanning.replanner import ReplanCounts, Replanner
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.limb_paths import limb_paths
+from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.scene import compose_scene
 from toolkit.world.world import World
@@ -31,6 +31,7 @@ from toolkit.world.world import World
 Observer = Callable[[float, str], None]
 """Told of progress: the share of the run that is done, and a word on it."""
 
+EXTRA_REST = 0.5  # s; on the last stance, beyond the plan's own rest: a robot that topples does so within it
 _DEFAULT = ExecutionConfig()
 
 
@@ -43,14 +44,14 @@ def execute(
     trajectory: WholeBodyTrajectory,
     *,
     config: ExecutionConfig = _DEFAULT,
-    paths: LimbPathSampler | None = None,
+    paths: LimbPaths | None = None,
     rng: np.random.Generator | None = None,
     observer: Observer | None = None,
 ) -> Execution:
     """Simulate a plan under the controller.
 
     The robot starts in the trajectory's first state and is driven by joint torques alone, within its limits (but for a
-    push that `config.disturbance` asks for). The run ends `config.extra_rest` after the plan, or with a fall.
+    push that `config.disturbance` asks for). The run ends `EXTRA_REST` after the plan, or with a fall.
 
     Args:
         robot: the robot, as the controller knows it.
@@ -78,17 +79,15 @@ def execute(
     qpos0, qvel0 = trajectory.qpos[0].copy(), trajectory.qvel[0].copy()
     config.disturbance.disturb_model(scene, index.robot_geom, _touched(scene, index, qpos0), rng)
     period = config.control_period
-    ticks = int(np.ceil((schedule.duration + config.extra_rest) / period - 1e-9))
+    ticks = int(np.ceil((schedule.duration + EXTRA_REST) / period - 1e-9))
     paths = limb_paths(robot, world, schedule, motion) if paths is None else paths
     reference = sample_reference(period * np.arange(ticks), sequence, schedule, motion, trajectory, paths, robot)
     replanner = None
     if config.replanning.enabled and motion.problem.margins.friction <= config.replanning.max_friction:
-        nominal = Nominal.of(motion, reference, robot, config.replanning)
+        nominal = Nominal.of(motion, reference, robot, config.replanning.horizon)
         replanner = Replanner(reference, nominal, robot, world.surfaces, config.replanning)
-    controller = Controller(
-        robot, reference, motion.problem.margins, period, config.controller, config.touchdown, replanner
-    )
-    recorder = Recorder(ticks, scene, robot, index, config)
+    controller = Controller(robot, reference, motion.problem.margins, period, config.controller, replanner)
+    recorder = Recorder(ticks, scene, robot, index)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(schedule.duration, rng)
     data = mujoco.MjData(scene)
@@ -133,11 +132,7 @@ def execute(
         finished=recorder.count == ticks and not recorder.fall,
         solver_failures=controller.failures,
         com_aim=com_aim[: recorder.count],
-        replans=replanner.replans if replanner else 0,
-        replan_failures=replanner.failures if replanner else 0,
-        replan_departures=replanner.departures if replanner else 0,
-        replan_landings=replanner.moved if replanner else 0,
-        replan_seconds=replanner.mean_seconds if replanner else 0.0,
+        replanning=replanner.counts if replanner else ReplanCounts(),
     )
     return measure(log, recorder, reference, robot, world, sequence, config)
 

@@ -8,6 +8,10 @@ import numpy as np
 
 from toolkit.geometry.limb import Limb
 
+BEARING_FORCE = 20.0  # N; a patch that carries more is in contact: less is the noise of a touch
+CONTACT_GAP = 0.03  # s; shorter interruptions do not end a contact: soles chatter
+SETTLE_TIME = 0.02  # s; from touchdown to the pose that slip is counted from: the impact belongs to the touchdown error
+
 
 @dataclass(frozen=True)
 class ContactInterval:

@@ -53,7 +53,7 @@ def random_slope(rng: np.random.Generator, config: SlopeConfig) -> str:
     down = rng.uniform(-0.4, 0.8 * length)  # from the upper edge to the start
     start = down * along if down > 0.0 else np.array([down, 0.0, 0.0])
     end = length * along
-    world = WorldText("training", "a slope", 0.5, (0.05, 0.35), tuple(start), (20.0, 0.0, 0.0), abyss=None)
+    world = WorldText("training", "a slope", 0.5, (0.05, 0.35), (20.0, 0.0, 0.0), tuple(start), abyss=None)
     world.platform("above", (-1.5, 0.0), config.width)
     world.tile("slope", (length, config.width), end / 2, material="slope", rotation=Rotation.from_euler("y", angle))
     world.platform("below", (end[0], end[0] + 3.0), config.width, end[2])
@@ -62,7 +62,7 @@ def random_slope(rng: np.random.Generator, config: SlopeConfig) -> str:
 
 def random_terrain(rng: np.random.Generator, config: TerrainConfig) -> str:
     """MJCF text of a terrain whose start is on the middle tile, heading along x."""
-    world = WorldText("training", "tilted tiles and walls", 0.5, (1.0, 1.0), (0.0, 0.0, 0.05), (20.0, 0.0, 0.0))
+    world = WorldText("training", "tilted tiles and walls", 0.5, (1.0, 1.0), (20.0, 0.0, 0.0), (0.0, 0.0, 0.05))
     for row in range(3):
         for column in range(3):
             turn = Rotation.from_euler("xy", rng.uniform(-config.tilt, config.tilt, 2), degrees=True)

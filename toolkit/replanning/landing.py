@@ -1,14 +1,76 @@
-"""LandingRegion: where a contact to be made may go, as half planes in its own plane."""
+"""Landings: where the contacts to be made may go, as half planes in their own planes."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from toolkit.contacts.stance import Contact
+from toolkit.control.sampled_plan import Swing
 from toolkit.geometry.pose import Pose
+from toolkit.replanning.situation import Situation
 from toolkit.world.surface import Surface
 
 CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+MARGIN = 0.01  # m; of the sole from the edge of its surface: what the swing's tracking may miss by
+GAP = 0.02  # m; between a landing sole and the other one
+SLEW = 0.8  # m/s; by how much a landing point may still move per second that is left: a foot is not faster sideways
+
+
+class Landings:
+    """The contacts that feet are to make, and how far each may be shifted.
+
+    Attributes:
+        contacts: swing -> the contact that it makes.
+    """
+
+    def __init__(
+        self, swings: tuple[Swing, ...], half_sizes: np.ndarray, surfaces: tuple[Surface, ...], max_shift: float
+    ):
+        """Collect the contacts.
+
+        Args:
+            swings: the planned moves.
+            half_sizes: (4, 2) m; of the patches.
+            surfaces: that contacts lie on, by their index.
+            max_shift: m; along each axis of a landing point's plane.
+        """
+        self._swings, self._half_sizes, self._surfaces, self._max_shift = swings, half_sizes, surfaces, max_shift
+        self.contacts: dict[int, Contact] = {
+            event: swing.contact
+            for event, swing in enumerate(swings)
+            if swing.contact is not None and swing.limb.is_foot and swing.contact.surface >= 0
+        }
+        self._regions: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def region(self, event: int, situation: Situation, end: float) -> tuple[np.ndarray, np.ndarray]:
+        """Half planes of a landing point's shift.
+
+        Args:
+            event: the swing that makes the contact.
+            situation: what is measured.
+            end: s; when the swing ends.
+
+        Returns:
+            (k, 2) rows and (k,) bounds of at least 0: `rows @ shift <= bounds`.
+        """
+        swing, contact = self._swings[event], self.contacts[event]
+        half = self._half_sizes[swing.limb]
+        if event not in self._regions:
+            self._regions[event] = landing_rows(contact, half, self._surfaces[contact.surface], MARGIN)
+        region, room = self._regions[event]
+        axes = np.concatenate([np.eye(2), -np.eye(2)])
+        reach = np.full(4, self._max_shift)
+        if event in situation.moving:
+            moved = contact.pose.rotation[:, :2].T @ situation.moving[event]
+            left = SLEW * max(end - situation.time - 0.05, 0.0)
+            reach = np.minimum(reach, np.maximum(axes @ moved + left, 0.0))
+        rows, bounds = [region, axes], [room, reach]
+        other = situation.standing.get(swing.limb.mirrored)
+        if other is not None and swing.start <= situation.time + 1e-9:
+            row, room = apart_row(contact.pose, half, Pose(other[2], other[1]), half, GAP)
+            rows.append(row[None])
+            bounds.append(np.array([room]))
+        return np.concatenate(rows), np.concatenate(bounds)
 
 
 def landing_rows(

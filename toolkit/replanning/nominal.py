@@ -6,16 +6,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolkit.centroidal.body import knot_contacts, swing_ankles
+from toolkit.centroidal.body import BodyMargins, knot_contacts, swing_ankles
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion, CentroidalProblem
-from toolkit.control.reference import Reference, Swing, planned_wrench
+from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.geometry.limb import FEET, PALMS
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.physics.leg import PLANNED, TORQUE_ROLES, leg_clearances, leg_posture, leg_torques
-from toolkit.replanning.config import ReplanConfig
 from toolkit.robot.model import RobotModel
+from toolkit.wholebody.motion_dynamics import planned_wrench
 
 DIFFERENCE = 1e-5  # m; of the CoM, for gradients of clearances
+MAX_DT = 0.1  # s; longest step of the grid: a swing has a few of them
+BODY = BodyMargins(length=0.007, ankle=0.05, hip=0.025, height=0.01, torque=0.92)
+"""Margins kept inside the body's limits; smaller than the plan's, so that there is something to correct with."""
 
 
 @dataclass(frozen=True)
@@ -74,16 +77,16 @@ class Nominal:
     swings: tuple[Swing, ...]
 
     @classmethod
-    def of(cls, motion: CentroidalMotion, reference: Reference, robot: RobotModel, config: ReplanConfig) -> Nominal:
+    def of(cls, motion: CentroidalMotion, reference: Reference, robot: RobotModel, horizon: float) -> Nominal:
         """The grid of a planned motion.
 
         Args:
             motion: the plan.
             reference: the same at the control ticks; its moves, and the angular momentum of its postures.
             robot: for the limits of its body.
-            config: horizon, longest step, margins of the body.
+            horizon: s; how long the motion rests at its end.
         """
-        fine, swings = _refined(motion, config), reference.swings
+        fine, swings = _refined(motion, horizon), reference.swings
         problem, mass = fine.problem, fine.problem.mass
         weight = mass * float(np.linalg.norm(GRAVITY))
         moving = problem.times[:-1] < motion.problem.times[-1] - 1e-9
@@ -112,15 +115,15 @@ class Nominal:
             share=load / np.maximum(load.sum(1, keepdims=True), 1e-9),
             landing=landing,
             torque=_torque_rows(fine, robot, weight),
-            rows=_body_rows(fine, robot, config),
+            rows=_body_rows(fine, robot),
             swings=swings,
         )
 
 
-def _refined(motion: CentroidalMotion, config: ReplanConfig) -> CentroidalMotion:
+def _refined(motion: CentroidalMotion, horizon: float) -> CentroidalMotion:
     """The same motion on a finer grid, with a rest at its end."""
     problem = motion.problem
-    count = np.maximum(np.ceil(problem.dt / config.max_dt - 1e-9).astype(int), 1)
+    count = np.maximum(np.ceil(problem.dt / MAX_DT - 1e-9).astype(int), 1)
     step = np.repeat(np.arange(problem.steps), count)
     dt = (problem.dt / count)[step]
     start = np.concatenate([[0.0], np.cumsum(dt)])[:-1]
@@ -130,12 +133,12 @@ def _refined(motion: CentroidalMotion, config: ReplanConfig) -> CentroidalMotion
     com = motion.com[step] + inside * (motion.linear_momentum[step] / problem.mass + 0.5 * inside * acceleration)
     share = inside / problem.dt[step, None]
     spin = (1.0 - share) * motion.angular_momentum[step] + share * motion.angular_momentum[step + 1]
-    rest = int(np.ceil(config.horizon / config.max_dt)) + 1
+    rest = int(np.ceil(horizon / MAX_DT)) + 1
     step = np.append(step, np.full(rest, problem.steps - 1))
     zero = np.zeros((rest + 1, 3))
     fine: CentroidalProblem = replace(
         problem,
-        dt=np.append(dt, np.full(rest, config.max_dt)),
+        dt=np.append(dt, np.full(rest, MAX_DT)),
         active=problem.active[step],
         position=problem.position[step],
         rotation=problem.rotation[step],
@@ -173,9 +176,9 @@ def _torque_rows(motion: CentroidalMotion, robot: RobotModel, weight: float) -> 
     return rows
 
 
-def _body_rows(motion: CentroidalMotion, robot: RobotModel, config: ReplanConfig) -> BodyRows:
+def _body_rows(motion: CentroidalMotion, robot: RobotModel) -> BodyRows:
     """Limits of legs and arms at the knots where they count."""
-    problem, body = motion.problem, config.body
+    problem = motion.problem
     knots, limbs, positions, rotations = knot_contacts(problem)
     base = rotation_about_z(problem.yaw)
     tables = []
@@ -199,7 +202,7 @@ def _body_rows(motion: CentroidalMotion, robot: RobotModel, config: ReplanConfig
         at, position, rotation = knots[here], positions[here], rotations[here]
 
         def stance(com, leg=leg, at=at, position=position, rotation=rotation):
-            found = leg_clearances(leg, leg_posture(leg, com, problem.yaw[at], position, rotation), body)
+            found = leg_clearances(leg, leg_posture(leg, com, problem.yaw[at], position, rotation), BODY)
             return np.stack([found[limit.name] for limit in PLANNED], -1)
 
         enter(at, limb, stance)
@@ -208,7 +211,7 @@ def _body_rows(motion: CentroidalMotion, robot: RobotModel, config: ReplanConfig
 
         def swing(com, leg=leg, at=at, tip=tip):
             length = np.linalg.norm(com + base[at] @ leg.hip_in_com - tip, axis=-1)
-            return (leg.max_length - body.length - length)[:, None]
+            return (leg.max_length - BODY.length - length)[:, None]
 
         enter(at, -1, swing)
     for limb in PALMS:
@@ -219,7 +222,7 @@ def _body_rows(motion: CentroidalMotion, robot: RobotModel, config: ReplanConfig
 
         def palm(com, arm=arm, at=at, position=position):
             length = np.linalg.norm(com + base[at] @ arm.shoulder_in_com - position, axis=-1)
-            return np.minimum(length - arm.min_reach, arm.max_reach - length)[:, None] - body.length
+            return np.minimum(length - arm.min_reach, arm.max_reach - length)[:, None] - BODY.length
 
         enter(at, limb, palm)
     knot, limb, clearance, gradient = (np.concatenate(column) for column in zip(*tables, strict=True))

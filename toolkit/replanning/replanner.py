@@ -2,24 +2,48 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from time import process_time
 
 import numpy as np
 
 from toolkit.centroidal.problem import STANDARD_GRAVITY
+from toolkit.control.corrector import PENDULUM_RATE, Cones, MotionTarget
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.limb_target import LimbTargets
-from toolkit.control.reference import Reference, Swing
-from toolkit.control.target import Cones, MotionTarget
+from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.replanning.config import ReplanConfig
-from toolkit.replanning.contacts import Situation
-from toolkit.replanning.kernel import solve
 from toolkit.replanning.nominal import Nominal
-from toolkit.replanning.problem import Replan, ReplanProblem
+from toolkit.replanning.replan import Replan, ReplanProblem
+from toolkit.replanning.situation import Situation
 from toolkit.robot.model import RobotModel
 from toolkit.world.surface import Surface
+
+PACE = 1.9  # of the plan's; a swing goes on at most so much faster where its contact is needed earlier...
+PACE_RATE = 12.0  # 1/s; ... changing its pace by this much per second...
+SHORTEST = 0.3  # s; ... unless the whole swing would be shorter than this: legs are not faster
+KEPT_FROM = 0.75  # of the swing, after which the landing point is kept: the foot comes down
+
+
+@dataclass(frozen=True)
+class ReplanCounts:
+    """How a run was replanned.
+
+    Attributes:
+        replans: how many.
+        replan_failures: those that gave no answer, so that the one before went on.
+        replan_departures: those that had to leave the plan.
+        replan_landings: those that moved a landing point.
+        replan_seconds: of the processor for one that departs, on average (never decides anything).
+    """
+
+    replans: int = 0
+    replan_failures: int = 0
+    replan_departures: int = 0
+    replan_landings: int = 0
+    replan_seconds: float = 0.0
 
 
 class Replanner:
@@ -29,9 +53,6 @@ class Replanner:
     itself is the optimum, which needs no solving.
 
     Attributes:
-        replans: how many. departures: how many of them had to leave the plan; failures: how many of these gave no
-            answer, so that the one before went on; moved: how many of these moved a landing point.
-        seconds: of all of them together (of the processor; never decides anything).
         com_shift: (3,) m; by how much the feet that bear the plan stand off it, where that is more than the deadband.
     """
 
@@ -62,8 +83,8 @@ class Replanner:
         self._goal: dict[int, np.ndarray] = {}
         self._ends: dict[int, float] = {}
         self._shift, self._rate, self._moved = np.zeros((3, 4, 3))
-        self.replans = self.departures = self.failures = self.moved = 0
-        self.seconds = 0.0
+        self._replans = self._departures = self._failures = self._landings = 0
+        self._seconds = 0.0
         self.com_shift = np.zeros(3)
 
     def update(
@@ -107,22 +128,22 @@ class Replanner:
         time, displaced = float(self._reference.times[index]), self._displaced(tracker)
         if time >= self._nominal.times[-1] - self._config.horizon:
             return
-        self.replans += 1
+        self._replans += 1
         if not displaced and self._divergence(index, dynamics) <= self._config.deadband:
             self._plan, self._ends = None, {}
             self._goal.clear()
             return
         began = process_time()
-        plan = self._problem.solve(self._situation(time, displaced, dynamics, tracker, cones), solve)
-        self.departures += 1
+        plan = self._problem.solve(self._situation(time, displaced, dynamics, tracker, cones))
+        self._departures += 1
         if plan is None:
-            self.failures += 1
+            self._failures += 1
         else:
             self._plan = plan
             self._goal.update(plan.landing)
             self._ends = plan.ends
-            self.moved += bool(plan.landing)
-        self.seconds += process_time() - began
+            self._landings += bool(plan.landing)
+        self._seconds += process_time() - began
 
     def _displaced(self, tracker: ContactTracker) -> bool:
         """Whether feet stand elsewhere than planned, or are on their way there, or to come earlier."""
@@ -142,7 +163,7 @@ class Replanner:
         """In m, from the plan moved with the feet that bear it."""
         off = dynamics.com - self._reference.com[index] - self.com_shift
         speed = dynamics.com_velocity - self._reference.com_velocity[index]
-        return float(np.linalg.norm(off + speed / self._config.frequency))
+        return float(np.linalg.norm(off + speed / PENDULUM_RATE))
 
     def _follow_feet(self, index: int, period: float) -> None:
         """Let the plan's shift follow the feet that bear it."""
@@ -150,12 +171,13 @@ class Replanner:
         total = float(load.sum())
         if total > 0.0:
             wanted = load @ self._moved[:2] / total
-            self.com_shift += period * self._config.frequency * (wanted - self.com_shift)
+            self.com_shift += period * PENDULUM_RATE * (wanted - self.com_shift)
 
     @property
-    def mean_seconds(self) -> float:
-        """Seconds of the processor for one that departs from the plan, on average; 0 before the first."""
-        return self.seconds / self.departures if self.departures else 0.0
+    def counts(self) -> ReplanCounts:
+        """What was done so far."""
+        mean = self._seconds / max(self._departures, 1)
+        return ReplanCounts(self._replans, self._failures, self._departures, self._landings, mean)
 
     def _situation(
         self, time: float, displaced: bool, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones
@@ -176,7 +198,7 @@ class Replanner:
             if tracker.state[limb] is LimbState.SWING and limb.is_foot:
                 earliest[index] = time + (swing.end - time - lead) / self._most(swing) + 0.02
                 landing[index] = min(max(self._ends.get(index, np.inf), earliest[index]), swing.end - lead)
-            if tracker.state[limb] is not LimbState.SWING or over > self._config.fraction:
+            if tracker.state[limb] is not LimbState.SWING or over > KEPT_FROM:
                 fixed[index] = self._goal.get(index, np.zeros(3))
             else:
                 moving[index] = self._shift[limb].copy()
@@ -198,7 +220,7 @@ class Replanner:
 
     def _most(self, swing: Swing) -> float:
         """Fastest pace of a swing."""
-        return min(max((swing.end - swing.start) / self._config.shortest, 1.0), self._config.pace)
+        return min(max((swing.end - swing.start) / SHORTEST, 1.0), PACE)
 
     def _track(self, time: float, target: MotionTarget) -> None:
         """Move what to track by the last replan, where it reaches so far; else with the feet that bear it."""
@@ -230,7 +252,7 @@ class Replanner:
             end = self._ends.get(event, swing.end)
             pace = (swing.end - time - tracker.lead[foot]) / max(end - time, 0.02) if end < swing.end else 1.0
             pace = min(max(pace, 1.0), self._most(swing))
-            change = self._config.pace_rate * period
+            change = PACE_RATE * period
             tracker.pace[foot] += min(max(pace - tracker.pace[foot], -change), change)
             goal = self._goal.get(event, self._shift[foot])
             left = max(min(end, swing.start + 0.9 * (swing.end - swing.start)) - 0.03 - time, 0.05)

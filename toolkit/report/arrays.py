@@ -15,7 +15,8 @@ import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.errors import InputError
-from toolkit.execution.result import Execution
+from toolkit.execution.result import Controls, Execution, Samples
+from toolkit.replanning.replanner import ReplanCounts
 from toolkit.report.checks import check_entries, read_checks
 from toolkit.report.files import plain
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
@@ -23,6 +24,7 @@ from toolkit.wholebody.trajectory import WholeBodyTrajectory
 T = TypeVar("T")
 
 _REPLAY = ("timestep", "qpos0", "qvel0", "ctrl", "qpos", "tick_times")  # kept in double precision
+_GROUPS = {"controls": Controls, "samples": Samples, "replanning": ReplanCounts}
 
 
 def flatten(value: Any, prefix: str) -> dict[str, np.ndarray]:
@@ -105,19 +107,18 @@ def write_execution(path: Path, execution: Execution) -> None:
     unplanned contacts and checks are JSON text.
     """
     arrays: dict[str, np.ndarray] = {}
-    for item in fields(execution):
-        value = getattr(execution, item.name)
-        if item.name in ("scene", "final_qpos") or value is None:
+    for name, value in execution.named().items():
+        if name == "final_qpos" or value is None:
             continue
-        if item.name == "qpos":
-            value = np.concatenate([np.atleast_2d(value), execution.final_qpos[None]])
-        elif item.name == "checks":
+        if name == "qpos":
+            value = np.concatenate([np.atleast_2d(value), execution.controls.final_qpos[None]])
+        elif name == "checks":
             value = json.dumps(plain(check_entries(value)))
-        elif item.name in ("touchdowns", "unplanned_contacts"):
+        elif name in ("touchdowns", "unplanned_contacts"):
             value = json.dumps(plain(value))
         array = np.asarray(value)
-        single = isinstance(value, np.ndarray) and array.dtype == float and item.name not in _REPLAY
-        arrays[item.name] = array.astype(np.float32) if single else array
+        single = isinstance(value, np.ndarray) and array.dtype == float and name not in _REPLAY
+        arrays[name] = array.astype(np.float32) if single else array
     np.savez(path, **arrays)  # type: ignore[arg-type]
 
 
@@ -128,27 +129,34 @@ def read_execution(path: Path, scene: mujoco.MjModel) -> Execution:
         InputError: the file cannot be read or an array is missing.
     """
     arrays = _load(path)
-    hints = typing.get_type_hints(Execution)
-    values: dict[str, Any] = {"scene": scene}
     try:
-        for item in fields(Execution):
-            if item.name in ("scene", "final_qpos") or (item.name not in arrays and _has_default(item)):
-                continue
-            array = arrays[item.name]
-            if item.name in ("touchdowns", "unplanned_contacts", "checks"):
-                entries = json.loads(array.item())
-                values[item.name] = tuple(tuple(x) if isinstance(x, list) else x for x in entries)
-            elif hints[item.name] in (float, int, bool, str):
-                values[item.name] = hints[item.name](array.item())
-            elif typing.get_origin(hints[item.name]) is tuple:
-                values[item.name] = tuple(array.tolist())
-            else:
-                values[item.name] = array.astype(float) if array.dtype == np.float32 else array
+        qpos = arrays.pop("qpos")
+        arrays |= {"qpos": qpos[:-1], "final_qpos": qpos[-1]}
+        groups = {name: _read_fields(kind, arrays) for name, kind in _GROUPS.items()}
+        values = _read_fields(Execution, arrays, skip=("scene", *groups))
     except KeyError as error:
         raise InputError(f"{path}: has no array {error}; write it anew by running the plan again") from error
     values["checks"] = read_checks(values["checks"])
-    values["qpos"], values["final_qpos"] = values["qpos"][:-1], values["qpos"][-1]
-    return Execution(**values)
+    return Execution(scene=scene, **{name: _GROUPS[name](**group) for name, group in groups.items()}, **values)
+
+
+def _read_fields(kind: type, arrays: Mapping[str, np.ndarray], skip: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Values of a dataclass' fields."""
+    hints, values = typing.get_type_hints(kind), {}
+    for item in fields(kind):
+        if item.name in skip or (item.name not in arrays and _has_default(item)):
+            continue
+        array = arrays[item.name]
+        if item.name in ("touchdowns", "unplanned_contacts", "checks"):
+            entries = json.loads(array.item())
+            values[item.name] = tuple(tuple(x) if isinstance(x, list) else x for x in entries)
+        elif hints[item.name] in (float, int, bool, str):
+            values[item.name] = hints[item.name](array.item())
+        elif typing.get_origin(hints[item.name]) is tuple:
+            values[item.name] = tuple(array.tolist())
+        else:
+            values[item.name] = array.astype(float) if array.dtype == np.float32 else array
+    return values
 
 
 def _has_default(item: Field) -> bool:

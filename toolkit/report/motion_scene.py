@@ -105,9 +105,9 @@ def draw_centres(
     if motion is not None and motion.feasible:
         times = np.arange(0.0, motion.problem.times[-1] + 1 / rate, 1 / rate)
         draw_com(stream, "optimised", OPTIMISED, np.array([motion.sample(float(time))[0] for time in times]), times)
-    if execution is not None and len(execution.tick_times):
-        rows = frames(execution.tick_times, rate)
-        draw_com(stream, "executed", EXECUTED, execution.com[rows], execution.tick_times[rows])
+    if execution is not None and len(execution.samples.tick_times):
+        rows = frames(execution.samples.tick_times, rate)
+        draw_com(stream, "executed", EXECUTED, execution.samples.com[rows], execution.samples.tick_times[rows])
 
 
 def stance_times(schedule: ContactSchedule) -> np.ndarray:
@@ -150,13 +150,13 @@ def draw_held(
 def draw_made_contacts(stream: rr.RecordingStream, execution: Execution, half_sizes: np.ndarray) -> None:
     """Draw where limbs really made contact, white outlines that appear at each touchdown and stay."""
     made: list[np.ndarray] = []
-    times = execution.tick_times
-    start = [limb for limb in Limb if np.linalg.norm(execution.wrench[:1, limb, :3]) > LEAST_FORCE]
+    times = execution.samples.tick_times
+    start = [limb for limb in Limb if np.linalg.norm(execution.samples.wrench[:1, limb, :3]) > LEAST_FORCE]
     events = [(0.0, limb) for limb in start]
     events += [(float(touch["time"]), limb_of(touch["limb"])) for touch in execution.touchdowns if touch.get("time")]
     for time, limb in sorted(events):
         row = min(int(np.searchsorted(times, time)), len(times) - 1)
-        pose = execution.limb_pose[row, limb]
+        pose = execution.samples.limb_pose[row, limb]
         if not np.isfinite(pose).all():
             continue
         quad = patch_corners(Pose.from_quaternion(pose[:3], pose[3:]), half_sizes[limb])

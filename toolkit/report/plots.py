@@ -25,7 +25,7 @@ def draw_plots(path: Path, execution: Execution, schedule: ContactSchedule | Non
     """
     figure = Figure(figsize=(11, 9), layout="constrained")
     panels = figure.subplots(3, 2, sharex=True)
-    if len(execution.tick_times):
+    if len(execution.samples.tick_times):
         _draw(panels, execution, schedule)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
@@ -34,26 +34,27 @@ def draw_plots(path: Path, execution: Execution, schedule: ContactSchedule | Non
 
 def _draw(panels: np.ndarray, execution: Execution, schedule: ContactSchedule | None) -> None:
     """Fill the six panels."""
-    times = execution.tick_times
+    samples = execution.samples
+    times = samples.tick_times
     (com, error), (momentum, margin), (torque, slip) = panels
-    origin = execution.com_planned[0]
+    origin = samples.com_planned[0]
     for axis, color in enumerate(AXES):
-        com.plot(*thinned(times, execution.com_planned[:, axis] - origin[axis]), "--", color=unit(color), lw=1)
-        com.plot(*thinned(times, execution.com[:, axis] - origin[axis]), color=unit(color), label="xyz"[axis])
-        momentum.plot(*thinned(times, execution.momentum_planned[:, axis]), "--", color=unit(color), lw=1)
-        momentum.plot(*thinned(times, execution.momentum[:, axis]), color=unit(color), label="xyz"[axis])
+        com.plot(*thinned(times, samples.com_planned[:, axis] - origin[axis]), "--", color=unit(color), lw=1)
+        com.plot(*thinned(times, samples.com[:, axis] - origin[axis]), color=unit(color), label="xyz"[axis])
+        momentum.plot(*thinned(times, samples.momentum_planned[:, axis]), "--", color=unit(color), lw=1)
+        momentum.plot(*thinned(times, samples.momentum[:, axis]), color=unit(color), label="xyz"[axis])
     com.set(title="CoM from the start (planned dashed)", ylabel="[m]")
     momentum.set(title="linear momentum (planned dashed)", ylabel="[N s]")
-    distance = 1e3 * np.linalg.norm(execution.com - execution.com_planned, axis=1)
+    distance = 1e3 * np.linalg.norm(samples.com - samples.com_planned, axis=1)
     error.plot(*thinned(times, distance, worst="max"), color=unit(OPTIMISED), label="distance")
     error.set(title=f"CoM error, RMS {1e3 * execution.com_rms_error:.1f} mm", ylabel="[mm]", ylim=(0, None))
     for limb in Limb:
-        values = 1e3 * execution.cop_margin[:, limb]
+        values = 1e3 * samples.cop_margin[:, limb]
         if np.isfinite(values).any():
             margin.plot(*thinned(times, values, worst="min"), color=unit(LIMB_COLORS[limb]), label=limb.label)
     margin.axhline(0, color=unit(LIMIT), lw=0.8)
     margin.set(title="CoP to the edge of the patch", ylabel="[mm]")
-    torque.plot(*thinned(times, execution.torque_ratio, worst="max"), color=unit(EXECUTED), label="largest joint")
+    torque.plot(*thinned(times, samples.torque_ratio, worst="max"), color=unit(EXECUTED), label="largest joint")
     torque.axhline(1, color=unit(LIMIT), lw=0.8, label="limit")
     torque.set(title="torque / limit", ylim=(0, 1.1))
     if execution.slip and schedule is not None:

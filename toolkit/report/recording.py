@@ -76,7 +76,7 @@ def write_recording(
         sequence = solution.sequence
     if schedule is None and sequence is not None:
         schedule = ContactSchedule.of(sequence)
-    executed = execution is not None and len(execution.tick_times) > 0
+    executed = execution is not None and len(execution.samples.tick_times) > 0
     feasible = motion is not None and motion.feasible
 
     stream = start_recording(path, APPLICATION, f"{robot.name} in {world.name}")
@@ -93,17 +93,17 @@ def write_recording(
         predicted = solution.com if solution is not None else None
         draw_centres(stream, schedule, predicted, motion, execution if executed else None, rate)
         if execution is not None and executed:
-            rows = frames(execution.tick_times, rate)
-            times, pose = execution.tick_times[rows], execution.limb_pose[rows]
+            samples, rows = execution.samples, frames(execution.samples.tick_times, rate)
+            times, pose = samples.tick_times[rows], samples.limb_pose[rows]
             draw_made_contacts(stream, execution, robot.half_sizes)
-            draw_forces(stream, "planned", times, execution.wrench_planned[rows], pose, 0.008)
-            draw_forces(stream, "measured", times, execution.wrench[rows], pose, 0.018)
+            draw_forces(stream, "planned", times, samples.wrench_planned[rows], pose, 0.008)
+            draw_forces(stream, "measured", times, samples.wrench[rows], pose, 0.018)
             plot_execution(stream, execution, trajectory, schedule)
             for time, text in touchdown_entries(execution):
                 stream.set_time(TIMELINE, duration=time)
                 stream.log("events", rr.TextLog(text))
             if execution.fell:
-                stream.set_time(TIMELINE, duration=float(execution.tick_times[-1]))
+                stream.set_time(TIMELINE, duration=float(execution.samples.tick_times[-1]))
                 stream.log("events", rr.TextLog(execution.fall_reason, level=rr.TextLogLevel.ERROR))
             stream.reset_time()
         elif motion is not None and motion.feasible:
@@ -128,8 +128,8 @@ def _draw_robot(
 ) -> None:
     """Draw the robot as executed, else as planned, else standing at the start."""
     if execution is not None:
-        rows = frames(execution.tick_times, rate)
-        draw_motion(stream, execution.scene, execution.tick_times[rows], execution.qpos[rows])
+        rows = frames(execution.samples.tick_times, rate)
+        draw_motion(stream, execution.scene, execution.samples.tick_times[rows], execution.samples.qpos[rows])
     elif trajectory is not None and len(trajectory.times) and np.isfinite(trajectory.qpos).all():
         rows = frames(trajectory.times, rate)
         draw_motion(stream, robot.mujoco_model, trajectory.times[rows], trajectory.qpos[rows])

@@ -192,16 +192,16 @@ def _write_pictures(folder: Path, result: ResultLike, args: Namespace) -> None:
         return
     execution = trial.execution
     if getattr(args, "pictures", False):
-        executed = execution.com if execution is not None else None
+        executed = execution.samples.com if execution is not None else None
         draw_top_view(folder / "plan.png", result.world, result.robot, trial.solution, trial.motion, executed)
         if execution is not None:
             draw_plots(folder / "execution.png", execution, trial.schedule)
-    if execution is None or not len(execution.tick_times):
+    if execution is None or not len(execution.samples.tick_times):
         return
     contacts = list(trial.solution.sequence.start.contacts)
     contacts += [t.contact for t in trial.solution.sequence.transitions if t.contact is not None]
-    patches = Patches(contacts, result.robot.half_sizes)
+    patches, samples = Patches(contacts, result.robot.half_sizes), execution.samples
     if getattr(args, "pictures", False):
-        strip(execution.scene, execution.qpos, execution.tick_times, folder / "strip.png", patches=patches)
+        strip(execution.scene, samples.qpos, samples.tick_times, folder / "strip.png", patches=patches)
     if getattr(args, "video", False):
-        video(execution.scene, execution.qpos, execution.tick_times, folder / "video.mp4", patches=patches)
+        video(execution.scene, samples.qpos, samples.tick_times, folder / "video.mp4", patches=patches)

@@ -248,9 +248,11 @@ def _dynamics(motion: CentroidalMotion | None) -> dict[str, Any]:
 
 def _execution(execution: Execution | None) -> dict[str, Any]:
     """Figures of the simulated execution."""
-    figures = _figures(EXECUTION, execution)
-    if execution is not None:
-        figures["unplanned_contacts"] = len(execution.unplanned_contacts)
-        figures["unplanned_contact_geoms"] = [list(pair) for pair in execution.unplanned_contacts]
-        figures["fall_reason"] = execution.fall_reason
+    if execution is None:
+        return _figures(EXECUTION, None)
+    named = execution.named()
+    figures = {name: named[name] for name in EXECUTION}
+    figures["unplanned_contacts"] = len(execution.unplanned_contacts)
+    figures["unplanned_contact_geoms"] = [list(pair) for pair in execution.unplanned_contacts]
+    figures["fall_reason"] = execution.fall_reason
     return figures

@@ -73,28 +73,26 @@ def plot_execution(
     schedule: ContactSchedule | None,
 ) -> None:
     """Send every series of a simulated run; what needs the trajectory or the schedule only where there is one."""
-    times = execution.tick_times
+    samples = execution.samples
+    times = samples.tick_times
     if not len(times):
         return
-    error = np.linalg.norm(execution.com - execution.com_planned, axis=1)
+    error = np.linalg.norm(samples.com - samples.com_planned, axis=1)
     plot(stream, "series/tracking/com", *thinned(times, 1e3 * error, worst="max"), "CoM", EXECUTED)
     if trajectory is not None:
         for limb, values in limb_errors(execution, trajectory).items():
             curve = thinned(times, 1e3 * values, worst="max")
             plot(stream, f"series/tracking/{limb.label}", *curve, limb.label, LIMB_COLORS[limb])
     for part, name in ((slice(0, 3), "linear"), (slice(3, 6), "angular")):
-        for source, values, width in (
-            ("planned", execution.momentum_planned, 1.0),
-            ("measured", execution.momentum, 2.0),
-        ):
+        for source, values, width in (("planned", samples.momentum_planned, 1.0), ("measured", samples.momentum, 2.0)):
             names = [f"{axis} {source}" for axis in "xyz"]
             plot(stream, f"series/{name}_momentum/{source}", *thinned(times, values[:, part]), names, AXES, width)
     for limb in Limb:
         mine = LIMB_COLORS[limb]
-        if np.isfinite(execution.cop_margin[:, limb]).any():
-            curve = thinned(times, 1e3 * execution.cop_margin[:, limb], worst="min")
+        if np.isfinite(samples.cop_margin[:, limb]).any():
+            curve = thinned(times, 1e3 * samples.cop_margin[:, limb], worst="min")
             plot(stream, f"series/cop_margin/{limb.label}", *curve, limb.label, mine)
-        for source, wrench, width in (("planned", execution.wrench_planned, 1.0), ("measured", execution.wrench, 2.0)):
+        for source, wrench, width in (("planned", samples.wrench_planned, 1.0), ("measured", samples.wrench, 2.0)):
             force = np.linalg.norm(wrench[:, limb, :3], axis=1)
             if force.max() > LEAST_FORCE:
                 name = f"{limb.label} {source}"
@@ -102,7 +100,7 @@ def plot_execution(
     plot(
         stream,
         "series/torque_ratio/largest",
-        *thinned(times, execution.torque_ratio, worst="max"),
+        *thinned(times, samples.torque_ratio, worst="max"),
         "torque / limit",
         EXECUTED,
     )
@@ -124,16 +122,16 @@ def limb_errors(execution: Execution, trajectory: WholeBodyTrajectory) -> dict[L
     """(C,) m distance of each measured patch from the trajectory's, for limbs that have both."""
     errors = {}
     for limb in Limb:
-        planned, measured = trajectory.limb_pose[:, limb, :3], execution.limb_pose[:, limb, :3]
+        planned, measured = trajectory.limb_pose[:, limb, :3], execution.samples.limb_pose[:, limb, :3]
         if np.isfinite(planned).any() and np.isfinite(measured).any():
-            axes = [np.interp(execution.tick_times, trajectory.times, planned[:, axis]) for axis in range(3)]
+            axes = [np.interp(execution.samples.tick_times, trajectory.times, planned[:, axis]) for axis in range(3)]
             errors[limb] = np.linalg.norm(measured - np.column_stack(axes), axis=1)
     return errors
 
 
 def slip_steps(execution: Execution, schedule: ContactSchedule) -> tuple[np.ndarray, np.ndarray]:
     """Slip of each stance: (k + 1,) s at which it begins, and the end of the run; (k + 1,) m, the last one repeated."""
-    end = float(execution.tick_times[-1])
+    end = float(execution.samples.tick_times[-1])
     edges = np.clip([*stance_times(schedule), end], 0.0, end)
     count = min(len(execution.slip), len(edges) - 1)
     return edges[: count + 1], np.array([*execution.slip[:count], execution.slip[count - 1]])
@@ -151,11 +149,11 @@ def send_contact_states(
                 lanes.setdefault((limb, "planned"), []).append((phase.start, limb in held))
         for limb in Limb:
             lanes[limb, "planned"].append((schedule.duration, False))
-    if execution is not None and len(execution.tick_times):
-        force = np.linalg.norm(execution.wrench[..., :3], axis=-1) > LEAST_FORCE
+    if execution is not None and len(execution.samples.tick_times):
+        force = np.linalg.norm(execution.samples.wrench[..., :3], axis=-1) > LEAST_FORCE
         for limb in Limb:
-            samples = zip(execution.tick_times.tolist(), force[:, limb].tolist(), strict=True)
-            lanes[limb, "measured"] = [*samples, (float(execution.tick_times[-1]), False)]
+            samples = zip(execution.samples.tick_times.tolist(), force[:, limb].tolist(), strict=True)
+            lanes[limb, "measured"] = [*samples, (float(execution.samples.tick_times[-1]), False)]
     for (limb, source), samples in lanes.items():
         if not any(held for _, held in samples):
             continue

@@ -13,7 +13,6 @@ from rich.text import Text
 
 from toolkit.report.colors import FOOT_SURFACE, PALM_SURFACE, START
 from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, start_recording
-from toolkit.world.polygon import region_of
 from toolkit.world.world import World
 
 
@@ -31,7 +30,7 @@ def surface_table(world: World) -> Table:
             str(surface.index),
             Text(surface.geom),
             " ".join(f"{value:.2f}" for value in np.round(surface.pose.position, 2) + 0.0),
-            f"{region_of(surface).area:.4f}",
+            f"{surface.region.area:.4f}",
             f"{np.degrees(np.arccos(np.clip(surface.normal[2], -1, 1))):.1f}",
             f"{surface.friction:g}",
             str(len(surface.pieces)),

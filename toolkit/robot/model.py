@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -133,6 +134,13 @@ class RobotModel:
         """(k,) int; indices into `joint_names` of the joints from the base to a limb, in order."""
         model = self.mujoco_model
         return np.array(joints_to(model, model.body(self.limbs[limb].body).id), int) - 1  # joint 0 is the free one
+
+    def carrying(self, limbs: Iterable[Limb]) -> np.ndarray:
+        """(n,) bool; joints from the base to any of some limbs."""
+        joints = np.zeros(len(self.joint_names), bool)
+        for limb in limbs:
+            joints[self.joints_to(limb)] = True
+        return joints
 
     def arm_joints(self, palm: Limb) -> np.ndarray:
         """(k,) int; indices into `joint_names` of the joints from the trunk to a palm, in order."""

@@ -10,50 +10,30 @@ and are left to the final collision check.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 
 from toolkit.geometry.limb import PALMS, Limb
-from toolkit.robot.chain import joints_to
 from toolkit.robot.model import RobotModel
 from toolkit.world.scene import compose_scene
 from toolkit.world.world import World
 
-
-@dataclass(frozen=True)
-class AvoidanceConfig:
-    """Settings of the dampers.
-
-    Attributes:
-        enabled: whether arms avoid anything.
-        notice: m; distances below this are looked at.
-        safe_world, safe_self: m; wanted distance of an arm from the world and from the rest of the robot.
-        time: s; tau above.
-        max_rows: dampers at a time, the nearest ones.
-    """
-
-    enabled: bool = True
-    notice: float = 0.12
-    safe_world: float = 0.06
-    safe_self: float = 0.012
-    time: float = 0.15
-    max_rows: int = 16
+NOTICE = 0.12  # m; distances below this are looked at
+SAFE_WORLD, SAFE_SELF = 0.06, 0.012  # m; wanted distance of an arm from the world and from the rest of the robot
+TIME = 0.15  # s; tau above: slower than a tick by far, faster than a swing
+MAX_ROWS = 16  # dampers at a time, the nearest ones: each costs the solver, and few bind
 
 
 class ArmAvoidance:
     """Distances of the arms in the composed scene, tick after tick."""
 
-    def __init__(self, robot: RobotModel, world: World, config: AvoidanceConfig):
+    def __init__(self, robot: RobotModel, world: World):
         """Compose the scene once.
 
         Args:
             robot: the robot; one without palms has no arms to speak of.
             world: what to avoid.
-            config: settings.
         """
-        self.config = config
         self.model = compose_scene(robot, world)
         self.data = mujoco.MjData(self.model)
         self.static = self.model.body_weldid[self.model.geom_bodyid] == 0
@@ -62,12 +42,12 @@ class ArmAvoidance:
         self.hand = {limb: self.model.geom_bodyid == body for limb, body in hands.items()}
         self.model.geom_margin[:] = 0.0
         self.model.geom_gap[:] = 0.0
-        self.model.geom_margin[self.arm_of >= 0] = config.notice
+        self.model.geom_margin[self.arm_of >= 0] = NOTICE
         self.box = self.model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
         solid = self.box & ((self.model.geom_contype != 0) | (self.model.geom_conaffinity != 0))
         self.boxes, self.arm_boxes = np.flatnonzero(solid), np.flatnonzero(solid & (self.arm_of >= 0))
         self.near = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
-        self.resting = self._pairs_below(robot.home, config.safe_self)
+        self.resting = self._pairs_below(robot.home, SAFE_SELF)
 
     def rows(self, qpos: np.ndarray, drift: np.ndarray, tick: float, reaching: set[Limb]) -> tuple:
         """Dampers `A dq <= b` over the joint displacements of one tick.
@@ -81,17 +61,17 @@ class ArmAvoidance:
         Returns:
             A (k, n) and b (k,).
         """
-        model, data, config = self.model, self.data, self.config
+        model, data = self.model, self.data
         self._place(qpos)
         found = []
         for first, second, distance, normal, point in self._contacts():
             if self._ignored(first, second, reaching):
                 continue
             world = self.static[first] or self.static[second]
-            safe = config.safe_world if world else config.safe_self
+            safe = SAFE_WORLD if world else SAFE_SELF
             found.append((distance - safe, first, second, normal, point))
         found.sort(key=lambda item: item[0])
-        found = found[: config.max_rows]
+        found = found[:MAX_ROWS]
         matrix, bound = np.zeros((len(found), model.nv - 6)), np.zeros(len(found))
         before, after = self.near
         for row, (room, first, second, normal, point) in enumerate(found):
@@ -99,7 +79,7 @@ class ArmAvoidance:
             mujoco.mj_jac(model, data, after, None, point, model.geom_bodyid[second])
             rate = normal @ (after - before)
             matrix[row] = -rate[6:]
-            bound[row] = room * tick / config.time + rate[:6] @ drift
+            bound[row] = room * tick / TIME + rate[:6] @ drift
         return matrix, bound
 
     def _place(self, qpos: np.ndarray) -> None:
@@ -109,7 +89,7 @@ class ArmAvoidance:
         mujoco.mj_collision(self.model, self.data)
 
     def _contacts(self):
-        """Pairs of geoms within `notice`: geoms, distance, normal from first to second, nearest point of each pair."""
+        """Pairs of geoms within `NOTICE`: geoms, distance, normal from first to second, nearest point of each pair."""
         contact = self.data.contact
         nearest: dict[tuple[int, int], int] = {}
         for index, (first, second) in enumerate(contact.geom.tolist()):
@@ -124,14 +104,14 @@ class ArmAvoidance:
 
     def _box_pairs(self):
         """The same for boxes, whose collision function sees pairs apart only face to face, not edge to edge."""
-        model, data, notice = self.model, self.data, self.config.notice
+        model, data = self.model, self.data
         others, ends = self.boxes, np.zeros(6)
         for arm in self.arm_boxes:
             apart = np.linalg.norm(data.geom_xpos[others] - data.geom_xpos[arm], axis=1)
-            near = apart < notice + model.geom_rbound[others] + model.geom_rbound[arm]
+            near = apart < NOTICE + model.geom_rbound[others] + model.geom_rbound[arm]
             for other in others[near & (self.arm_of[others] != self.arm_of[arm])].tolist():
-                distance = mujoco.mj_geomDistance(model, data, int(arm), other, notice, ends)
-                if distance < notice and abs(distance) > 1e-9:
+                distance = mujoco.mj_geomDistance(model, data, int(arm), other, NOTICE, ends)
+                if distance < NOTICE and abs(distance) > 1e-9:
                     yield int(arm), other, distance, (ends[3:] - ends[:3]) / distance, 0.5 * (ends[:3] + ends[3:])
 
     def _ignored(self, first: int, second: int, reaching: set[Limb]) -> bool:
@@ -156,14 +136,10 @@ class ArmAvoidance:
 
 def _arm_of_geoms(robot: RobotModel, model: mujoco.MjModel) -> np.ndarray:
     """(ngeom,) int; the palm whose arm a geom belongs to, -1 elsewhere. The trunk, below both arms, is no arm."""
-    chains = {limb: joints_to(model, model.body(robot.limbs[limb].body).id) for limb in robot.limbs}
     arm = np.full(model.nbody, -1)
-    for palm in (limb for limb in PALMS if limb in chains):
-        others = {joint for limb, chain in chains.items() if limb != palm for joint in chain}
-        own = [joint for joint in chains[palm] if joint not in others]
-        if own:
-            root = int(model.jnt_bodyid[own[0]])
-            for body in range(root, model.nbody):
-                if body == root or arm[model.body_parentid[body]] == palm:
-                    arm[body] = palm
+    for palm in (limb for limb in PALMS if limb in robot.limbs):
+        root = int(model.jnt_bodyid[model.joint(robot.joint_names[robot.arm_joints(palm)[0]]).id])
+        for body in range(root, model.nbody):
+            if body == root or arm[model.body_parentid[body]] == palm:
+                arm[body] = palm
     return arm[model.geom_bodyid]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -10,39 +10,21 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.collision import CollisionConfig, first_collision
+from toolkit.wholebody.collision import first_collision
 from toolkit.wholebody.finding import Finding
 from toolkit.wholebody.limb_paths import LimbPaths
-from toolkit.wholebody.torque import inverse_dynamics, velocities
+from toolkit.wholebody.motion_dynamics import inverse_dynamics, velocities
 from toolkit.world.world import World
 
-
-@dataclass(frozen=True)
-class CheckConfig:
-    """What a whole-body motion may deviate by, and what it may ask of the joints.
-
-    Attributes:
-        com: m; distance of the CoM from the plan.
-        foot, palm: m; distance of a patch in contact from its planned place.
-        swing: m; the same for a foot in the air.
-        orientation: rad; of a sole from its planned orientation, or of a palm's normal.
-        range_tolerance: rad; beyond a joint's range.
-        velocity_ratio, torque_ratio: of the joint limits.
-        free_torque_ratio: the same torque for joints that bear no contact: a head or a free arm that is a little late
-            harms nothing, and the controller keeps its torque within the limit.
-        collision: see the class.
-    """
-
-    com: float = 0.02
-    foot: float = 0.005
-    palm: float = 0.01
-    swing: float = 0.02
-    orientation: float = 0.03
-    range_tolerance: float = 1e-3
-    velocity_ratio: float = 1.0
-    torque_ratio: float = 1.0
-    free_torque_ratio: float = 4.0
-    collision: CollisionConfig = field(default_factory=CollisionConfig)
+# What a whole-body motion may deviate by from its plan.
+COM_ERROR = 0.02  # m; of the CoM
+FOOT_ERROR, PALM_ERROR = 0.005, 0.01  # m; of a patch in contact
+SWING_ERROR = 0.02  # m; of a foot in the air
+ORIENTATION_ERROR = 0.03  # rad; of a sole, or of a palm's normal
+RANGE_TOLERANCE = 1e-3  # rad; beyond a joint's range: rounding of the solver
+FREE_TORQUE_RATIO = 4.0
+"""Of the torque limit, for joints that bear no contact: a head or a free arm that is a little late harms nothing, and
+the controller keeps its torque within the limit."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +59,6 @@ def check(
     motion: CentroidalMotion,
     times: np.ndarray,
     qpos: np.ndarray,
-    config: CheckConfig,
 ) -> CheckReport:
     """Check a motion.
 
@@ -88,12 +69,12 @@ def check(
         motion: planned CoM and wrenches.
         times: (T,) s, uniform.
         qpos: (T, 7 + n).
-        config: thresholds.
     """
-    position, orientation, tracking = _tracking(robot, paths, motion, times, qpos, config)
+    position, orientation, tracking = _tracking(robot, paths, motion, times, qpos)
     torque, residual = inverse_dynamics(robot, motion, times, qpos)
-    limits = _limits(robot, times, qpos, torque, _bearing(robot, motion), config)
-    hit = first_collision(robot, world, times, qpos, config.collision)
+    bearing = robot.carrying(limb for limb in robot.limbs if motion.problem.active[:, limb].any())
+    limits = _limits(robot, times, qpos, torque, bearing)
+    hit = first_collision(robot, world, times, qpos)
     findings = tracking + limits + ([hit] if hit else [])
     return CheckReport(position, orientation, torque, residual, not limits, tuple(findings))
 
@@ -104,7 +85,6 @@ def _tracking(
     motion: CentroidalMotion,
     times: np.ndarray,
     qpos: np.ndarray,
-    config: CheckConfig,
 ) -> tuple[float, float, list[Finding]]:
     """Largest position and orientation error over CoM and contacts, and the reasons to fail."""
     model = robot.mujoco_model
@@ -123,7 +103,7 @@ def _tracking(
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         error = float(np.linalg.norm(data.subtree_com[0] - motion.sample(time)[0]))
-        position = max(position, note("the CoM", "m", error, config.com, time))
+        position = max(position, note("the CoM", "m", error, COM_ERROR, time))
         for limb, item in robot.limbs.items():
             sample = paths.sample(limb, time)
             if sample.pose is None or not (limb.is_foot or sample.in_contact):
@@ -131,12 +111,12 @@ def _tracking(
             site = data.site(item.site)
             error = float(np.linalg.norm(site.xpos - sample.pose.position))
             if not sample.in_contact:
-                note(f"{limb.label} in the air", "m", error, config.swing, time)
+                note(f"{limb.label} in the air", "m", error, SWING_ERROR, time)
                 continue
             turn = _angle(limb, site.xmat.reshape(3, 3), sample.pose.rotation)
-            limit = config.foot if limb.is_foot else config.palm
+            limit = FOOT_ERROR if limb.is_foot else PALM_ERROR
             position = max(position, note(limb.label, "m", error, limit, time))
-            orientation = max(orientation, note(limb.label, "rad", turn, config.orientation, time))
+            orientation = max(orientation, note(limb.label, "rad", turn, ORIENTATION_ERROR, time))
     findings = [
         Finding(f"{thing} is {error:.3g} {unit} off its plan at {time:.2f} s (limit {limit:.3g} {unit})", float(time))
         for (thing, unit), (error, limit, time) in worst.items()
@@ -153,38 +133,28 @@ def _angle(limb: Limb, actual: np.ndarray, planned: np.ndarray) -> float:
     return float(2.0 * np.arcsin(min(np.linalg.norm(actual - planned) / (2.0 * np.sqrt(2.0)), 1.0)))
 
 
-def _bearing(robot: RobotModel, motion: CentroidalMotion) -> np.ndarray:
-    """(n,) bool; joints between the base and a limb that is in contact at any time."""
-    bearing = np.zeros(len(robot.joint_names), bool)
-    for limb in robot.limbs:
-        if motion.problem.active[:, limb].any():
-            bearing[robot.joints_to(limb)] = True
-    return bearing
-
-
 def _limits(
     robot: RobotModel,
     times: np.ndarray,
     qpos: np.ndarray,
     torque: np.ndarray,
     bearing: np.ndarray,
-    config: CheckConfig,
 ) -> list[Finding]:
     """Reasons to fail: range, velocity, torque."""
     findings = []
     joints = qpos[:, 7:]
     beyond = np.maximum(robot.lower - joints, joints - robot.upper)
     row, column = _worst(beyond)
-    if not beyond[row, column] <= config.range_tolerance:
+    if not beyond[row, column] <= RANGE_TOLERANCE:
         text = (
             f"joint {robot.joint_names[column]} is at {joints[row, column]:.3f} rad at {times[row]:.2f} s "
             f"(range {robot.lower[column]:.3f} to {robot.upper[column]:.3f} rad)"
         )
         findings.append(Finding(text, float(times[row])))
-    torque_ratio = np.where(bearing, config.torque_ratio, config.free_torque_ratio)
+    torque_ratio = np.where(bearing, 1.0, FREE_TORQUE_RATIO)
     speed = velocities(robot.mujoco_model, times, qpos)[:, 6:]
     for values, limit, allowed, what, unit in (
-        (speed, robot.velocity_limit, np.full(len(bearing), config.velocity_ratio), "turns at", "rad/s"),
+        (speed, robot.velocity_limit, np.ones(len(bearing)), "turns at", "rad/s"),
         (torque, robot.torque_limit, torque_ratio, "needs", "N m"),
     ):
         row, column = _worst(np.abs(values) / (allowed * limit))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 
@@ -12,27 +10,13 @@ from toolkit.wholebody.finding import Finding
 from toolkit.world.scene import compose_scene
 from toolkit.world.world import World
 
-
-@dataclass(frozen=True)
-class CollisionConfig:
-    """What counts as a collision.
-
-    Attributes:
-        rate: Hz; at most this many postures per second are looked at.
-        patch_depth: m; a limb's last link may press this deep into the world: it makes the planned contacts.
-        body_depth: m; any other link into the world.
-        self_depth: m; links of the robot into each other.
-    """
-
-    rate: float = 25.0
-    patch_depth: float = 4e-3
-    body_depth: float = 1e-3
-    self_depth: float = 2e-3
+RATE = 25.0  # Hz; at most this many postures per second are looked at: at 1 m/s a limb moves 4 cm between two
+PATCH_DEPTH = 4e-3  # m; a limb's last link may press this deep into the world: it makes the planned contacts
+BODY_DEPTH = 1e-3  # m; any other link into the world
+SELF_DEPTH = 2e-3  # m; links of the robot into each other
 
 
-def first_collision(
-    robot: RobotModel, world: World, times: np.ndarray, qpos: np.ndarray, config: CollisionConfig
-) -> Finding | None:
+def first_collision(robot: RobotModel, world: World, times: np.ndarray, qpos: np.ndarray) -> Finding | None:
     """The first collision of a motion, None if there is none.
 
     Pairs of links that touch each other in the home posture are left out.
@@ -42,14 +26,13 @@ def first_collision(
         world: the world.
         times: (T,) s, uniform.
         qpos: (T, 7 + n).
-        config: what counts.
     """
     model = compose_scene(robot, world)
     data = mujoco.MjData(model)
     static = model.body_weldid[model.geom_bodyid] == 0
     patch = np.isin(model.geom_bodyid, [model.body(limb.body).id for limb in robot.limbs.values()])
     resting = _touching_at_home(model, data, static, robot.home)
-    stride = max(int(np.floor(1.0 / (config.rate * (times[1] - times[0])) + 1e-9)), 1)
+    stride = max(int(np.floor(1.0 / (RATE * (times[1] - times[0])) + 1e-9)), 1)
     for index in [*range(0, len(times) - 1, stride), len(times) - 1]:
         data.qpos[:] = qpos[index]
         mujoco.mj_kinematics(model, data)
@@ -59,9 +42,9 @@ def first_collision(
         for (first, second), depth in zip(data.contact.geom, -data.contact.dist, strict=True):
             if static[first] or static[second]:
                 link = second if static[first] else first
-                allowed = config.patch_depth if patch[link] else config.body_depth
+                allowed = PATCH_DEPTH if patch[link] else BODY_DEPTH
             else:
-                allowed = np.inf if _bodies(model, first, second) in resting else config.self_depth
+                allowed = np.inf if _bodies(model, first, second) in resting else SELF_DEPTH
             if depth > allowed:
                 return Finding(
                     f"{_label(model, first)} and {_label(model, second)} collide at {times[index]:.2f} s, "

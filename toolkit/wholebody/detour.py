@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from toolkit.wholebody.swing import SwingPath
-from toolkit.wholebody.swing_task import SwingConfig, SwingTask
+from toolkit.wholebody.swing_task import SAMPLES, SwingConfig, SwingTask
+
+STEP, MOST = 0.02, 0.16  # m; of the detour: by what it grows until the way is free, and the most it may be
 
 
 def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath], config: SwingConfig) -> np.ndarray:
@@ -25,7 +27,7 @@ def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath], config: 
         return np.zeros(3)
     pose, half_size = task.other
     standing = corners(pose.position[None], pose.rotation[None], half_size)[0]
-    u = np.linspace(0.0, 1.0, config.samples)
+    u = np.linspace(0.0, 1.0, SAMPLES)
 
     def gap(bump: np.ndarray) -> tuple[float, float]:
         path = path_of(bump)
@@ -44,7 +46,7 @@ def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath], config: 
     middle = 0.5 * (task.end.position + task.start.position) - pose.position
     aside *= (1.0 if aside @ middle >= 0.0 else -1.0) / length
     best, best_gap = np.zeros(3), free
-    for size in np.arange(config.detour_step, config.max_detour + 1e-9, config.detour_step):
+    for size in np.arange(STEP, MOST + 1e-9, STEP):
         reached = gap(size * aside)[0]
         if reached > best_gap:
             best, best_gap = size * aside, reached

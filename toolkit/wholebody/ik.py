@@ -18,11 +18,12 @@ from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose, mean_pose, rotation_vector
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
+from toolkit.wholebody import ik_config as weights
 from toolkit.wholebody.avoidance import ArmAvoidance
 from toolkit.wholebody.ik_config import IKConfig
 from toolkit.wholebody.knee import knee_range
 from toolkit.wholebody.limb_paths import LimbPaths
-from toolkit.wholebody.profile import Window
+from toolkit.wholebody.swing import Window
 
 OFFSET = Window(0.0, 0.6)  # of a palm's swing, over which it joins its path
 LEAVING, LANDING = Window(0.0, 0.2), Window(0.75, 1.0)  # of a foot's swing, near its contacts
@@ -36,7 +37,7 @@ class WholeBodyIK:
 
         Args:
             robot: the robot.
-            config: weights.
+            config: settings.
             tick: s between two solves.
             avoidance: what arms keep clear of; nothing where None.
         """
@@ -66,13 +67,13 @@ class WholeBodyIK:
         self.solver.enable_joint_limits(True)
 
     def _add_tasks(self) -> None:
-        robot, config, solver = self.robot, self.config, self.solver
+        robot, solver = self.robot, self.solver
         self.com = solver.add_com_task(np.zeros(3))
-        self.com.configure("com", "soft", config.com)
+        self.com.configure("com", "soft", weights.COM)
         self.feet, self.palms, self.offsets = {}, {}, {}
         for foot in FEET:
             task = solver.add_frame_task(robot.limbs[foot].site, np.eye(4))
-            task.configure(foot.label, "soft", config.foot_position, config.foot_orientation)
+            task.configure(foot.label, "soft", weights.FOOT_POSITION, weights.FOOT_ORIENTATION)
             self.feet[foot] = task
         for palm in self.arm_joints:
             site, z = robot.limbs[palm].site, np.array([0.0, 0.0, 1.0])
@@ -81,7 +82,7 @@ class WholeBodyIK:
             twist = solver.add_orientation_task(site, np.eye(3))
             self.palms[palm] = (position, normal, twist)
         self.base = solver.add_orientation_task(robot.base, np.eye(3))
-        self.base.configure("base", "soft", config.base)
+        self.base.configure("base", "soft", weights.BASE)
         self.postures = []
         for joints, weight in self._groups():
             task = solver.add_joints_task()
@@ -92,15 +93,20 @@ class WholeBodyIK:
 
     def _groups(self) -> list[tuple[list[str], float]]:
         """Joint names with the weight of their posture: arms, trunk, legs."""
-        robot, config = self.robot, self.config
-        legs = {joint for foot in FEET for joint in robot.joints_to(foot).tolist()}
-        arms = {joint for palm in self.palms for joint in self.arm_joints[palm].tolist()}
-        reaching = {joint for palm in self.palms for joint in robot.joints_to(palm).tolist()}
+        robot = self.robot
+        legs, reaching = robot.carrying(FEET), robot.carrying(self.palms)
+        arms = np.zeros(len(robot.joint_names), bool)
+        for joints in self.arm_joints.values():
+            arms[joints] = True
+        trunk = reaching & ~arms if self.palms else ~reaching
         groups: dict[float, list[str]] = {}
         for joint, name in enumerate(robot.joint_names):
-            in_trunk = joint in reaching - arms or not reaching
-            weight = config.legs if joint in legs else config.arms if joint in arms else config.rest
-            weight = config.trunk if in_trunk and joint not in legs else weight
+            if legs[joint]:
+                weight = weights.LEGS
+            elif trunk[joint]:
+                weight = weights.TRUNK
+            else:
+                weight = weights.ARMS if arms[joint] else weights.REST
             groups.setdefault(weight, []).append(name)
         return [(names, weight) for weight, names in groups.items()]
 
@@ -132,7 +138,7 @@ class WholeBodyIK:
         for task, names, weight in self.postures:
             task.set_joints({name: posture[name] for name in names})
             task.configure("posture", "soft", weight * self._ease)
-        for _ in range(self.config.settle):
+        for _ in range(weights.SETTLE):
             if np.abs(self._solve(0.0)).max() < 1e-7:
                 break
         for task, _, weight in self.postures:
@@ -154,7 +160,7 @@ class WholeBodyIK:
         self._set_targets(time, paths, motion)
         self._set_ranges(angles, [palm for palm in self.palms if paths.authority(palm, time) == 0.0])
         step = self._ease * (self._posture(time, angles, paths, motion) - angles)
-        step = (step + self.config.inertia * self.last_step) / (1.0 + self.config.inertia)
+        step = (step + weights.INERTIA * self.last_step) / (1.0 + weights.INERTIA)
         targets = dict(zip(self.robot.joint_names, angles + step, strict=True))
         for task, names, _ in self.postures:
             for name in names:
@@ -198,7 +204,7 @@ class WholeBodyIK:
 
     @property
     def _ease(self) -> float:
-        return min(self.tick / self.config.posture_time, 1.0)
+        return min(self.tick / weights.POSTURE_TIME, 1.0)
 
     def _solve(self, time: float) -> np.ndarray:
         try:
@@ -211,14 +217,14 @@ class WholeBodyIK:
     def _set_targets(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> None:
         self.com.target_world = motion.sample(time)[0]
         self.momentum.L_world = momentum_at(motion, time)
-        config, feet = self.config, []
+        feet = []
         for foot, task in self.feet.items():
             pose = paths.sample(foot, time).pose
             assert pose is not None
             task.T_world_frame = pose.matrix
             air = self._air(foot, time, paths)
-            position = config.foot_position * (config.air_position / config.foot_position) ** air
-            orientation = config.foot_orientation * (config.air_orientation / config.foot_orientation) ** air
+            position = weights.FOOT_POSITION * (weights.AIR_POSITION / weights.FOOT_POSITION) ** air
+            orientation = weights.FOOT_ORIENTATION * (weights.AIR_ORIENTATION / weights.FOOT_ORIENTATION) ** air
             task.configure(foot.label, "soft", position, orientation)
             feet.append(pose)
         self.base.R_world_frame = mean_pose(*feet).rotation
@@ -246,7 +252,7 @@ class WholeBodyIK:
             matrix = np.zeros((len(rows), len(qpos)))
             matrix[:, self.order.q_index] = rows
             self.dampers = self.solver.add_joint_space_half_spaces_constraint(matrix, bound + rows @ angles)
-            self.dampers.configure("dampers", "soft", self.config.avoid)
+            self.dampers.configure("dampers", "soft", weights.AVOID)
 
     def _base_motion(self, before: np.ndarray) -> np.ndarray:
         """(6,) displacement of the base since a state (7 + n,), linear in the world and angular in the body."""
@@ -266,7 +272,7 @@ class WholeBodyIK:
             home = self.robot.home[7:][arm]
             lower[arm] = np.maximum(lower[arm], np.minimum(home - swing, angles[arm]))
             upper[arm] = np.minimum(upper[arm], np.maximum(home + swing, angles[arm]))
-        share = min(self.config.range_rate * self.tick, 1.0)
+        share = min(weights.RANGE_RATE * self.tick, 1.0)
         lower = np.minimum(angles + share * (lower - angles), angles)
         upper = np.maximum(angles + share * (upper - angles), angles)
         for name, low, high in zip(self.robot.joint_names, lower.tolist(), upper.tolist(), strict=True):
@@ -283,9 +289,9 @@ class WholeBodyIK:
             twist.R_world_frame = pose.rotation
         # Weights span many orders of magnitude, so they grow geometrically with the authority.
         share = 10.0 ** (-7.0 * (1.0 - authority)) if authority > 0.0 else 0.0
-        position.configure(f"{palm.label}_position", "soft", share * self.config.palm_position)
-        normal.configure(f"{palm.label}_normal", "soft", share * self.config.palm_normal)
-        twist.configure(f"{palm.label}_twist", "soft", share * self.config.palm_twist)
+        position.configure(f"{palm.label}_position", "soft", share * weights.PALM_POSITION)
+        normal.configure(f"{palm.label}_normal", "soft", share * weights.PALM_NORMAL)
+        twist.configure(f"{palm.label}_twist", "soft", share * weights.PALM_TWIST)
 
     def _from_free(self, palm: Limb, pose: Pose, time: float, paths: LimbPaths) -> Pose:
         """A path that comes from the free posture starts where the palm is, and the difference fades."""

@@ -16,10 +16,9 @@ from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, mean_pose
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.profile import Window
-from toolkit.wholebody.swing import PathSample, SwingPath
+from toolkit.wholebody.swing import PathSample, SwingPath, Window
 from toolkit.wholebody.swing_planner import Collide, plan_swing
-from toolkit.wholebody.swing_task import SwingConfig, SwingTask
+from toolkit.wholebody.swing_task import SAMPLES, SwingConfig, SwingTask
 from toolkit.wholebody.toe_pitch import SwingingLeg
 from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
@@ -210,7 +209,7 @@ def _swing(
     if standing is not None:
         other = standing.pose, robot.half_sizes[limb.mirrored]
         if motion is not None:
-            u = np.linspace(0.0, 1.0, config.samples)
+            u = np.linspace(0.0, 1.0, SAMPLES)
             com = np.array([motion.sample(phase.start + share * phase.duration)[0] for share in u])
             leg = SwingingLeg(robot.legs[limb], u, com, standing.pose.yaw)
     path = plan_swing(

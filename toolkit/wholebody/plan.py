@@ -14,7 +14,7 @@ from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.avoidance import ArmAvoidance
-from toolkit.wholebody.check import CheckConfig, CheckReport, check
+from toolkit.wholebody.check import CheckReport, check
 from toolkit.wholebody.finding import Finding
 from toolkit.wholebody.ik import WholeBodyIK, first_guess
 from toolkit.wholebody.ik_config import IKConfig
@@ -30,13 +30,12 @@ class WholeBodyConfig:
 
     Attributes:
         rate: Hz; samples of the trajectory.
-        swing, ik, check: see the classes.
+        swing, ik: see the classes.
     """
 
     rate: float = 50.0
     swing: SwingConfig = field(default_factory=SwingConfig)
     ik: IKConfig = field(default_factory=IKConfig)
-    check: CheckConfig = field(default_factory=CheckConfig)
 
 
 def whole_body(
@@ -78,7 +77,7 @@ def whole_body(
     except PlanningError as error:
         reason = "; ".join([*(finding.text for finding in blocked), str(error)])
         return _failed(robot, paths, times, reason, perf_counter() - begin)
-    report = check(robot, world, paths, motion, times, qpos, config.check)
+    report = check(robot, world, paths, motion, times, qpos)
     return _trajectory(robot, paths, times, qpos, report, blocked, begin)
 
 
@@ -96,9 +95,7 @@ def solve_ik(
         PlanningError: if a quadratic program has no solution.
     """
     tick = float(times[1] - times[0]) / config.substeps
-    avoidance = None
-    if world is not None and config.avoidance.enabled:
-        avoidance = ArmAvoidance(robot, world, config.avoidance)
+    avoidance = None if world is None else ArmAvoidance(robot, world)
     solver = WholeBodyIK(robot, config, tick, avoidance)
     qpos = np.empty((len(times), len(robot.home)))
     qpos[0] = solver.start(first_guess(robot, paths, motion), paths, motion)

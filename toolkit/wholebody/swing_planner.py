@@ -8,15 +8,28 @@ from dataclasses import replace
 import numpy as np
 
 from toolkit.wholebody.detour import detour
-from toolkit.wholebody.profile import Window
-from toolkit.wholebody.swing import Move, SwingPath
-from toolkit.wholebody.swing_task import SwingConfig, SwingTask, SwingTiming
+from toolkit.wholebody.swing import Move, SwingPath, Window
+from toolkit.wholebody.swing_task import EASY, SAMPLES, STEEP, SwingConfig, SwingTask, SwingTiming
 
 Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool: the box touches the world."""
 
-
 SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
+THICKNESS = 0.08  # m; height of the swept box above the patch: what a foot or a hand has there
+SPACING = 0.03  # m; largest way between two poses that are checked: less than the swept box is wide
+
+RAISE_STEP, MAX_RAISE = 0.03, 0.36  # m; what the path is raised by until it is clear, and the most it may be
+EASY_RAISE = 0.04  # m; paths raised by more than that are first tried with the steep timing
+MODERATE_RAISE = 0.12  # m; higher paths come after lower ones with less margin
+
+# Windows of the crossing and the landing of feet that swing fast: nearly all the time there is, to keep the peak
+# velocity low, but the foot comes to rest along the surface before it meets it.
+FAST_ACROSS, FAST_LAND = Window(0.02, 0.95), Window(0.7, 1.0)
+SLOW, FAST = 1.0, 2.5  # m/s; mean speed up to which the easy windows are kept, and from which these hold
+
+# A foot that trails the standing one by more than PITCH_FROM (m) pitches its toes down in proportion (rad/m), at most
+# by MAX_PITCH (rad), and more where the ankle's range asks for it, whose ends are kept at ANKLE_MARGIN (rad).
+PITCH_GAIN, PITCH_FROM, MAX_PITCH, ANKLE_MARGIN = 1.5, 0.2, 0.9, 0.15
 
 
 def plan_swing(task: SwingTask, collide: Collide, config: SwingConfig) -> SwingPath:
@@ -25,17 +38,17 @@ def plan_swing(task: SwingTask, collide: Collide, config: SwingConfig) -> SwingP
     Candidates are tried from the straightest to the highest, moderate heights first with the whole margin, then with
     half of it, then with none; then great heights likewise.
     """
-    bump = detour(task, lambda vector: _path(task, 0.0, 0.0, config.easy, vector, config), config)
+    bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector, config), config)
     sides = _free_sides(task, collide, config)
     candidates = list(_candidates(task, config))
     needed = 0.0 if not task.is_foot else abs(task.end.position[2] - task.start.position[2])
-    moderate = [item for item in candidates if max(item[:2]) <= needed + config.moderate_raise]
-    great = [item for item in candidates if max(item[:2]) > needed + config.moderate_raise]
+    moderate = [item for item in candidates if max(item[:2]) <= needed + MODERATE_RAISE]
+    great = [item for item in candidates if max(item[:2]) > needed + MODERATE_RAISE]
     for group in (moderate, great):
         for share in (1.0, 0.5, 0.0):
             for before, after, timing in group:
-                path = _within_ankle_range(task, _path(task, before, after, timing, bump, config), config)
-                if not collide(*_swept_boxes(task, path, share * config.margin, sides, config)).any():
+                path = _within_ankle_range(task, _path(task, before, after, timing, bump, config))
+                if not collide(*_swept_boxes(task, path, share * config.margin, sides)).any():
                     return path
     return replace(_path(task, *candidates[-1], bump, config), clear=False)
 
@@ -44,14 +57,14 @@ def _candidates(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, f
     """Extra height (m) before and after the crossing, with the timing, from the easiest to the highest."""
     raises = list(_raises(task, config))
     level = abs(task.end.position[2] - task.start.position[2]) if task.is_foot else 0.0
-    low = [pair for pair in raises if max(pair) <= level + config.easy_raise]
-    yield from ((*pair, config.easy) for pair in low)
-    yield from ((*pair, config.steep) for pair in raises)
+    low = [pair for pair in raises if max(pair) <= level + EASY_RAISE]
+    yield from ((*pair, EASY) for pair in low)
+    yield from ((*pair, STEEP) for pair in raises)
 
 
 def _raises(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float]]:
     """Extra height (m) before and after the crossing, from the least to the most."""
-    steps = np.arange(0.0, config.max_raise + 1e-9, config.raise_step).tolist()
+    steps = np.arange(0.0, MAX_RAISE + 1e-9, RAISE_STEP).tolist()
     if not task.is_foot:
         yield from ((0.0 if task.free_start else step, 0.0 if task.free_end else step) for step in steps)
         return
@@ -60,7 +73,7 @@ def _raises(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float
     up, down = max(climb, 0.0), max(-climb, 0.0)
     # Small raises first, whatever the climb: along a slope they are all it takes.
     small = [step for step in steps[:5] if step < abs(climb)]
-    heights = sorted({*small, *np.linspace(0.0, abs(climb), 1 + min(4, int(np.ceil(abs(climb) / config.raise_step))))})
+    heights = sorted({*small, *np.linspace(0.0, abs(climb), 1 + min(4, int(np.ceil(abs(climb) / RAISE_STEP))))})
     yield from ((min(height, up), min(height, down)) for height in heights)
     yield from ((up + step, down + step) for step in steps[1:])
 
@@ -75,8 +88,8 @@ def _path(
     up = np.array([0.0, 0.0, 1.0]) if task.is_foot else _outward(task)
     travel = task.end.position - task.start.position - off - onto - (before - after) * up
     speed = float(np.linalg.norm(travel)) / task.duration
-    across = _hastened(speed, timing.across, config.fast_across, config)
-    land = _hastened(speed, timing.land, config.fast_land, config) if task.is_foot else timing.land
+    across = _hastened(speed, timing.across, FAST_ACROSS)
+    land = _hastened(speed, timing.land, FAST_LAND) if task.is_foot else timing.land
     moves = [
         Move(off, timing.leave),
         Move(before * up, timing.rise),
@@ -86,9 +99,7 @@ def _path(
         Move(bump, across, returns=True),
     ]
     moves = tuple(move for move in moves if np.any(move.vector))
-    return _pitched(
-        task, SwingPath(task.begin, task.duration, task.start, task.end, moves, across), _pitch(task, config)
-    )
+    return _pitched(task, SwingPath(task.begin, task.duration, task.start, task.end, moves, across), _pitch(task))
 
 
 def _pitched(task: SwingTask, path: SwingPath, pitch: float) -> SwingPath:
@@ -101,17 +112,17 @@ def _pitched(task: SwingTask, path: SwingPath, pitch: float) -> SwingPath:
     return replace(path, moves=moves, pitch=path.pitch + pitch)
 
 
-def _within_ankle_range(task: SwingTask, path: SwingPath, config: SwingConfig) -> SwingPath:
+def _within_ankle_range(task: SwingTask, path: SwingPath) -> SwingPath:
     """The path with as much more pitch as the ankle needs; twice, since the pitch raises the foot."""
     if task.leg is None:
         return path
     for _ in range(2):
-        wanted = path.pitch + task.leg.extra_pitch(path, config.ankle_margin)
-        path = _pitched(task, path, float(np.clip(wanted, -config.max_pitch, config.max_pitch)) - path.pitch)
+        wanted = path.pitch + task.leg.extra_pitch(path, ANKLE_MARGIN)
+        path = _pitched(task, path, float(np.clip(wanted, -MAX_PITCH, MAX_PITCH)) - path.pitch)
     return path
 
 
-def _pitch(task: SwingTask, config: SwingConfig) -> float:
+def _pitch(task: SwingTask) -> float:
     """How far (rad) the toes go down on the way: more, the farther the foot trails the standing one."""
     if task.other is None:
         return 0.0
@@ -119,8 +130,8 @@ def _pitch(task: SwingTask, config: SwingConfig) -> float:
     ahead = (task.end.position - task.start.position) @ task.start.rotation[:, 0]
     # Fast swings leave the ankle no time for more than its range demands.
     speed = float(np.linalg.norm(task.end.position - task.start.position)) / task.duration
-    gain = config.pitch_gain * (1.0 - _haste(speed, config))
-    return float(np.clip(gain * (min(trail, ahead) - config.pitch_from), 0.0, config.max_pitch))
+    gain = PITCH_GAIN * (1.0 - _haste(speed))
+    return float(np.clip(gain * (min(trail, ahead) - PITCH_FROM), 0.0, MAX_PITCH))
 
 
 def _outward(task: SwingTask) -> np.ndarray:
@@ -132,14 +143,14 @@ def _outward(task: SwingTask) -> np.ndarray:
     return outward / length if length > 1e-3 else np.array([0.0, 0.0, 1.0])
 
 
-def _haste(speed: float, config: SwingConfig) -> float:
+def _haste(speed: float) -> float:
     """0 for slow swings, 1 for fast ones."""
-    return min(max((speed - config.slow) / (config.fast - config.slow), 0.0), 1.0)
+    return min(max((speed - SLOW) / (FAST - SLOW), 0.0), 1.0)
 
 
-def _hastened(speed: float, slow: Window, fast: Window, config: SwingConfig) -> Window:
+def _hastened(speed: float, slow: Window, fast: Window) -> Window:
     """Window between those of slow and of fast swings."""
-    share = _haste(speed, config)
+    share = _haste(speed)
     return Window(slow.start + share * (fast.start - slow.start), slow.end + share * (fast.end - slow.end))
 
 
@@ -153,7 +164,7 @@ def _free_sides(task: SwingTask, collide: Collide, config: SwingConfig) -> tuple
             continue
         half = np.empty((len(shares), 3))
         half[:, :2] = task.half_size + (shares * config.margin)[:, None]
-        half[:, 2] = 0.5 * config.thickness - SKIN
+        half[:, 2] = 0.5 * THICKNESS - SKIN
         centers = np.repeat((pose.position + (half[0, 2] + 2 * SKIN) * pose.normal)[None], len(shares), 0)
         hit = collide(centers, np.repeat(pose.rotation[None], len(shares), 0), half)
         sides.append(float(max(shares[~hit], default=0.0)) * config.margin)
@@ -161,7 +172,7 @@ def _free_sides(task: SwingTask, collide: Collide, config: SwingConfig) -> tuple
 
 
 def _swept_boxes(
-    task: SwingTask, path: SwingPath, margin: float, sides: tuple[float, float], config: SwingConfig
+    task: SwingTask, path: SwingPath, margin: float, sides: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres (k, 3), rotations (k, 3, 3), half sizes (k, 3) of the patch, thickened and padded, along a path.
 
@@ -169,7 +180,7 @@ def _swept_boxes(
     the padding at the sides is what is free there, and grows with the way from there.
     """
     length = sum(np.linalg.norm(move.vector) for move in path.moves)
-    count = max(config.samples, int(np.ceil(2.0 * length / config.spacing)) + 1)  # twice as fast in the middle
+    count = max(SAMPLES, int(np.ceil(2.0 * length / SPACING)) + 1)  # twice as fast in the middle
     u = np.linspace(0.0, 1.0, count)
     points, rotations = path.positions(u), path.rotations(u)
     below, aside = np.full(count, margin), np.full(count, margin)
@@ -188,6 +199,6 @@ def _swept_boxes(
     below = np.maximum(below, 0.0)
     half = np.empty((count, 3))
     half[:, :2] = task.half_size + (aside - np.where(aside > SKIN, 0.0, SKIN))[:, None]
-    half[:, 2] = 0.5 * (config.thickness + below - SKIN)
-    centers = points + (0.5 * (config.thickness - below + SKIN))[:, None] * rotations[:, :, 2]
+    half[:, 2] = 0.5 * (THICKNESS + below - SKIN)
+    centers = points + (0.5 * (THICKNESS - below + SKIN))[:, None] * rotations[:, :, 2]
     return centers, rotations, half

@@ -62,8 +62,8 @@ class WorldText:
         comment: what the world is, for whoever opens the file.
         friction: sliding coefficient of all geoms.
         timing: s; shift and swing.
-        start: (3,) m.
         goal: (3,) m.
+        start: (3,) m.
         heading: deg; yaw of the start.
         radius: m; of the goal.
         abyss: m; height of a floor that is only drawn; None for none.
@@ -73,8 +73,8 @@ class WorldText:
     comment: str
     friction: float
     timing: tuple[float, float]
-    start: tuple[float, float, float]
     goal: tuple[float, float, float]
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     heading: float = 0.0
     radius: float = 0.2
     abyss: float | None = -1.0

@@ -1,86 +1,13 @@
-"""Where the world leaves room: heights, triangles, and boxes against it."""
+"""Where the world leaves room: boxes against it."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from toolkit.world.solids import solids_of
 from toolkit.world.world import World
 
 _FAR = (0.0, 0.0, 1e4)  # m; where unused boxes wait
-
-
-@dataclass(frozen=True)
-class HeightMap:
-    """Height of the ground on a grid.
-
-    Attributes:
-        origin: (2,) float, m; world xy of the centre of cell (0, 0).
-        resolution: m; edge of a cell.
-        height: (nx, ny) float, m; world z of the highest point at each cell's centre, -inf where there is nothing.
-    """
-
-    origin: np.ndarray
-    resolution: float
-    height: np.ndarray
-
-    def at(self, points: np.ndarray) -> np.ndarray:
-        """Heights (...,) of the cells that points (..., 2) lie in; -inf outside."""
-        cell = np.rint((np.asarray(points, float) - self.origin) / self.resolution).astype(int)
-        inside = np.all((cell >= 0) & (cell < np.array(self.height.shape)), axis=-1)
-        cell = np.where(np.expand_dims(inside, -1), cell, 0)
-        return np.where(inside, self.height[cell[..., 0], cell[..., 1]], -np.inf)
-
-
-def collision_triangles(world: World) -> np.ndarray:
-    """Triangles of everything that collides.
-
-    Args:
-        world: the world; infinite planes are cut to `world.square`.
-
-    Returns:
-        (n, 3, 3) float, m; corners in the world frame, counterclockwise seen from outside.
-    """
-    return solids_of(world.mujoco_model, square=world.square).corners
-
-
-def height_map(world: World, resolution: float, *, below: float = np.inf) -> HeightMap:
-    """Height of the highest geometry over a grid on `world.square`.
-
-    Args:
-        world: the world.
-        resolution: m; edge of a cell. Only cell centres are looked at: what is thinner may be missed.
-        below: m; what lies above this height is not seen (a ceiling).
-
-    Returns:
-        The grid.
-    """
-    x0, y0, x1, y1 = world.square
-    count = np.maximum(np.ceil(np.array([x1 - x0, y1 - y0]) / resolution - 1e-9).astype(int), 1)
-    origin = np.array([x0, y0]) + resolution / 2
-    height = np.full(count, -np.inf)
-    for corners in collision_triangles(world):
-        first = np.clip(np.ceil((corners[:, :2].min(axis=0) - origin) / resolution - 1e-6).astype(int), 0, count)
-        last = np.clip(np.floor((corners[:, :2].max(axis=0) - origin) / resolution + 1e-6).astype(int) + 1, 0, count)
-        if (last <= first).any():
-            continue
-        first_edge, second_edge = corners[1] - corners[0], corners[2] - corners[0]
-        area = first_edge[0] * second_edge[1] - first_edge[1] * second_edge[0]
-        if abs(area) < 1e-12:  # upright
-            continue
-        x = (origin[0] + resolution * np.arange(first[0], last[0]) - corners[0, 0])[:, None]
-        y = (origin[1] + resolution * np.arange(first[1], last[1]) - corners[0, 1])[None]
-        u = (x * second_edge[1] - y * second_edge[0]) / area
-        v = (y * first_edge[0] - x * first_edge[1]) / area
-        z = corners[0, 2] + u * first_edge[2] + v * second_edge[2]
-        slack = 1e-9
-        hit = (u >= -slack) & (v >= -slack) & (u + v <= 1 + slack) & (z <= below)
-        block = height[first[0] : last[0], first[1] : last[1]]
-        np.maximum(block, np.where(hit, z, -np.inf), out=block)
-    return HeightMap(origin, resolution, height)
 
 
 class BoxCollider:

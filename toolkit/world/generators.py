@@ -51,7 +51,6 @@ def rubble_field(
         f"{rows} x {columns} tiles of {tile:g} m, roll and pitch within {tilt:g} degrees, between two platforms",
         friction,
         (shift, swing),
-        (0.0, 0.0, 0.0),
         (end + 0.97, 0.0, 0.0),
     )
     world.platform("platform_start", (-0.6, begin), columns * tile)
@@ -86,9 +85,6 @@ def rubble_corridor(
         friction: sliding coefficient.
         shift: s.
         swing: s.
-
-    Returns:
-        MJCF text.
     """
     begin, (length, width) = 0.6, (0.4, 0.3)
     end = begin + rows * length
@@ -97,7 +93,6 @@ def rubble_corridor(
         f"{rows} x {columns} tiles of {length:g} x {width:g} m between walls of tilted panels",
         friction,
         (shift, swing),
-        (0.0, 0.0, 0.0),
         (end + 0.6, 0.0, 0.0),
     )
     world.platform("platform_start", (-0.6, begin), columns * width)
@@ -141,9 +136,6 @@ def stepping_stones(
         friction: sliding coefficient.
         shift: s.
         swing: s.
-
-    Returns:
-        MJCF text.
     """
     begin, pitch = 0.4, stone + gap
     end = begin + gap + rows * pitch
@@ -152,7 +144,6 @@ def stepping_stones(
         f"{rows} x {columns} stones of {stone:g} m, tilted up to {tilt:g} degrees, {gap:g} m apart",
         friction,
         (shift, swing),
-        (0.0, 0.0, 0.0),
         (end + 0.4, 0.0, 0.0),
     )
     width = columns * pitch - gap
@@ -199,12 +190,7 @@ def training(
         robot's side.
     """
     world = WorldText(
-        "training",
-        "3 x 3 tilted tiles and walls",
-        friction,
-        (shift, swing),
-        (0.0, 0.0, 0.05),
-        (tile, 0.0, 0.05),
+        "training", "3 x 3 tilted tiles and walls", friction, (shift, swing), (tile, 0.0, 0.05), start=(0.0, 0.0, 0.05)
     )
     for row in range(3):
         for column in range(3):

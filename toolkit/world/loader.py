@@ -12,7 +12,6 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.world.extraction import SurfaceConfig, extract_surfaces
 from toolkit.world.faces import square_around
-from toolkit.world.polygon import nearest_point, surface_height
 from toolkit.world.solids import solids_of
 from toolkit.world.source import read_source
 from toolkit.world.surface import Surface
@@ -125,7 +124,7 @@ def _check_walls(
                 f"{path}: site '{name}' asks for a palm on a wall, but the world has none: no surface whose normal is "
                 f"{low:g} to {high:g} degrees from up; add a wall beside the start, or remove the site"
             )
-        distance = min(float(np.linalg.norm(nearest_point(wall, point) - point)) for wall in walls)
+        distance = min(float(np.linalg.norm(wall.nearest_point(point) - point)) for wall in walls)
         if distance > PALM_SITE_REACH:
             raise WorldError(
                 f"{path}: site '{name}' at {at} is {distance:.2f} m from the nearest surface for palms; move it within "
@@ -141,7 +140,7 @@ def _check_ground(path: Path, start: Pose, surfaces: tuple[Surface, ...], palms:
     z = start.position[2]
     for surface in surfaces:
         if surface.serves_foot:
-            height = surface_height(surface, spots)
+            height = surface.height(spots)
             if ((height <= z + _ABOVE_START) & (height >= z - _BELOW_START)).any():
                 return
     raise WorldError(

@@ -62,7 +62,6 @@ def mesh_patches(
         f"one mesh of {len(mesh.faces)} triangles: {rows} x {columns} flat patches of {patch:g} m",
         friction,
         (shift, swing),
-        (0.0, 0.0, 0.0),
         ((rows - 1) * pitch - patch * 0.25, 0.0, 0.0),
         abyss=-_DEPTH,
     )

@@ -30,9 +30,6 @@ def stairs(
         friction: sliding coefficient.
         shift: s.
         swing: s.
-
-    Returns:
-        MJCF text.
     """
     del rng
     begin = 0.45
@@ -43,7 +40,6 @@ def stairs(
         f"{steps} steps of {step_height:g} m, treads of {tread:g} m",
         friction,
         (shift, swing),
-        (0.0, 0.0, 0.0),
         (end + 0.65, 0.0, top),
         abyss=min(0.0, top) - 0.1,
     )
@@ -72,19 +68,11 @@ def gap(
         friction: sliding coefficient.
         shift: s.
         swing: s.
-
-    Returns:
-        MJCF text.
     """
     del rng
     edge = 0.6
     world = WorldText(
-        "gap",
-        f"two platforms, {width:g} m apart",
-        friction,
-        (shift, swing),
-        (0.0, 0.0, 0.0),
-        (edge + width + 0.7, 0.0, 0.0),
+        "gap", f"two platforms, {width:g} m apart", friction, (shift, swing), (edge + width + 0.7, 0.0, 0.0)
     )
     world.platform("platform_start", (-0.6, edge), 1.2)
     world.platform("platform_goal", (edge + width, edge + width + 1.3), 1.2)
@@ -111,9 +99,6 @@ def slope(
         friction: sliding coefficient.
         shift: s.
         swing: s.
-
-    Returns:
-        MJCF text.
     """
     del rng
     edge, tilt = 0.4, np.radians(angle)
@@ -123,8 +108,8 @@ def slope(
         f"a slope of {angle:g} degrees, {length:g} m long, level above and below",
         friction,
         (shift, swing),
-        (0.0, 0.0, top),
         (edge + run + 1.0, 0.0, 0.0),
+        start=(0.0, 0.0, top),
         abyss=min(0.0, top) - THICKNESS - 0.01,
     )
     world.platform("platform_start", (-0.8, edge), width, top)

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
+from shapely.geometry import Point, Polygon
+from shapely.ops import nearest_points
 
 from toolkit.geometry.pose import Pose
 
@@ -37,3 +40,29 @@ class Surface:
     def normal(self) -> np.ndarray:
         """(3,) float outward normal in the world."""
         return self.pose.rotation[:, 2]
+
+    @property
+    def region(self) -> Polygon:
+        """The region, holes included, in the surface's frame."""
+        return Polygon(self.boundary[0], self.boundary[1:])
+
+    def height(self, points: np.ndarray) -> np.ndarray:
+        """Height over points of the ground plane, of a surface that is not vertical.
+
+        Args:
+            points: (n, 2) float, m; world xy.
+
+        Returns:
+            (n,) float, m; world z, NaN where the surface is not there.
+        """
+        normal, origin = self.normal, self.pose.position
+        height = origin[2] - (points - origin[:2]) @ normal[:2] / normal[2]
+        local = self.pose.inverse() @ np.column_stack([points, height])
+        inside = shapely.intersects_xy(self.region, local[:, 0], local[:, 1])
+        return np.where(inside, height, np.nan)
+
+    def nearest_point(self, point: np.ndarray) -> np.ndarray:
+        """(3,) m; the point of the surface nearest to a point (3,) m of the world."""
+        x, y, _ = self.pose.inverse() @ point
+        nearest = nearest_points(self.region, Point(x, y))[0]
+        return self.pose @ np.array([nearest.x, nearest.y, 0.0])

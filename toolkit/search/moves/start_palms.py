@@ -12,7 +12,6 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.states.contact_table import ContactTable
-from toolkit.world.polygon import nearest_point
 from toolkit.world.world import PALM_SITE_REACH, PALM_SITES, World
 
 _SEARCH, _STEP = 0.1, 0.02  # m; how far from the point nearest to its site a palm may start
@@ -80,7 +79,7 @@ def _points(world: World, site: np.ndarray) -> np.ndarray:
     points = []
     for surface in world.surfaces:
         if surface.serves_palm:
-            middle = nearest_point(surface, site)
+            middle = surface.nearest_point(site)
             if np.linalg.norm(middle - site) <= PALM_SITE_REACH:
                 points.append(middle + spread @ surface.pose.rotation[:, :2].T)
     return np.concatenate(points)

@@ -9,9 +9,9 @@ import numpy as np
 from toolkit.centroidal.problem import STANDARD_GRAVITY
 from toolkit.geometry.limb import FEET
 from toolkit.physics.momentum import advanced, ballistic, fill_wrench_map
-from toolkit.replanning.contacts import ContactTable, Situation
-from toolkit.replanning.kernel import GIVEN
 from toolkit.replanning.nominal import Nominal
+from toolkit.replanning.situation import HorizonContacts, Situation
+from toolkit.replanning.sweep import GIVEN
 
 G = STANDARD_GRAVITY
 
@@ -106,7 +106,9 @@ class FreeLandings:
     column: np.ndarray
 
     @classmethod
-    def of(cls, events: list[int], planes: list[np.ndarray], nominal: Nominal, contacts: ContactTable) -> FreeLandings:
+    def of(
+        cls, events: list[int], planes: list[np.ndarray], nominal: Nominal, contacts: HorizonContacts
+    ) -> FreeLandings:
         """Find where limbs stand on the landing points of these swings."""
         column = np.full(contacts.active.shape, -1)
         for index, event in enumerate(events):
@@ -158,7 +160,7 @@ class Dynamics:
 
     @classmethod
     def of(
-        cls, window: Window, planned: np.ndarray, contacts: ContactTable, landings: FreeLandings, size: int
+        cls, window: Window, planned: np.ndarray, contacts: HorizonContacts, landings: FreeLandings, size: int
     ) -> Dynamics:
         """Linearise about the plan.
 

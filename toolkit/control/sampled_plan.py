@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -12,22 +11,11 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
-from toolkit.geometry.pose import Pose, rotation_from_quaternion
+from toolkit.geometry.pose import rotation_from_quaternion
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.momentum import posture_momentum
+from toolkit.wholebody.limb_paths import LimbPaths
+from toolkit.wholebody.motion_dynamics import planned_wrench, posture_momentum
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
-
-
-class LimbPathSampler(Protocol):
-    """Planned motion of the limbs' patches."""
-
-    def sample(self, limb: Limb, time: float) -> tuple[Pose | None, np.ndarray, np.ndarray, bool]:
-        """World pose (None: hangs free), (6,) velocity and (6,) acceleration of a patch, and whether it rests."""
-        ...
-
-    def authority(self, limb: Limb, time: float) -> float:
-        """How binding that pose is, in [0, 1]."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -104,7 +92,7 @@ def sample_reference(
     schedule: ContactSchedule,
     motion: CentroidalMotion,
     trajectory: WholeBodyTrajectory,
-    paths: LimbPathSampler,
+    paths: LimbPaths,
     robot: RobotModel,
 ) -> Reference:
     """Sample a plan.
@@ -184,19 +172,6 @@ def swings_of(sequence: ContactSequence, schedule: ContactSchedule) -> tuple[Swi
         for phase in schedule.phases
         if phase.swing is not None
     )
-
-
-def planned_wrench(motion: CentroidalMotion) -> np.ndarray:
-    """Planned wrenches in the contact frames.
-
-    Returns:
-        (N, 4, 6); force, and moment about the patch's centre: CoP times force plus the yaw torque.
-    """
-    force = np.einsum("nlji,nlj->nli", motion.problem.rotation, motion.force)
-    lever = np.concatenate([motion.cop, np.zeros_like(motion.cop[..., :1])], axis=-1)
-    moment = np.cross(lever, force)
-    moment[..., 2] += motion.yaw_torque
-    return np.where(motion.problem.active[..., None], np.concatenate([force, moment], axis=-1), 0.0)
 
 
 def _posture(times: np.ndarray, trajectory: WholeBodyTrajectory) -> tuple[np.ndarray, ...]:

@@ -1,4 +1,4 @@
-"""Joint torques that a whole-body motion needs under the planned contact wrenches."""
+"""What a motion asks of a robot: contact wrenches, joint torques, and the angular momentum of its postures."""
 
 from __future__ import annotations
 
@@ -10,12 +10,24 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.robot.model import RobotModel
 
+SMOOTHING = np.array([0.0625, 0.25, 0.375, 0.25, 0.0625])  # of neighbouring samples: velocities are differences
+
+
+def planned_wrench(motion: CentroidalMotion) -> np.ndarray:
+    """Planned wrenches in the contact frames: `tau = z x f + tau_n n` about the centre of the patch.
+
+    Returns:
+        (N, 4, 6); force f, and moment tau from the centre of pressure z and the torque tau_n about the normal n.
+    """
+    force = np.einsum("nlji,nlj->nli", motion.problem.rotation, motion.force)
+    lever = np.concatenate([motion.cop, np.zeros_like(motion.cop[..., :1])], axis=-1)
+    moment = np.cross(lever, force)
+    moment[..., 2] += motion.yaw_torque
+    return np.where(motion.problem.active[..., None], np.concatenate([force, moment], axis=-1), 0.0)
+
 
 def contact_wrenches(motion: CentroidalMotion, times: np.ndarray, window: float) -> np.ndarray:
     """Planned wrenches at the patch centres, averaged over a window around each time.
-
-    The wrench of a contact is force f, and moment `tau = R (z x R^T f) + tau_n n` about the patch centre, with z the
-    centre of pressure in the patch and tau_n the torque about the normal n.
 
     Args:
         motion: centroidal motion.
@@ -26,12 +38,9 @@ def contact_wrenches(motion: CentroidalMotion, times: np.ndarray, window: float)
         (T, 4, 6) force and moment in the world.
     """
     problem = motion.problem
-    force = motion.force
-    local = np.einsum("tlji,tlj->tli", problem.rotation, force)
-    cop = np.concatenate([motion.cop, np.zeros((*motion.cop.shape[:2], 1))], -1)
-    moment = np.einsum("tlij,tlj->tli", problem.rotation, np.cross(cop, local))
-    moment = moment + motion.yaw_torque[..., None] * problem.rotation[..., 2]
-    wrench = np.where(problem.active[..., None], np.concatenate([force, moment], -1), 0.0)
+    force, moment = np.split(planned_wrench(motion), 2, axis=-1)
+    parts = [np.einsum("nlij,nlj->nli", problem.rotation, part) for part in (force, moment)]
+    wrench = np.concatenate(parts, axis=-1)
     knots = problem.times
     total = np.zeros((len(times), 4, 6))
     for offset in (-0.25 * window, 0.25 * window):
@@ -88,3 +97,35 @@ def inverse_dynamics(
                 generalized -= jacobian.T @ wrenches[index, limb]
         result[index] = generalized
     return result[:, 6:], result[:, :6]
+
+
+def posture_momentum(model: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> tuple:
+    """Angular momentum about the CoM along a motion, lightly smoothed, and its rate.
+
+    Inverse kinematics follows the planned angular momentum only as far as the postures allow; whoever tracks both the
+    postures and a momentum must take the momentum from the postures, or the two pull against each other.
+
+    Args:
+        model: of the robot alone.
+        times: (T,) s.
+        qpos: (T, 7 + n).
+        qvel: (T, 6 + n), MuJoCo conventions.
+
+    Returns:
+        (T, 3) kg m^2/s and (T, 3) N m in the world.
+    """
+    data = mujoco.MjData(model)
+    momentum = np.zeros((len(times), 3))
+    for index in range(len(times)):
+        data.qpos[:], data.qvel[:] = qpos[index], qvel[index]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        momentum[index] = data.subtree_angmom[0]
+    if len(times) < len(SMOOTHING):
+        return momentum, np.zeros_like(momentum)
+    edge = len(SMOOTHING) // 2
+    padded = np.pad(momentum, ((edge, edge), (0, 0)), mode="edge")
+    momentum = np.column_stack([np.convolve(padded[:, k], SMOOTHING, "valid") for k in range(3)])
+    return momentum, np.gradient(momentum, times, axis=0)

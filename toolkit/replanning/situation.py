@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.control.target import Cones
+from toolkit.control.corrector import Cones
 from toolkit.geometry.limb import Limb
 from toolkit.replanning.nominal import Nominal
 
@@ -45,7 +45,7 @@ class Situation:
 
 
 @dataclass(frozen=True)
-class ContactTable:
+class HorizonContacts:
     """Contacts in N steps of a horizon.
 
     Attributes:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from toolkit.wholebody.profile import Window, blend
+from toolkit.wholebody.swing import Window, blend
 
 
 @pytest.mark.parametrize("kind", ["step", "bump"])

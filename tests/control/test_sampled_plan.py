@@ -3,9 +3,10 @@
 import numpy as np
 
 from toolkit.control.dynamics import RobotDynamics
-from toolkit.control.reference import planned_wrench, sample_reference
+from toolkit.control.sampled_plan import sample_reference
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.wholebody.limb_paths import limb_paths
+from toolkit.wholebody.motion_dynamics import planned_wrench
 
 
 def sampled(plan, times):

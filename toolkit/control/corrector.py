@@ -9,8 +9,11 @@ import numpy as np
 
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.limb_target import LimbTargets
-from toolkit.control.reference import Reference
+from toolkit.control.sampled_plan import Reference
 from toolkit.control.touchdown import ContactTracker
+
+PENDULUM_RATE = 3.4
+"""1/s; frequency of the pendulum that a humanoid is: the CoM diverges by `(c - c_plan) + (v - v_plan) / rate`."""
 
 
 @dataclass(frozen=True)

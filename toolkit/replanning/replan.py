@@ -9,29 +9,38 @@ of its force; the limits of the body are linear about the plan.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.contacts.stance import Contact
-from toolkit.control.target import Cones
-from toolkit.geometry.pose import Pose
+from toolkit.control.corrector import PENDULUM_RATE, Cones
 from toolkit.physics.wrench import friction_rows, sole_rows
 from toolkit.replanning.config import ReplanConfig
-from toolkit.replanning.contacts import ContactTable, Situation
-from toolkit.replanning.dynamics import Dynamics, FreeLandings, Window
-from toolkit.replanning.kernel import GIVEN, Program
-from toolkit.replanning.landing import apart_row, landing_rows
-from toolkit.replanning.nominal import Nominal
+from toolkit.replanning.kernel import Program, solve
+from toolkit.replanning.knot_costs import knot_costs
+from toolkit.replanning.landing import Landings
+from toolkit.replanning.linear_motion import Dynamics, FreeLandings, Window
+from toolkit.replanning.nominal import BODY, Nominal
+from toolkit.replanning.situation import HorizonContacts, Situation
+from toolkit.replanning.sweep import GIVEN
 from toolkit.robot.model import RobotModel
 from toolkit.world.surface import Surface
 
 SIDES = 8
 ROWS = SIDES + 12 + 10 + 1
+PRICE = 10.0  # of exceeding the body's limits by 1 m or 1 rad: a small excess is better than a fall
 HARD = 1e4  # price of a landing point outside its region, per m
+SOFTNESS = 0.05  # m or rad; excess by which a price doubles
 ROOM = 1e-3  # of the plan's own wrenches inside their rows
+FORCE, MOMENT = 1.0, 5.0  # weights of the wrenches' deviations, per weight and per weight times 1 m, squared, and s
 PALM_MOMENT = 1e3  # weight that keeps a palm's moments as planned: the controller has none
+MAX_ITERATIONS, TOLERANCE = 25, 1e-6  # of the solver
+
+# Landing points stay where they are planned while the divergence left when the next foot lands is at most SETTLED m
+# and the body's limits exceeded on the way cost at most EXCESS: the controller's gains bring that back by themselves.
+SETTLED, EXCESS = 0.01, 0.02
+# Swings end early only where the objective exceeds EARLY_OBJECTIVE and falls by EARLY_GAIN; 1 s earlier costs EARLY.
+EARLY_OBJECTIVE, EARLY_GAIN, EARLY = 0.3, 0.3, 3.0
 
 
 @dataclass(frozen=True)
@@ -70,42 +79,35 @@ class ReplanProblem:
     """Builds and solves the programs of one run."""
 
     def __init__(self, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...], config: ReplanConfig):
-        self._nominal, self._config, self._surfaces = nominal, config, surfaces
-        self._half_sizes = robot.half_sizes
-        self._landings: dict[int, Contact] = {
-            event: swing.contact
-            for event, swing in enumerate(nominal.swings)
-            if swing.contact is not None and swing.limb.is_foot and swing.contact.surface >= 0
-        }
-        self._regions: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._nominal, self._config = nominal, config
+        self._landings = Landings(nominal.swings, robot.half_sizes, surfaces, config.max_shift)
         self._cone_rows: dict[tuple, np.ndarray] = {}
         self._size = GIVEN + 2 * config.landings
 
-    def solve(self, situation: Situation, solver: Callable) -> Replan | None:
+    def solve(self, situation: Situation) -> Replan | None:
         """The best motion from a measured state; None where the solver gives no answer.
 
         Landing points move only where the motion cannot be brought back to the plan without that; and where not even
         that is enough, swings under way may also end earlier, at any of a few times.
         """
         if not situation.displaced:
-            kept = self._solve(situation, solver, {}, landings=0)
+            kept = self._solve(situation, {}, landings=0)
             if kept is not None and self._is_settled(kept):
                 return kept
         decided = {event: time for event, time in situation.landing.items() if self._is_early(event, time)}
-        best = self._solve(situation, solver, decided)
-        if best is None or best.objective < self._config.early_objective:
+        best = self._solve(situation, decided)
+        if best is None or best.objective < EARLY_OBJECTIVE:
             return best
         for event, earliest in situation.earliest.items():
             for time in self._early_times(event, earliest):
-                found = self._solve(situation, solver, {event: time})
-                if found is not None and found.objective < best.objective - self._config.early_gain:
+                found = self._solve(situation, {event: time})
+                if found is not None and found.objective < best.objective - EARLY_GAIN:
                     best = found
         return best
 
     def _is_settled(self, kept: Replan) -> bool:
         """Whether a motion with the planned landing points is back at the plan when the next foot lands."""
-        config = self._config
-        return kept.divergence[kept.next_landing] <= config.settled and kept.excess <= config.excess
+        return kept.divergence[kept.next_landing] <= SETTLED and kept.excess <= EXCESS
 
     def _is_early(self, event: int, time: float) -> bool:
         return time < self._nominal.swings[event].end - 1e-3
@@ -116,24 +118,23 @@ class ReplanProblem:
         knots = knots[(knots >= earliest - 1e-9) & (knots < self._nominal.swings[event].end - 1e-3)]
         return knots[np.unique([0, len(knots) // 2, len(knots) - 1])] if len(knots) else knots
 
-    def _solve(
-        self, situation: Situation, solver: Callable, early: dict[int, float], landings: int | None = None
-    ) -> Replan | None:
+    def _solve(self, situation: Situation, early: dict[int, float], landings: int | None = None) -> Replan | None:
         """The best motion with given ends of the swings under way, and at most so many landing points free."""
         nominal, config, size = self._nominal, self._config, self._size
         window = Window.of(nominal, situation.time, config.horizon)
-        contacts = ContactTable.of(nominal, situation, window.first, window.times, early)
+        contacts = HorizonContacts.of(nominal, situation, window.first, window.times, early)
         events = self._free_landings(situation, window, config.landings if landings is None else landings)
-        planes = [self._landings[event].pose.rotation[:, :2] for event in events]
+        planes = [self._landings.contacts[event].pose.rotation[:, :2] for event in events]
         free = FreeLandings.of(events, planes, nominal, contacts)
         dynamics = Dynamics.of(window, nominal.wrench[window.span], contacts, free, size)
-        cost, slope, constant = self._objective(window, contacts, free, situation)
+        share = nominal.share[window.span]
+        cost, slope, constant = knot_costs(window, free, contacts.shift, share, situation.goal, size)
         rows, bound = self._contact_rows(window, contacts, dynamics, situation.cones)
         knot, soft, soft_bound, price = self._soft_rows(window, contacts, free, situation, early)
         weight = np.empty((len(dynamics.step), 6))
         duration = window.dt[dynamics.step]
-        weight[:, :3] = (config.force * duration)[:, None]
-        weight[:, 3:] = (np.where(dynamics.limb < 2, config.moment, PALM_MOMENT) * duration)[:, None]
+        weight[:, :3] = (FORCE * duration)[:, None]
+        weight[:, 3:] = (np.where(dynamics.limb < 2, MOMENT, PALM_MOMENT) * duration)[:, None]
         program = Program(
             a=dynamics.a,
             b=dynamics.b,
@@ -149,23 +150,23 @@ class ReplanProblem:
             soft_rows=soft,
             soft_bound=soft_bound,
             price=price,
-            softness=0.05,
+            softness=SOFTNESS,
             start=self._start(window, situation),
         )
         u = np.zeros((len(dynamics.step), 6))
         guess = np.zeros(size - GIVEN)
         for index, (event, plane) in enumerate(zip(events, planes, strict=True)):
             guess[2 * index : 2 * index + 2] = plane.T @ situation.goal.get(event, np.zeros(3))
-        x, iterations, residual, gap = solver(program, u, guess, config.max_iterations, config.tolerance)
+        x, iterations, residual, gap = solve(program, u, guess, MAX_ITERATIONS, TOLERANCE)
         if not (np.isfinite(x).all() and np.isfinite(u).all() and residual < 1e-3 and gap < 1e-3):
             return None
         excess = price * np.maximum(np.einsum("ki,ki->k", soft, x[knot]) - soft_bound, 0.0)
         objective = constant + 0.5 * np.einsum("ti,tij,tj", x, cost, x) + (slope * x).sum()
         objective += 0.5 * (weight * u * u).sum() + excess.sum()
-        objective += config.early * sum(nominal.swings[k].end - t for k, t in early.items())
+        objective += EARLY * sum(nominal.swings[k].end - t for k, t in early.items())
         wrench = np.zeros((window.steps, 4, 6))
         wrench[dynamics.step, dynamics.limb] = dynamics.wrench + u
-        ends = [nominal.swings[event].end for event in self._landings]
+        ends = [nominal.swings[event].end for event in self._landings.contacts]
         next_end = min((end for end in ends if end > situation.time), default=np.inf)
         times, dt, spin = window.times, window.dt[:, None], window.spin_of(x)
         return Replan(
@@ -180,7 +181,7 @@ class ReplanProblem:
             ends=early,
             objective=float(objective),
             excess=float(excess.sum()),
-            divergence=np.linalg.norm(x[:, :3] + x[:, 3:6] / config.frequency, axis=1),
+            divergence=np.linalg.norm(x[:, :3] + x[:, 3:6] / PENDULUM_RATE, axis=1),
             next_landing=int(np.searchsorted(times, next_end) if next_end < times[-1] else window.steps),
             iterations=iterations,
         )
@@ -188,7 +189,7 @@ class ReplanProblem:
     def _start(self, window: Window, situation: Situation) -> np.ndarray:
         """(12,) the measured deviation from the plan, less what is too small to be worth a reaction."""
         start = window.deviation(situation)
-        divergence = float(np.linalg.norm(start[:3] + start[3:6] / self._config.frequency))
+        divergence = float(np.linalg.norm(start[:3] + start[3:6] / PENDULUM_RATE))
         start *= max(1.0 - self._config.deadband / max(divergence, 1e-9), 0.0)
         start[:3] += situation.com_shift
         return start
@@ -198,7 +199,7 @@ class ReplanProblem:
         nominal = self._nominal
         standing = {event for event, _, _ in situation.standing.values()}
         free = []
-        for event in self._landings:
+        for event in self._landings.contacts:
             swing = nominal.swings[event]
             if event in standing or event in situation.fixed or swing.end <= situation.time:
                 continue
@@ -207,34 +208,7 @@ class ReplanProblem:
             free.append(event)
         return free
 
-    def _objective(self, window: Window, contacts: ContactTable, free: FreeLandings, situation: Situation):
-        """Quadratic costs of the knots: Hessians, gradients and the constant."""
-        config, size, dt = self._config, self._size, window.dt
-        spin = window.spin_rows(size)[1:]
-        follow, offset = free.offset_of_feet(contacts.shift, self._nominal.share[window.span], size)
-        cost, slope = np.zeros((window.steps + 1, size, size)), np.zeros((window.steps + 1, size))
-        duration = dt[:, None, None]
-        cost[1:] += config.com * duration * np.einsum("tki,tkj->tij", follow, follow)
-        slope[1:] -= config.com * dt[:, None] * np.einsum("tki,tk->ti", follow, offset)
-        axis = np.arange(3)
-        cost[1:, 3 + axis, 3 + axis] += dt[:, None] * [config.velocity, config.velocity, config.climb]
-        cost[1:] += config.spin * duration * np.einsum("tki,tkj->tij", spin, spin)
-        change = spin.copy()
-        change[:, axis, 9 + axis] -= 1.0
-        cost[1:] += config.spin_rate / duration * np.einsum("tki,tkj->tij", change, change)
-        end = follow[-1].copy()
-        end[axis, 3 + axis] += 1.0 / config.frequency
-        cost[-1] += config.final * end.T @ end + 0.1 * config.final * spin[-1].T @ spin[-1]
-        slope[-1] -= config.final * end.T @ offset[-1]
-        cost[0, GIVEN:, GIVEN:] += 1e-3 * np.eye(size - GIVEN)
-        for index, (event, plane) in enumerate(zip(free.events, free.planes, strict=True)):
-            own = free.states(index)
-            cost[0, own, own] += (config.landing + config.landing_change) * np.eye(2)
-            slope[0, own] -= config.landing_change * plane.T @ situation.goal.get(event, np.zeros(3))
-        constant = 0.5 * (config.com * dt @ (offset**2).sum(1) + config.final * (offset[-1] ** 2).sum())
-        return cost, slope, float(constant)
-
-    def _contact_rows(self, window: Window, contacts: ContactTable, dynamics: Dynamics, cones: Cones):
+    def _contact_rows(self, window: Window, contacts: HorizonContacts, dynamics: Dynamics, cones: Cones):
         """Rows and bounds of the wrenches' deviations."""
         step, limb = dynamics.step, dynamics.limb
         friction = contacts.friction[step, limb]
@@ -245,7 +219,7 @@ class ReplanProblem:
             if limb[c] < 2:
                 torque = self._nominal.torque[window.first + step[c], limb[c]]
                 rows[c, SIDES + 12 : -1] = np.concatenate([torque, -torque])
-                limit[c, SIDES + 12 : -1] = self._config.body.torque
+                limit[c, SIDES + 12 : -1] = BODY.torque
         return rows, np.maximum(limit - np.einsum("cri,ci->cr", rows, dynamics.wrench), ROOM)
 
     def _cone(self, limb: int, friction: float, cones: Cones) -> np.ndarray:
@@ -261,16 +235,17 @@ class ReplanProblem:
             self._cone_rows[key] = rows
         return rows
 
-    def _soft_rows(self, window: Window, contacts: ContactTable, free: FreeLandings, situation: Situation, early):
+    def _soft_rows(self, window: Window, contacts: HorizonContacts, free: FreeLandings, situation: Situation, early):
         """Limits of the body after the first knot, then regions of the landing points."""
-        table, size, config, first = self._nominal.rows, self._size, self._config, window.first
+        nominal, size, first = self._nominal, self._size, window.first
+        table = nominal.rows
         begin, end = np.searchsorted(table.knot, [first + 1, window.last + 1])
         knot, limb = table.knot[begin:end] - first, table.limb[begin:end]
         gradient, clearance = table.gradient[begin:end], table.clearance[begin:end]
         rows = np.zeros((end - begin, size))
         rows[:, :3] = -gradient
         # The contact of the step before the knot, or where there is none of the one after it.
-        step = np.where(self._nominal.active[first + knot - 1, limb] | (knot >= window.steps), knot - 1, knot)
+        step = np.where(nominal.active[first + knot - 1, limb] | (knot >= window.steps), knot - 1, knot)
         contact = limb >= 0
         bound = clearance - np.where(contact, (gradient * contacts.shift[step, limb]).sum(1), 0.0)
         for index, plane in enumerate(free.planes):
@@ -278,38 +253,13 @@ class ReplanProblem:
             rows[here, free.states(index)] = gradient[here] @ plane
         blocks, bounds = [rows], [bound]
         for index, event in enumerate(free.events):
-            region, room = self._region(event, situation, early)
+            end = early.get(event, nominal.swings[event].end)
+            region, room = self._landings.region(event, situation, end)
             block = np.zeros((len(region), size))
             block[:, free.states(index)] = region
             blocks.append(block)
             bounds.append(room)
         landing = sum(len(block) for block in blocks[1:])
-        price = np.concatenate([np.full(len(rows), config.price), np.full(landing, HARD)])
+        price = np.concatenate([np.full(len(rows), PRICE), np.full(landing, HARD)])
         knot = np.concatenate([knot, np.zeros(landing, int)]).astype(np.int64)
         return knot, np.concatenate(blocks), np.concatenate(bounds), price
-
-    def _region(self, event: int, situation: Situation, early: dict[int, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Half planes of a landing point's shift."""
-        swing, config = self._nominal.swings[event], self._config
-        contact = self._landings[event]
-        found = self._regions.get(event)
-        if found is None:
-            half = self._half_sizes[swing.limb]
-            found = landing_rows(contact, half, self._surfaces[contact.surface], config.margin)
-            self._regions[event] = found
-        rows, bounds = [found[0]], [found[1]]
-        axes = np.concatenate([np.eye(2), -np.eye(2)])
-        rows.append(axes)
-        reach = np.full(4, config.max_shift)
-        if event in situation.moving:
-            moved = contact.pose.rotation[:, :2].T @ situation.moving[event]
-            left = config.slew * max(early.get(event, swing.end) - situation.time - 0.05, 0.0)
-            reach = np.minimum(reach, np.maximum(axes @ moved + left, 0.0))
-        bounds.append(reach)
-        other = situation.standing.get(swing.limb.mirrored)
-        if other is not None and swing.start <= situation.time + 1e-9:
-            half = self._half_sizes[swing.limb]
-            row, room = apart_row(contact.pose, half, Pose(other[2], other[1]), half, config.gap)
-            rows.append(row[None])
-            bounds.append(np.array([room]))
-        return np.concatenate(rows), np.concatenate(bounds)
