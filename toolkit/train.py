@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from toolkit import cli
 from toolkit.contacts.category import Category
@@ -24,11 +22,12 @@ from toolkit.learning.dataset import read_dataset, read_datasets
 from toolkit.learning.differentiate import differentiate
 from toolkit.learning.enrich import EnrichConfig, enrich
 from toolkit.learning.evaluate import Score, at_default, balanced, score
+from toolkit.learning.jobs import executor
 from toolkit.learning.query import query_seconds
 from toolkit.learning.shard import CollectConfig
 from toolkit.prediction.network import load_network, network_path, training_summary
 from toolkit.prediction.networks import load_networks
-from toolkit.report.console import make_console
+from toolkit.report.console import make_console, progress_bar
 from toolkit.report.scores import score_table
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
@@ -45,42 +44,6 @@ Make the networks with which the contact search judges transitions.
   fit            train a classifier and a regressor per category (needs torch: pip install -e '.[train]')
   evaluate       score the trained networks on fresh transitions
 """
-
-
-def progress_bar(console: Console) -> Progress:
-    """A progress bar for counted work."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-    )
-
-
-@contextmanager
-def executor(workers: int, cluster: str | None) -> Iterator[Executor]:
-    """Local processes, or the workers of a dask cluster.
-
-    Raises:
-        InputError: dask is not installed, or the cluster does not answer.
-    """
-    if cluster is None:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            yield pool
-        return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError("--cluster needs dask: pip install -e '.[cluster]'") from None
-    try:
-        client = Client(cluster, timeout="20s")
-    except (OSError, TimeoutError, ValueError) as error:
-        raise InputError(f"--cluster {cluster}: no dask scheduler answers there ({error})") from None
-    with client, client.get_executor(pure=False) as pool:
-        yield pool
 
 
 def add_executor_options(parser: argparse.ArgumentParser) -> None:

@@ -25,10 +25,9 @@ from toolkit.centroidal.residual import check
 from toolkit.centroidal.sampling import SamplingConfig, sample_transition, sample_walk
 from toolkit.contacts.category import Category
 from toolkit.contacts.schedule import ContactSchedule
-from toolkit.report.console import make_console
+from toolkit.report.console import make_console, progress_bar
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
-from toolkit.train import progress_bar
 from validation import goals
 from validation.goals import Goal
 from validation.growth import exponent

@@ -12,7 +12,8 @@ from typing import Any
 
 from rich.console import Console
 
-from toolkit.train import executor, progress_bar
+from toolkit.learning.jobs import executor
+from toolkit.report.console import progress_bar
 from validation.trial_file import TrialFile
 
 Record = dict[str, Any]

@@ -171,7 +171,7 @@ def test_a_cluster_makes_the_same_shards(tmp_path, robot):
     config = CollectConfig(robot=robot.name, seed=5, samples_per_category=12, per_shard=4)
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         collect(tmp_path / "local", robot, config, pool)
-    from toolkit.train import executor
+    from toolkit.learning.jobs import executor
 
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,

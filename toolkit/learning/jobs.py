@@ -2,11 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from multiprocessing import get_context
 from typing import TypeVar
 
+from toolkit.errors import InputError
+
 Result = TypeVar("Result")
+
+
+@contextmanager
+def executor(workers: int, cluster: str | None) -> Iterator[Executor]:
+    """Local processes, or the workers of a dask cluster.
+
+    Raises:
+        InputError: dask is not installed, or the cluster does not answer.
+    """
+    if cluster is None:
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            yield pool
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError("--cluster needs dask: pip install -e '.[cluster]'") from None
+    try:
+        client = Client(cluster, timeout="20s")
+    except (OSError, TimeoutError, ValueError) as error:
+        raise InputError(f"--cluster {cluster}: no dask scheduler answers there ({error})") from None
+    with client, client.get_executor(pure=False) as pool:
+        yield pool
 
 
 def run_jobs(
