@@ -5,12 +5,10 @@ import numpy as np
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.reference import planned_wrench, sample_reference
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.wholebody.limb_paths import limb_paths
 
 
 def sampled(plan, times):
-    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion)
-    return sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, paths, plan.robot)
+    return sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, plan.paths, plan.robot)
 
 
 def test_com_velocity_and_acceleration_are_derivatives(walking):

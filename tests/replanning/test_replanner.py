@@ -16,7 +16,6 @@ from toolkit.replanning.dynamics import G
 from toolkit.replanning.kernel import solve
 from toolkit.replanning.nominal import Nominal
 from toolkit.replanning.problem import ReplanProblem
-from toolkit.wholebody.limb_paths import limb_paths
 
 CONFIG = ReplanConfig(enabled=True)
 WITH = ExecutionConfig(replanning=CONFIG)
@@ -25,9 +24,10 @@ WITH = ExecutionConfig(replanning=CONFIG)
 @pytest.fixture(scope="module")
 def nominal(walking):
     plan = walking
-    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion)
     times = np.arange(0.0, plan.schedule.duration, 0.01)
-    reference = sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, paths, plan.robot)
+    reference = sample_reference(
+        times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, plan.paths, plan.robot
+    )
     return Nominal.of(plan.motion, reference, plan.robot, CONFIG)
 
 

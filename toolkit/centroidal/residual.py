@@ -63,7 +63,7 @@ class Residuals:
 
 def check(motion: CentroidalMotion) -> Residuals:
     """Recompute how far a motion violates its problem."""
-    p = motion.problem
+    p = motion.solved
     n, weight = p.steps, p.mass * -GRAVITY[2]
     com, linear, angular = motion.com, motion.linear_momentum, motion.angular_momentum
     force, cop, torque = motion.force, motion.cop, motion.yaw_torque

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from toolkit.contacts.failure import Failure
 from toolkit.execution.check import Check
 
 
@@ -32,8 +33,7 @@ class Execution:
         touchdowns: one dict per transition: `transition`, `limb`, `time`, `planned_time`, `position_error` m.
         slip: one entry per stance: largest tangential displacement of any patch while it was in contact, m.
         completed: the plan was run to its end.
-        fell: base too low, tilted, or body contact with the world.
-        fall_reason: one line, "" if it did not fall.
+        fall: How the robot fell: base too low, tilted, or body contact with the world. None where it did not.
         solver_failures: control ticks whose QP was not solved.
         com_rms_error: m; from the plan as replanned: a robot that recovers from a push is not asked to be where it
             would be without, and a run that nothing disturbs has no other plan than the first one.
@@ -44,7 +44,8 @@ class Execution:
         tick_seconds: (C,) wall-clock of each control tick.
         simulated_seconds, real_time_factor: of the whole loop.
         checks: every check of the verdict that execution decides.
-        failure_time: s; the fall, the first unplanned contact or the stance that slipped too far; None without any.
+        failure: The first check that did not pass, or the fall; its time is that of the fall, the first unplanned
+            contact or the stance that slipped too far. None where every check passed.
         replayable: the controls alone reproduce the run; False where it was pushed.
     """
 
@@ -70,8 +71,7 @@ class Execution:
     touchdowns: tuple[dict, ...]
     slip: tuple[float, ...]
     completed: bool
-    fell: bool
-    fall_reason: str
+    fall: Failure | None
     goal_reached: bool
     final_goal_distance: float
     max_slip: float
@@ -86,9 +86,14 @@ class Execution:
     real_time_factor: float
     checks: tuple[Check, ...]
     replayable: bool = True
-    failure_time: float | None = None
+    failure: Failure | None = None
     replans: int = 0
     replan_failures: int = 0
     replan_departures: int = 0
     replan_landings: int = 0
     replan_seconds: float = 0.0
+
+    @property
+    def fell(self) -> bool:
+        """Whether the robot fell."""
+        return self.fall is not None

@@ -10,6 +10,7 @@ and are left to the final collision check.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import mujoco
@@ -18,8 +19,6 @@ import numpy as np
 from toolkit.geometry.limb import PALMS, Limb
 from toolkit.robot.chain import joints_to
 from toolkit.robot.model import RobotModel
-from toolkit.world.scene import compose_scene
-from toolkit.world.world import World
 
 
 @dataclass(frozen=True)
@@ -45,16 +44,16 @@ class AvoidanceConfig:
 class ArmAvoidance:
     """Distances of the arms in the composed scene, tick after tick."""
 
-    def __init__(self, robot: RobotModel, world: World, config: AvoidanceConfig):
-        """Compose the scene once.
+    def __init__(self, robot: RobotModel, scene: mujoco.MjModel, config: AvoidanceConfig):
+        """Prepare a copy of the scene.
 
         Args:
             robot: the robot; one without palms has no arms to speak of.
-            world: what to avoid.
+            scene: robot and world in one model; what to avoid.
             config: settings.
         """
         self.config = config
-        self.model = compose_scene(robot, world)
+        self.model = copy.copy(scene)
         self.data = mujoco.MjData(self.model)
         self.static = self.model.body_weldid[self.model.geom_bodyid] == 0
         self.arm_of = _arm_of_geoms(robot, self.model)

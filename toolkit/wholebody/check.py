@@ -8,13 +8,12 @@ import mujoco
 import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.contacts.failure import Failure
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.collision import CollisionConfig, first_collision
-from toolkit.wholebody.finding import Finding
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.torque import inverse_dynamics, velocities
-from toolkit.world.world import World
 
 
 @dataclass(frozen=True)
@@ -62,17 +61,17 @@ class CheckReport:
     torque: np.ndarray
     base_residual: np.ndarray
     limits_respected: bool
-    findings: tuple[Finding, ...]
+    findings: tuple[Failure, ...]
 
     @property
     def reasons(self) -> tuple[str, ...]:
         """One line per violated check."""
-        return tuple(finding.text for finding in self.findings)
+        return tuple(finding.reason for finding in self.findings)
 
 
 def check(
     robot: RobotModel,
-    world: World,
+    scene: mujoco.MjModel,
     paths: LimbPaths,
     motion: CentroidalMotion,
     times: np.ndarray,
@@ -83,7 +82,7 @@ def check(
 
     Args:
         robot: the robot.
-        world: for collisions.
+        scene: robot and world in one model, for collisions.
         paths: planned poses of the limbs.
         motion: planned CoM and wrenches.
         times: (T,) s, uniform.
@@ -93,7 +92,7 @@ def check(
     position, orientation, tracking = _tracking(robot, paths, motion, times, qpos, config)
     torque, residual = inverse_dynamics(robot, motion, times, qpos)
     limits = _limits(robot, times, qpos, torque, _bearing(robot, motion), config)
-    hit = first_collision(robot, world, times, qpos, config.collision)
+    hit = first_collision(robot, scene, times, qpos, config.collision)
     findings = tracking + limits + ([hit] if hit else [])
     return CheckReport(position, orientation, torque, residual, not limits, tuple(findings))
 
@@ -105,7 +104,7 @@ def _tracking(
     times: np.ndarray,
     qpos: np.ndarray,
     config: CheckConfig,
-) -> tuple[float, float, list[Finding]]:
+) -> tuple[float, float, list[Failure]]:
     """Largest position and orientation error over CoM and contacts, and the reasons to fail."""
     model = robot.mujoco_model
     data = mujoco.MjData(model)
@@ -138,7 +137,7 @@ def _tracking(
             position = max(position, note(limb.label, "m", error, limit, time))
             orientation = max(orientation, note(limb.label, "rad", turn, config.orientation, time))
     findings = [
-        Finding(f"{thing} is {error:.3g} {unit} off its plan at {time:.2f} s (limit {limit:.3g} {unit})", float(time))
+        Failure(f"{thing} is {error:.3g} {unit} off its plan at {time:.2f} s (limit {limit:.3g} {unit})", float(time))
         for (thing, unit), (error, limit, time) in worst.items()
         if error > limit
     ]
@@ -169,7 +168,7 @@ def _limits(
     torque: np.ndarray,
     bearing: np.ndarray,
     config: CheckConfig,
-) -> list[Finding]:
+) -> list[Failure]:
     """Reasons to fail: range, velocity, torque."""
     findings = []
     joints = qpos[:, 7:]
@@ -180,7 +179,7 @@ def _limits(
             f"joint {robot.joint_names[column]} is at {joints[row, column]:.3f} rad at {times[row]:.2f} s "
             f"(range {robot.lower[column]:.3f} to {robot.upper[column]:.3f} rad)"
         )
-        findings.append(Finding(text, float(times[row])))
+        findings.append(Failure(text, float(times[row])))
     torque_ratio = np.where(bearing, config.torque_ratio, config.free_torque_ratio)
     speed = velocities(robot.mujoco_model, times, qpos)[:, 6:]
     for values, limit, allowed, what, unit in (
@@ -193,7 +192,7 @@ def _limits(
                 f"joint {robot.joint_names[column]} {what} {values[row, column]:.3g} {unit} at {times[row]:.2f} s "
                 f"(limit {allowed[column] * limit[column]:.3g} {unit})"
             )
-            findings.append(Finding(text, float(times[row])))
+            findings.append(Failure(text, float(times[row])))
     return findings
 
 

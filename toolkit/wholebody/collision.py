@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from toolkit.contacts.failure import Failure
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.finding import Finding
-from toolkit.world.scene import compose_scene
-from toolkit.world.world import World
 
 
 @dataclass(frozen=True)
@@ -31,21 +29,20 @@ class CollisionConfig:
 
 
 def first_collision(
-    robot: RobotModel, world: World, times: np.ndarray, qpos: np.ndarray, config: CollisionConfig
-) -> Finding | None:
+    robot: RobotModel, scene: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray, config: CollisionConfig
+) -> Failure | None:
     """The first collision of a motion, None if there is none.
 
     Pairs of links that touch each other in the home posture are left out.
 
     Args:
         robot: the robot.
-        world: the world.
+        scene: robot and world in one model.
         times: (T,) s, uniform.
         qpos: (T, 7 + n).
         config: what counts.
     """
-    model = compose_scene(robot, world)
-    data = mujoco.MjData(model)
+    model, data = scene, mujoco.MjData(scene)
     static = model.body_weldid[model.geom_bodyid] == 0
     patch = np.isin(model.geom_bodyid, [model.body(limb.body).id for limb in robot.limbs.values()])
     resting = _touching_at_home(model, data, static, robot.home)
@@ -63,7 +60,7 @@ def first_collision(
             else:
                 allowed = np.inf if _bodies(model, first, second) in resting else config.self_depth
             if depth > allowed:
-                return Finding(
+                return Failure(
                     f"{_label(model, first)} and {_label(model, second)} collide at {times[index]:.2f} s, "
                     f"{depth * 1e3:.1f} mm deep (allowed {allowed * 1e3:.1f} mm)",
                     float(times[index]),
