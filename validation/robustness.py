@@ -27,7 +27,7 @@ from validation.trial_file import TrialFile
 DESCRIPTION = """\
 Plan once through each of ten random rubble fields, then execute the plan under each disturbance alone: pushes, body
 mass, friction, surfaces that lie elsewhere, delay. A run SURVIVES when the robot carries the plan out to its end and
-stands in the goal; it HOLDS when moreover no stance slips 3 cm, nothing but soles and palms touches the world, and
+stands in the goal; it HOLDS when moreover no stance slips 2 cm, nothing but soles and palms touches the world, and
 torques and velocities stay within the limits; it PASSES when every check of the verdict does.
 """
 NONE = "none"

@@ -12,6 +12,7 @@ import numpy as np
 
 from toolkit import pipeline
 from toolkit.errors import ToolkitError
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.replay import replay_controls
 from toolkit.execution.result import Execution
 from toolkit.geometry.limb import PALMS
@@ -26,7 +27,6 @@ from validation.cases import Case
 from validation.options import TrialSettings
 
 WORLD_FILE = "world.xml"  # in a run's folder, to run it again
-SLIP_LIMIT = 0.03  # m; of any one stance
 PALM_FORCE = 5.0  # N; planned palm forces below it are ramps and count nowhere
 
 
@@ -163,7 +163,7 @@ def holds(figures: dict[str, Any]) -> bool:
 def held_within(figures: dict[str, Any]) -> bool:
     """The bounds alone."""
     return (
-        figures["max_slip"] < SLIP_LIMIT
+        figures["max_slip"] <= ExecutionConfig().slip_limit
         and figures["unplanned_contacts"] == 0
         and figures["max_torque_ratio"] <= 1.0
         and figures["max_velocity_ratio"] <= 1.0
