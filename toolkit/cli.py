@@ -6,12 +6,13 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.errors import ToolkitError
+from toolkit.errors import InputError, ToolkitError
 from toolkit.world.timing import Timing
 
 if TYPE_CHECKING:
@@ -183,6 +184,31 @@ def plain_options(args: argparse.Namespace) -> dict[str, Any]:
     """The options that a report keeps: numbers, words and paths, but for the seed and the folder, kept elsewhere."""
     values = vars(args).items()
     return {k: v for k, v in values if isinstance(v, (bool, int, float, str, Path)) and k not in ("seed", "out")}
+
+
+@contextmanager
+def whole_file(path: Path, *, parents: bool = False) -> Iterator[Path]:
+    """A file to write into, which appears as `path` only when the block has ended without an error.
+
+    Args:
+        path: The file.
+        parents: Whether to make the folders that it lies in; they are removed again where nothing could be written.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    draft = path.with_name(f".{path.name}.tmp")
+    made = [folder for folder in path.parents if parents and not folder.exists()]
+    try:
+        for folder in reversed(made):
+            folder.mkdir()
+        yield draft
+        os.replace(draft, path)
+    except OSError as error:
+        for remove in (draft.unlink, *(folder.rmdir for folder in made)):
+            with suppress(OSError):
+                remove()
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another --out") from error
 
 
 def _terrain_error(text: str) -> tuple[float, float]:

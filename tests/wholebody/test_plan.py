@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.wholebody.interpolate import TrajectorySampler
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import whole_body
 from toolkit.world.scene import compose_scene
@@ -89,23 +88,6 @@ def test_velocities_are_mujocos(robot, planned):
         error = np.zeros(model.nv)
         mujoco.mj_differentiatePos(model, error, 1.0, qpos, trajectory.qpos[index + 1])
         assert np.abs(error).max() < 1e-2  # rad or m; a lift-off changes the acceleration by 100 rad/s^2 in 20 ms
-
-
-def test_sampler_passes_through_the_samples_with_continuous_velocity(robot, planned):
-    _, trajectory = planned
-    sampler, h = TrajectorySampler(trajectory), 1e-6
-    model, change = robot.mujoco_model, np.zeros(robot.mujoco_model.nv)
-    for index in range(1, len(trajectory.times) - 1, 13):
-        time = trajectory.times[index]
-        qpos, qvel, _ = sampler.sample(time)
-        mujoco.mj_differentiatePos(model, change, 1.0, trajectory.qpos[index], qpos)
-        np.testing.assert_allclose(change, 0.0, atol=1e-9)
-        np.testing.assert_allclose(qvel, trajectory.qvel[index], atol=1e-6)
-        for moment in (time - h, time + 0.37 * trajectory.times[1]):
-            before, after = sampler.sample(moment - h)[0], sampler.sample(moment + h)[0]
-            mujoco.mj_differentiatePos(model, change, 2 * h, before, after)
-            # The base's rotation leaves out third-order terms of the turn within 20 ms.
-            np.testing.assert_allclose(sampler.sample(moment)[1], change, atol=1e-4)
 
 
 def test_an_infeasible_motion_is_refused(robot, flat_walk):
