@@ -43,7 +43,7 @@ class Planner:
         )
 
 
-def run(planner, passing, monkeypatch, candidates=6, blamed=None):
+def run(planner, passing, monkeypatch, candidates=6):
     tested = []
 
     class Tester:
@@ -52,7 +52,7 @@ def run(planner, passing, monkeypatch, candidates=6, blamed=None):
 
         def test(self, item):
             tested.append(item.name)
-            failure = None if item.name in passing else Failure("it fell", transition=blamed)
+            failure = None if item.name in passing else Failure("it fell")
             return SimpleNamespace(passed=failure is None, merit=(len(tested),), failure=failure)
 
     monkeypatch.setattr(loop, "Tester", Tester)
