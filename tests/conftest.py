@@ -1,9 +1,12 @@
 """A flat world, a standing robot, a short walk, planned and executed once for all tests."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from toolkit.centroidal.build import initial_com
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.centroidal.sequence import optimise
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
@@ -12,8 +15,10 @@ from toolkit.execution.run import execute
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
 from toolkit.robot.loader import find_robots, load_robot
+from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import whole_body
 from toolkit.world.loader import load_world
+from toolkit.world.scene import compose_scene
 from toolkit.world.timing import Timing
 
 FRICTION = 0.7
@@ -35,17 +40,19 @@ class Plan:
         self.robot, self.world, self.sequence = robot, world, sequence
         self.schedule = ContactSchedule.of(sequence, initial_rest=0.1, final_rest=0.4)
         self.motion = optimise(robot, self.schedule, initial_com(robot, sequence.start), np.zeros(3))
-        assert self.motion.feasible, self.motion.status
-        self.trajectory = whole_body(robot, world, self.schedule, self.motion)
+        assert self.motion.feasible, self.motion.outcome
+        plan = MotionPlan(robot, world, sequence, self.schedule, self.motion)
+        self.whole = whole_body(plan, compose_scene(robot, world))
+        self.paths, self.trajectory = self.whole.paths, self.whole.trajectory
 
     def run(self, **options):
-        parts = (self.robot, self.world, self.sequence, self.schedule, self.motion, self.trajectory)
-        return execute(*parts, **options)
+        return execute(self.whole, **options)
 
     def run_with(self, sequence, **options):
         """Run another sequence of the same timing with the same CoM and joints."""
         schedule = ContactSchedule.of(sequence, initial_rest=0.1, final_rest=0.4)
-        return execute(self.robot, self.world, sequence, schedule, self.motion, self.trajectory, **options)
+        paths = limb_paths(self.robot, self.world, schedule, self.motion)
+        return execute(replace(self.whole, sequence=sequence, schedule=schedule, paths=paths), **options)
 
 
 def sole(robot, limb, x=0.0):

@@ -45,7 +45,7 @@ def test_a_start_on_a_palm_is_planned_executed_and_replayed(name):
     assert result.passed, result.reason
     trial = result.trial
     assert trial is not None and trial.trajectory is not None and trial.execution is not None
-    contact = trial.solution.sequence.start[PALM]
+    contact = trial.plan.sequence.start[PALM]
 
     data = mujoco.MjData(robot.mujoco_model)  # the first posture, by MuJoCo's own kinematics
     data.qpos[:] = trial.trajectory.qpos[0]
@@ -56,7 +56,8 @@ def test_a_start_on_a_palm_is_planned_executed_and_replayed(name):
 
     execution = trial.execution
     break_time = next(
-        (phase.start for phase in trial.schedule.phases if PALM not in [item.limb for item in phase.contacts]), np.inf
+        (phase.start for phase in trial.plan.schedule.phases if PALM not in [item.limb for item in phase.contacts]),
+        np.inf,
     )
     held = execution.samples.tick_times < break_time - 0.1
     assert held.sum() * np.diff(execution.samples.tick_times).mean() > 0.4

@@ -5,7 +5,9 @@ from types import SimpleNamespace
 import pytest
 
 from toolkit import pipeline
+from toolkit.contacts.failure import Failure
 from toolkit.geometry.limb import Limb
+from toolkit.pipeline import loop
 
 
 def solution(name, *limbs, start=()):
@@ -44,12 +46,16 @@ class Planner:
 def run(planner, passing, monkeypatch, candidates=6):
     tested = []
 
-    def test(robot, world, item, config, observer):
-        tested.append(item.name)
-        passed = item.name in passing
-        return SimpleNamespace(passed=passed, merit=(len(tested),), reason="it fell", failed_transition=None)
+    class Tester:
+        def __init__(self, *parts):
+            pass
 
-    monkeypatch.setattr(pipeline, "test_solution", test)
+        def test(self, item):
+            tested.append(item.name)
+            failure = None if item.name in passing else Failure("it fell")
+            return SimpleNamespace(passed=failure is None, merit=(len(tested),), failure=failure)
+
+    monkeypatch.setattr(loop, "Tester", Tester)
     config = pipeline.PipelineConfig(candidates=candidates)
     return pipeline.run(None, None, planner, config), tested  # pyright: ignore[reportArgumentType]
 

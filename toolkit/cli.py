@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from toolkit.errors import ToolkitError
+from toolkit.errors import InputError, ToolkitError
 from toolkit.world.timing import Timing
+
+if TYPE_CHECKING:
+    from toolkit.execution.config import ExecutionConfig
+    from toolkit.search.planner import PlannerConfig
 
 AUTO_TIMINGS = (Timing(1.0, 1.0), Timing(0.4, 0.6), Timing(0.05, 0.35))
 EXIT_CODES = "exit codes: 0 success, 1 a plan or check failed (the reason is printed), 2 bad input"
@@ -38,7 +46,7 @@ def add_robot_options(target: argparse.ArgumentParser) -> None:
 
 def add_planning_options(target: argparse.ArgumentParser) -> None:
     """Add what every command that plans understands."""
-    target.add_argument("--seed", type=int, default=0, help="of every random draw (default: %(default)s)")
+    target.add_argument("--seed", type=int, default=0, help="seed of every random draw (default: %(default)s)")
     target.add_argument(
         "--planner",
         choices=("auto", "learned", "optimiser", "kinematic", "quasi-static"),
@@ -71,6 +79,55 @@ def add_planning_options(target: argparse.ArgumentParser) -> None:
     )
 
 
+@dataclass(frozen=True)
+class PlanningOptions:
+    """What `add_planning_options` understands, but for the seed.
+
+    Attributes:
+        planner: Who judges transitions (`toolkit.pipeline.planner.PLANNERS`).
+        timing: Times that a transition may take; empty for the world's own.
+        time_limit: s of the search.
+        expansions: States that the search expands at most; None for any number.
+        no_palms: Whether to plan with the feet alone.
+        steps: Size of the foot transition model.
+        heuristic: Heuristic of the search.
+    """
+
+    planner: str = "auto"
+    timing: tuple[Timing, ...] = ()
+    time_limit: float = 30.0
+    expansions: int | None = 1000
+    no_palms: bool = False
+    steps: int = 60
+    heuristic: str = "grid"
+
+    @classmethod
+    def of(cls, args: argparse.Namespace) -> PlanningOptions:
+        """The options of a parsed command line."""
+        return cls(
+            planner=args.planner,
+            timing=args.timing or (),
+            time_limit=args.time_limit,
+            expansions=args.expansions,
+            no_palms=args.no_palms,
+            steps=args.steps,
+            heuristic=args.heuristic,
+        )
+
+    def planner_config(self) -> PlannerConfig:
+        """Settings of the planner."""
+        from toolkit.search.anytime.ana_star import AnaStarConfig
+        from toolkit.search.planner import PlannerConfig
+
+        return PlannerConfig(
+            steps=self.steps,
+            palms=not self.no_palms,
+            heuristic=self.heuristic,
+            timings=self.timing,
+            search=AnaStarConfig(max_expansions=self.expansions),
+        )
+
+
 def add_disturbance_options(target: argparse.ArgumentParser) -> None:
     """Add what may differ between the simulation and the plan; nothing does by default."""
     group = target.add_argument_group("disturbances", "what differs between the simulation and the plan")
@@ -98,6 +155,60 @@ def add_execution_options(target: argparse.ArgumentParser) -> None:
         action="store_false",
         help="track the plan as it is: do not optimise the next contacts again from the measured state",
     )
+
+
+def execution_config(args: argparse.Namespace) -> ExecutionConfig:
+    """How a plan is carried out (see `add_disturbance_options` and `add_execution_options`).
+
+    Raises:
+        InputError: a value is out of range.
+    """
+    from toolkit.execution.config import ExecutionConfig
+    from toolkit.execution.disturbance import Disturbance
+    from toolkit.replanning.config import ReplanConfig
+
+    offset, tilt = args.terrain_error
+    disturbance = Disturbance(
+        push=args.push,
+        mass_error=args.mass_error,
+        friction_error=args.friction_error,
+        terrain_offset=offset,
+        terrain_tilt=math.radians(tilt),
+        state_noise=args.state_noise,
+        delay=args.delay,
+    )
+    return ExecutionConfig(disturbance=disturbance, replanning=ReplanConfig(enabled=args.replanning))
+
+
+def plain_options(args: argparse.Namespace) -> dict[str, Any]:
+    """The options that a report keeps: numbers, words and paths, but for the seed and the folder, kept elsewhere."""
+    values = vars(args).items()
+    return {k: v for k, v in values if isinstance(v, (bool, int, float, str, Path)) and k not in ("seed", "out")}
+
+
+@contextmanager
+def whole_file(path: Path, *, parents: bool = False) -> Iterator[Path]:
+    """A file to write into, which appears as `path` only when the block has ended without an error.
+
+    Args:
+        path: The file.
+        parents: Whether to make the folders that it lies in; they are removed again where nothing could be written.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    draft = path.with_name(f".{path.name}.tmp")
+    made = [folder for folder in path.parents if parents and not folder.exists()]
+    try:
+        for folder in reversed(made):
+            folder.mkdir()
+        yield draft
+        os.replace(draft, path)
+    except OSError as error:
+        for remove in (draft.unlink, *(folder.rmdir for folder in made)):
+            with suppress(OSError):
+                remove()
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another --out") from error
 
 
 def _terrain_error(text: str) -> tuple[float, float]:

@@ -42,28 +42,26 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     args = arguments().parse_args(argv)
     # Heavy imports come after the options, so that --help and mistakes in them answer at once.
-    from toolkit import pipeline
+    from toolkit.pipeline import PipelineConfig, make_planner, run
     from toolkit.report.console import StageConsole, solution_table
     from toolkit.report.files import RunFolder
-    from toolkit.report.run import write_run
+    from toolkit.report.run import RunOptions, write_run
     from toolkit.robot.loader import load_robot
-    from toolkit.search.options import planner_config
     from toolkit.world.loader import load_world
 
-    began = time.perf_counter()
+    began, options = time.perf_counter(), cli.PlanningOptions.of(args)
     display = StageConsole()
     world = load_world(args.world)
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
     folder = RunFolder(args.out, world.name, robot.name)
     display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
-    planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
-    config = pipeline.PipelineConfig(
-        seed=args.seed, time_limit=args.time_limit, candidates=sys.maxsize, until="dynamics"
-    )
-    result = pipeline.run(robot, world, planner, config, display)
+    planner = make_planner(robot, world, options.planner, options.planner_config())
+    config = PipelineConfig(seed=args.seed, time_limit=options.time_limit, candidates=sys.maxsize, until="dynamics")
+    result = run(robot, world, planner, config, display)
+    written = RunOptions(not args.no_recording, args.pictures, False, surface_seconds, cli.plain_options(args))
     with folder:
-        write_run(folder.path, result, args, surface_seconds)
+        write_run(folder.path, result, written)
     if result.search.solutions:
         display.console.print(solution_table(result.search, result.trial.solution if result.trial else None))
     display.verdict((), result.passed, result.reason, folder.target, time.perf_counter() - began)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import os
 from pathlib import Path
 
 from toolkit import cli
@@ -39,7 +37,6 @@ def main(argv: list[str] | None = None) -> int:
     """
     args = arguments().parse_args(argv)
     # The viewer's library takes a second to import: mistakes in the world are reported before.
-    from toolkit.errors import InputError
     from toolkit.world.loader import load_world
 
     world = load_world(args.world)
@@ -50,19 +47,8 @@ def main(argv: list[str] | None = None) -> int:
     console.print(surface_table(world))
     if args.out is None:
         return 0
-    draft = args.out / f".{RECORDING}.tmp"
-    made = [folder for folder in (args.out, *args.out.parents) if not folder.exists()]
-    try:
-        args.out.mkdir(parents=True, exist_ok=True)
+    with cli.whole_file(args.out / RECORDING, parents=True) as draft:
         write_surface_recording(draft, world)
-        os.replace(draft, args.out / RECORDING)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            draft.unlink()
-        for folder in made:
-            with contextlib.suppress(OSError):
-                folder.rmdir()
-        raise InputError(f"{args.out}: cannot be written ({error.strerror or error}); choose another --out") from error
     console.print(f"written to {args.out / RECORDING}", soft_wrap=True, markup=False)
     return 0
 

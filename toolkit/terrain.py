@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import inspect
-import os
 import sys
 from pathlib import Path
 
@@ -42,7 +40,7 @@ def arguments() -> argparse.ArgumentParser:
     for kind, generator in KINDS.items():
         text = inspect.getdoc(generator) or ""
         options = kinds.add_parser(kind, description=text.splitlines()[0])
-        options.add_argument("--seed", type=int, default=0, help="of everything random (default: 0)")
+        options.add_argument("--seed", type=int, default=0, help="seed of everything random (default: 0)")
         options.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: standard output)")
         described = dict(line.strip().split(": ", 1) for line in text.splitlines() if ": " in line)
         for name, parameter in inspect.signature(generator, eval_str=True).parameters.items():
@@ -78,14 +76,8 @@ def main(argv: list[str] | None = None) -> int:
     if out is None:
         sys.stdout.write(text)
         return 0
-    draft = out.with_name(f".{out.name}.tmp")
-    try:
+    with cli.whole_file(out) as draft:
         draft.write_text(text)
-        os.replace(draft, out)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            draft.unlink()
-        raise InputError(f"{out}: cannot be written ({error.strerror}); choose another --out") from error
     return 0
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
 from pathlib import Path
 
 from toolkit import cli
@@ -48,19 +47,17 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     args = arguments().parse_args(argv)
     # Heavy imports come after the options, so that --help and mistakes in them answer at once.
-    from toolkit import pipeline
-    from toolkit.execution.options import execution_config
+    from toolkit.pipeline import PipelineConfig, make_planner, run
     from toolkit.report.console import StageConsole
     from toolkit.report.files import RunFolder
     from toolkit.report.offscreen import require_rendering
-    from toolkit.report.run import write_run
+    from toolkit.report.run import RunOptions, write_run
     from toolkit.robot.loader import load_robot
-    from toolkit.search.options import planner_config
     from toolkit.world.loader import load_world
 
     began = time.perf_counter()
     display = StageConsole()
-    execution = execution_config(args)
+    options, execution = cli.PlanningOptions.of(args), cli.execution_config(args)
     world = load_world(args.world)
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
@@ -68,17 +65,14 @@ def main(argv: list[str] | None = None) -> int:
     if args.pictures or args.video:
         require_rendering()
     display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
-    config = replace(
-        pipeline.PipelineConfig(),
-        seed=args.seed,
-        time_limit=args.time_limit,
-        candidates=args.candidates,
-        execution=execution,
+    planner = make_planner(robot, world, options.planner, options.planner_config())
+    config = PipelineConfig(
+        seed=args.seed, time_limit=options.time_limit, candidates=args.candidates, execution=execution
     )
-    planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
-    result = pipeline.run(robot, world, planner, config, display)
+    result = run(robot, world, planner, config, display)
+    written = RunOptions(not args.no_recording, args.pictures, args.video, surface_seconds, cli.plain_options(args))
     with folder:
-        write_run(folder.path, result, args, surface_seconds)
+        write_run(folder.path, result, written)
     display.verdict(result.checks, result.passed, result.reason, folder.target, time.perf_counter() - began)
     return 0 if result.passed else 1
 

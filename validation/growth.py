@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import copy
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -25,9 +24,7 @@ WHOLE = 2  # worlds of each length whose search goes on for the whole time limit
 
 def growth_jobs(settings: TrialSettings, args: argparse.Namespace) -> list[Job]:
     """Searches through rubble of several lengths; their expansions are not limited, their time is."""
-    planning = copy.copy(settings.planning)
-    planning.expansions = None
-    settings = replace(settings, planning=planning)
+    settings = replace(settings, planning=replace(settings.planning, expansions=None))
     jobs = []
     for length in args.lengths:
         rows = max(round(length / TILE), 1)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from toolkit import cli
 from toolkit.execution.config import ExecutionConfig
+from toolkit.pipeline import planner_kind
+from toolkit.prediction.networks import load_networks
 from toolkit.replanning.config import ReplanConfig
 from toolkit.robot.loader import load_robot
-from toolkit.robot.model import RobotModel
 from validation.jobs import PoolOptions
 from validation.machine import ROOT, code_fingerprint, folder_fingerprint
 
@@ -72,7 +73,7 @@ class TrialSettings:
     Attributes:
         robot: name. robots: folder that holds it.
         planner: who judges transitions, "auto" already resolved.
-        planning: the planning options of the command line.
+        planning: the planning options of the command line; their `planner` gives way to this one.
         out: folder for runs.
         recording: whether runs are kept with a recording.
         replanning: whether runs replan.
@@ -81,7 +82,7 @@ class TrialSettings:
     robot: str
     robots: Path
     planner: str
-    planning: argparse.Namespace
+    planning: cli.PlanningOptions
     out: Path
     recording: bool = True
     replanning: bool = True
@@ -95,7 +96,8 @@ class TrialSettings:
         """As JSON can hold it, for results: what decides them."""
         names = ("timing", "time_limit", "expansions", "no_palms", "steps", "heuristic")
         own = {"robot": self.robot, "planner": self.planner, "replanning": self.replanning}
-        return own | {name: getattr(self.planning, name) for name in names}
+        planning = asdict(self.planning) | {"timing": self.planning.timing or None}
+        return own | {name: planning[name] for name in names}
 
     def deciding(self) -> dict[str, Any]:
         """What a trial's record depends on, the code and the robot's files included."""
@@ -113,25 +115,13 @@ def settings_of(args: argparse.Namespace) -> TrialSettings:
         InputError: the robot cannot be loaded, or the networks that were asked for are not there.
     """
     robot = load_robot(args.robot, args.robots)
-    planner = resolved(args.planner, robot)
+    planner = planner_kind(robot, args.planner)
+    if planner == "learned":
+        load_networks(robot)  # a planner that lacks its networks is refused before the first trial
     folder = robot.folder.resolve()
     replanning = getattr(args, "replanning", True)  # not every experiment executes
-    return TrialSettings(folder.name, folder.parent, planner, args, args.out.resolve(), replanning=replanning)
-
-
-def resolved(planner: str, robot: RobotModel) -> str:
-    """What "auto" stands for; a planner that lacks its networks is refused before the first trial.
-
-    Raises:
-        NetworkError: the networks are missing or do not fit.
-    """
-    if planner == "auto":
-        planner = "learned" if (robot.folder / "networks").is_dir() else "kinematic"
-    if planner == "learned":
-        from toolkit.prediction.networks import load_networks
-
-        load_networks(robot)
-    return planner
+    planning = cli.PlanningOptions.of(args)
+    return TrialSettings(folder.name, folder.parent, planner, planning, args.out.resolve(), replanning=replanning)
 
 
 def pool_of(args: argparse.Namespace) -> PoolOptions:

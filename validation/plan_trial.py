@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -161,7 +161,7 @@ def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: b
     warm_up(WarmUp(settings.robot, settings.robots, planner_kind))
     try:
         planner = TimedPlanner(make_planner(settings, world, planner_kind))
-        result = run(robot_of(settings.robot, settings.robots), world, cast(ContactPlanner, planner), config, log)
+        result = run(robot_of(settings.robot, settings.robots), world, planner, config, log)
     except ToolkitError as error:
         return record | {"reason": " ".join(str(error).split())}
     first, trial = planner.search_result, result.trial
@@ -179,18 +179,18 @@ def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: b
         again = make_planner(settings, world, planner_kind)
         second = again.search(np.random.default_rng([case.seed, 0]), limit)
         record["repeatable"] = signature(first) == signature(second)
-    if trial is None or trial.motion is None:
+    if trial is None:
         return record
     if not result.passed:
         return record | {"stage": "dynamics"}
-    transitions = trial.solution.sequence.transitions
+    transitions, motion = trial.plan.sequence.transitions, trial.plan.motion
     return record | {
         "stage": "done",
-        "objective": trial.motion.objective,
-        "optimiser_seconds": trial.motion.seconds,
+        "objective": motion.objective,
+        "optimiser_seconds": motion.seconds,
         "transitions": len(transitions),
         "palm_contacts": sum(not t.limb.is_foot and t.contact is not None for t in transitions),
-        "figures": asdict(motion_figures(trial.motion)),
+        "figures": asdict(motion_figures(motion)),
     }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import time
 from dataclasses import replace
 from functools import lru_cache
@@ -13,22 +12,21 @@ import numpy as np
 
 from toolkit import pipeline
 from toolkit.errors import ToolkitError
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.replay import replay_controls
 from toolkit.execution.result import Execution
 from toolkit.geometry.limb import PALMS
 from toolkit.report.files import REPORT, RunFolder
-from toolkit.report.run import write_run
+from toolkit.report.run import RunOptions, write_run
 from toolkit.report.run_report import RunReport, write_report
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
-from toolkit.search.options import planner_config
 from toolkit.search.planner import ContactPlanner
 from toolkit.world.world import World
 from validation.cases import Case
 from validation.options import TrialSettings
 
 WORLD_FILE = "world.xml"  # in a run's folder, to run it again
-SLIP_LIMIT = 0.03  # m; of any one stance
 PALM_FORCE = 5.0  # N; planned palm forces below it are ramps and count nowhere
 
 
@@ -60,7 +58,7 @@ def make_planner(
     settings: TrialSettings, world: World, kind: str | None = None, first_only: bool = False
 ) -> ContactPlanner:
     """The planner of a trial; `kind` in place of that of the settings, `first_only` as in `AnaStarConfig`."""
-    config = planner_config(settings.planning)
+    config = settings.planning.planner_config()
     config = replace(config, search=replace(config.search, first_only=first_only))
     return pipeline.make_planner(robot_of(settings.robot, settings.robots), world, kind or settings.planner, config)
 
@@ -96,7 +94,7 @@ def execution_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
         "planned": bool(result.search.solutions),
         "tested": result.tested,
         "stages": log.entries,
-        "feasible": trial is not None and trial.motion is not None and trial.motion.feasible,
+        "feasible": trial is not None and trial.plan.motion.feasible,
         "wholebody": trial is not None and trial.trajectory is not None and trial.trajectory.feasible,
         "arrived": False,
         "held": False,
@@ -105,7 +103,7 @@ def execution_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
         "reason": result.reason,
     }
     if trial is not None:
-        transitions = trial.solution.sequence.transitions
+        transitions = trial.plan.sequence.transitions
         record["transitions"] = len(transitions)
         record["palm_contacts"] = sum(not t.limb.is_foot and t.contact is not None for t in transitions)
         if trial.execution is not None:
@@ -124,10 +122,9 @@ def stage_reached(result: pipeline.PipelineResult) -> str:
         return "planning"
     if trial.passed:
         return "done"
-    for stage, reached in (("execution", trial.execution), ("wholebody", trial.trajectory), ("dynamics", trial.motion)):
-        if reached is not None:
-            return stage
-    return "planning"
+    if trial.execution is not None:
+        return "execution"
+    return "dynamics" if trial.trajectory is None else "wholebody"
 
 
 def executed(execution: Execution) -> dict[str, Any]:
@@ -138,7 +135,7 @@ def executed(execution: Execution) -> dict[str, Any]:
         "arrived": arrived,
         "replays": bool(np.array_equal(final, execution.controls.final_qpos)),
         "fell": execution.fell,
-        "fall_reason": execution.fall_reason,
+        "fall_reason": "" if execution.fall is None else execution.fall.reason,
         "simulated_seconds": execution.simulated_seconds,
         "max_slip": execution.max_slip,
         "max_torque_ratio": execution.max_torque_ratio,
@@ -166,7 +163,7 @@ def holds(figures: dict[str, Any]) -> bool:
 def held_within(figures: dict[str, Any]) -> bool:
     """The bounds alone."""
     return (
-        figures["max_slip"] < SLIP_LIMIT
+        figures["max_slip"] <= ExecutionConfig().slip_limit
         and figures["unplanned_contacts"] == 0
         and figures["max_torque_ratio"] <= 1.0
         and figures["max_velocity_ratio"] <= 1.0
@@ -194,12 +191,14 @@ def keep_run(
     settings: TrialSettings, case: Case, result: pipeline.PipelineResult, surface_seconds: float, name: str = ""
 ) -> str:
     """Write the folder of a run, with its world and its recording; returns its path."""
-    options = argparse.Namespace(
-        seed=case.seed, planner=settings.planner, robot=settings.robot, no_recording=not settings.recording
+    options = RunOptions(
+        recording=settings.recording,
+        surface_seconds=surface_seconds,
+        settings={"planner": settings.planner, "robot": settings.robot},
     )
     folder = RunFolder(settings.out / "runs" / (name or case.name), result.world.name, settings.robot)
     with folder:
-        write_run(folder.path, result, options, surface_seconds)
+        write_run(folder.path, result, options)
         (folder.path / WORLD_FILE).write_text(case.mjcf(), encoding="utf-8")
     return shown(folder.target)
 
@@ -207,15 +206,7 @@ def keep_run(
 def keep_failure(settings: TrialSettings, case: Case, world: World, reason: str) -> str:
     """The same for a trial that ended before there was anything but its world."""
     folder = RunFolder(settings.out / "runs" / case.name, world.name, settings.robot)
-    report = RunReport.of(
-        world=world.name,
-        robot=settings.robot,
-        seed=case.seed,
-        passed=False,
-        reason=reason,
-        surfaces=world.surfaces,
-        options={"planner": settings.planner},
-    )
+    report = RunReport.without_search(world, settings.robot, case.seed, reason, {"planner": settings.planner})
     with folder:
         write_report(folder.path / REPORT, report)
         (folder.path / WORLD_FILE).write_text(case.mjcf(), encoding="utf-8")

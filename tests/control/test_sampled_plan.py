@@ -5,13 +5,11 @@ import numpy as np
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.sampled_plan import sample_reference
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.motion_dynamics import planned_wrench
 
 
 def sampled(plan, times):
-    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion)
-    return sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, paths, plan.robot)
+    return sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, plan.paths, plan.robot)
 
 
 def test_com_velocity_and_acceleration_are_derivatives(walking):

@@ -1,5 +1,6 @@
 """Whole runs: standing, walking, replay; and runs that are broken on purpose must fail."""
 
+import copy
 import dataclasses
 
 import mujoco
@@ -12,6 +13,9 @@ from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.execution.replay import replay, replay_controls
 from toolkit.execution.run import execute
+from toolkit.geometry.limb import Limb
+from toolkit.wholebody.plan import WholeBodyConfig, whole_body
+from toolkit.wholebody.swing_task import SwingConfig
 
 
 def failed(execution):
@@ -29,6 +33,7 @@ def test_a_standing_robot_stands_still(standing):
 
 def test_a_short_walk_arrives(walking, walked):
     assert failed(walked) == set(), walked.checks
+    assert walked.failure is None and walked.fall is None
     assert walked.completed and walked.goal_reached and not walked.fell
     assert walked.solver_failures == 0
     assert walked.com_rms_error < 0.01
@@ -91,9 +96,13 @@ def test_sampled_poses_are_those_of_the_sampled_states(walking, walked):
 def test_a_robot_without_its_motors_falls(walking):
     """A robot whose motors give a hundredth of what the plan needs sinks, and the run says so."""
     weak = dataclasses.replace(walking.robot, torque_limit=0.01 * walking.robot.torque_limit)
-    execution = execute(weak, walking.world, walking.sequence, walking.schedule, walking.motion, walking.trajectory)
-    assert execution.fell and not execution.completed and execution.fall_reason
+    execution = execute(dataclasses.replace(walking.whole, robot=weak))
+    assert execution.fall is not None and not execution.completed
     assert {"upright", "completed"} <= failed(execution)
+    failure = execution.failure
+    assert failure is not None and failure.reason == f"the robot fell: {execution.fall.reason}"
+    assert failure.time == execution.fall.time == execution.tick_times[-1]
+    assert failure.transition == walking.schedule.phase_at(failure.time).transition
 
 
 def test_a_push_that_is_too_strong_is_a_fall_and_is_not_replayable(walking):
@@ -115,34 +124,44 @@ def test_a_foot_planned_below_the_floor_touches_early_and_is_missed_by_its_plan(
     assert execution.touchdowns[0]["position_error"] == pytest.approx(0.03, abs=0.01)
 
 
-def test_wrong_friction_in_the_scene_is_noticed(walking, monkeypatch):
-    from toolkit.execution import run
+def test_wrong_friction_in_the_scene_is_noticed(walking):
+    scene = copy.copy(walking.whole.scene)
+    scene.geom_priority[:] = 0  # the larger of both frictions wins: the robot's own 1.0
+    scene.geom_friction[:, 0] = np.where(scene.geom_bodyid == 0, scene.geom_friction[:, 0], 1.0)
+    assert "friction" in failed(execute(dataclasses.replace(walking.whole, scene=scene)))
 
-    def slippery(robot, world):
-        scene = compose(robot, world)
-        scene.geom_priority[:] = 0  # the larger of both frictions wins: the robot's own 1.0
-        scene.geom_friction[:, 0] = np.where(scene.geom_bodyid == 0, scene.geom_friction[:, 0], 1.0)
-        return scene
 
-    compose = run.compose_scene
-    monkeypatch.setattr(run, "compose_scene", slippery)
-    assert "friction" in failed(walking.run())
+def test_the_plan_s_scene_stays_as_it_is(walking):
+    """A run that disturbs masses, friction and terrain does so in a scene of its own."""
+    before = copy.copy(walking.whole.scene)
+    disturbance = Disturbance(mass_error=0.05, friction_error=-0.1, terrain_offset=0.01, terrain_tilt=0.02)
+    execution = walking.run(config=ExecutionConfig(timestep=0.001, control_decimation=2, disturbance=disturbance))
+    scene = walking.whole.scene
+    assert execution.scene is not scene and execution.scene.opt.timestep == 0.001
+    for name in ("body_mass", "geom_friction", "geom_pos", "geom_quat", "geom_margin"):
+        np.testing.assert_array_equal(getattr(scene, name), getattr(before, name))
+    assert scene.opt.timestep == before.opt.timestep
+
+
+def test_the_controller_tracks_the_paths_of_the_plan(walking, flat):
+    """Feet that are planned to swing higher do so in the run: the paths are not planned anew."""
+    config = WholeBodyConfig(swing=SwingConfig(foot_lift=0.09))
+    plan = whole_body(walking.whole, walking.whole.scene, config)
+    lift = [execute(each).limb_pose[:, Limb.LEFT_FOOT, 2].max() for each in (walking.whole, plan)]
+    assert lift[1] > lift[0] + 0.02
 
 
 def test_the_goal_counts_for_the_feet(walking, flat):
-    elsewhere = flat(5.0)
-    execution = execute(
-        walking.robot, elsewhere, walking.sequence, walking.schedule, walking.motion, walking.trajectory
-    )
+    execution = execute(dataclasses.replace(walking.whole, world=flat(5.0)))
     assert failed(execution) == {"goal_distance"} and not execution.goal_reached
 
 
 def test_plans_of_another_length_or_robot_are_refused(walking, standing):
     with pytest.raises(ExecutionError, match="plan both together"):
-        execute(walking.robot, walking.world, walking.sequence, walking.schedule, standing.motion, walking.trajectory)
+        execute(dataclasses.replace(walking.whole, motion=standing.motion))
     cut = dataclasses.replace(walking.trajectory, qpos=walking.trajectory.qpos[:, :-1])
     with pytest.raises(ExecutionError, match="plan it with the robot that executes it"):
-        execute(walking.robot, walking.world, walking.sequence, walking.schedule, walking.motion, cut)
+        execute(dataclasses.replace(walking.whole, trajectory=cut))
 
 
 def test_progress_is_told(standing):

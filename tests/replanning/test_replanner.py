@@ -17,7 +17,6 @@ from toolkit.replanning.nominal import MAX_DT, Nominal
 from toolkit.replanning.replan import ReplanProblem
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.replanning.situation import Situation
-from toolkit.wholebody.limb_paths import limb_paths
 
 CONFIG = ReplanConfig()
 
@@ -25,10 +24,11 @@ CONFIG = ReplanConfig()
 @pytest.fixture(scope="module")
 def nominal(walking):
     plan = walking
-    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion)
     times = np.arange(0.0, plan.schedule.duration, 0.01)
-    reference = sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, paths, plan.robot)
-    return Nominal.of(plan.motion, reference, plan.robot, CONFIG.horizon)
+    reference = sample_reference(
+        times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, plan.paths, plan.robot
+    )
+    return Nominal.of(plan.motion, reference, plan.robot, CONFIG)
 
 
 @pytest.fixture(scope="module")

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
+from toolkit.contacts.failure import Failure
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
@@ -17,9 +19,12 @@ from toolkit.execution.check import Check
 from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_from_quaternion
+from toolkit.pipeline import PipelineConfig, PipelineResult, Trial
 from toolkit.report.run_report import RunReport
 from toolkit.robot.model import LimbModel, RobotModel
 from toolkit.search.result import SearchResult, Solution
+from toolkit.wholebody.limb_paths import LimbPaths
+from toolkit.wholebody.plan import WholeBodyPlan
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.surface import Surface
 from toolkit.world.timing import Timing
@@ -47,6 +52,7 @@ GROUND = """
 <light pos="0 0 4"/>"""
 HALF_SIZE = np.array([0.11, 0.065])
 TIMESTEP = 0.002
+FAILURE = Failure("slip is 0.03 m, the limit is 0.02")
 
 
 def mjcf(*parts: str, actuators: str = "") -> str:
@@ -56,17 +62,27 @@ def mjcf(*parts: str, actuators: str = "") -> str:
 
 @dataclass(frozen=True)
 class MadeUpRun:
-    """Everything that a run hands to the report."""
+    """A run, and how to take parts of it away."""
 
-    world: World
-    robot: RobotModel
-    search: SearchResult
-    sequence: ContactSequence
-    schedule: ContactSchedule
-    motion: CentroidalMotion
-    trajectory: WholeBodyTrajectory
+    result: PipelineResult
+    plan: WholeBodyPlan
     execution: Execution
     report: RunReport
+
+    @property
+    def solution(self) -> Solution:
+        """The newest solution of the search."""
+        return self.result.search.solutions[-1]
+
+    def only(self, plan: MotionPlan, execution: Execution | None = None) -> PipelineResult:
+        """The result of a run that came as far as `plan` or `execution`."""
+        return replace(self.result, trial=Trial(self.solution, plan, execution, FAILURE))
+
+    @property
+    def motion_plan(self) -> MotionPlan:
+        """The plan without what the whole-body stage added."""
+        plan = self.plan
+        return MotionPlan(plan.robot, plan.world, plan.sequence, plan.schedule, plan.motion)
 
 
 def make_world() -> World:
@@ -207,7 +223,7 @@ def make_run(steps: int = 4) -> MadeUpRun:
     nv = robot.mujoco_model.nv
     trajectory = WholeBodyTrajectory(
         times, qpos, np.zeros((len(times), nv)), np.zeros((len(times), 2)), limb_pose, np.zeros((len(times), 4, 6)),
-        contact, 1e-4, 1e-3, True, True, "", 0.3,
+        contact, 1e-4, 1e-3, True, 0.3,
     )  # fmt: skip
 
     scene = mujoco.MjModel.from_xml_string(mjcf(GROUND, BODIES, actuators=ACTUATORS))
@@ -253,8 +269,7 @@ def make_run(steps: int = 4) -> MadeUpRun:
         touchdowns=touchdowns,
         slip=tuple(np.linspace(0, 0.01, len(sequence.transitions) + 1)),
         completed=True,
-        fell=False,
-        fall_reason="",
+        fall=None,
         goal_reached=True,
         final_goal_distance=0.1,
         max_slip=0.01,
@@ -267,6 +282,7 @@ def make_run(steps: int = 4) -> MadeUpRun:
         simulated_seconds=float(schedule.duration),
         real_time_factor=1.2,
         checks=checks,
+        failure=FAILURE,
     )
     count = len(sequence.transitions)
     predicted = np.array([stance.mean_feet.position + [0, 0, 0.9] for stance in sequence.stances])
@@ -276,23 +292,10 @@ def make_run(steps: int = 4) -> MadeUpRun:
     )
     expanded = np.column_stack([np.linspace(0, 1, 50), 0.1 * np.sin(np.arange(50)), np.zeros(50)])
     search = SearchResult(solutions, 1.0, 0.2, 50, False, expanded, "")
-    report = RunReport.of(
-        world=world.name,
-        robot=robot.name,
-        seed=3,
-        passed=False,
-        reason="slip is 0.03 m, the limit is 0.02",
-        surfaces=world.surfaces,
-        surface_seconds=0.1,
-        search=search,
-        solution=solutions[-1],
-        sequences_tested=1,
-        motion=motion,
-        trajectory=trajectory,
-        execution=execution,
-        checks=checks,
-    )
-    return MadeUpRun(world, robot, search, sequence, schedule, motion, trajectory, execution, report)
+    plan = WholeBodyPlan(robot, world, sequence, schedule, motion, scene, LimbPaths(()), trajectory)
+    trial = Trial(solutions[-1], plan, execution, FAILURE)
+    result = PipelineResult(robot, world, PipelineConfig(seed=3), search, trial, 1, FAILURE.reason)
+    return MadeUpRun(result, plan, execution, RunReport.of(result, 0.1))
 
 
 @pytest.fixture(scope="session")

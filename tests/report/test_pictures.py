@@ -32,7 +32,7 @@ def is_drawn(picture):
 
 
 def patches(run):
-    return Patches(run.sequence.start.contacts, run.robot.half_sizes)
+    return Patches(run.plan.sequence.start.contacts, run.plan.robot.half_sizes)
 
 
 def test_the_strip_shows_the_robot_moving(run, tmp_path, rendering):
@@ -117,16 +117,18 @@ def test_the_camera_avoids_a_wall(run):
 
 
 def test_the_plan_from_above_is_drawn_with_whatever_there_is(run, tmp_path):
-    for solution, motion in ((None, None), (run.search.solutions[0], None), (run.search.solutions[0], run.motion)):
-        draw_top_view(tmp_path / "plan.png", run.world, run.robot, solution, motion, run.execution.samples.com)
+    infeasible = replace(run.plan, motion=replace(run.plan.motion, feasible=False))
+    bare = replace(infeasible, world=replace(run.plan.world, surfaces=()))
+    com = run.execution.samples.com
+    for plan, executed in ((run.plan, com), (infeasible, com), (bare, None)):
+        draw_top_view(tmp_path / "plan.png", plan, run.solution, executed)
         assert is_drawn(iio.imread(tmp_path / "plan.png"))
-    draw_top_view(tmp_path / "bare.png", replace(run.world, surfaces=()), run.robot, None)
-    assert is_drawn(iio.imread(tmp_path / "bare.png"))
 
 
 def test_the_curves_are_drawn(run, tmp_path):
-    draw_plots(tmp_path / "plots.png", run.execution, run.schedule)
+    draw_plots(tmp_path / "plots.png", run.execution, run.plan.schedule)
     assert is_drawn(iio.imread(tmp_path / "plots.png"))
     samples = run.execution.samples
     empty = {name: getattr(samples, name)[:0] for name in ("tick_times", "com", "com_planned", "torque_ratio")}
-    draw_plots(tmp_path / "empty.png", replace(run.execution, samples=replace(samples, **empty), slip=()), run.schedule)
+    short = replace(run.execution, samples=replace(samples, **empty), slip=())
+    draw_plots(tmp_path / "empty.png", short, run.plan.schedule)

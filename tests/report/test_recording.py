@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from toolkit.contacts.failure import Failure
 from toolkit.execution.check import Check
 from toolkit.execution.result import Samples
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
+from toolkit.pipeline import Trial
 from toolkit.report import draw
 from toolkit.report.motion_scene import NEWTON_PER_METRE, frames, standing
 from toolkit.report.recording import write_recording
@@ -48,23 +50,14 @@ class Recording:
         return np.array(sorted(rows)), [np.array(rows[time]) for time in sorted(rows)]
 
 
-def write(run, path, **changes):
-    parts = dict(
-        report=run.report,
-        search=run.search,
-        solution=run.search.solutions[-1],
-        schedule=run.schedule,
-        motion=run.motion,
-        trajectory=run.trajectory,
-        execution=run.execution,
-    )
-    write_recording(path, world=run.world, robot=run.robot, **(parts | changes))
+def write(path, result, report):
+    write_recording(path, result, report)
     return Recording(path)
 
 
 @pytest.fixture(scope="module")
 def recording(run, tmp_path_factory):
-    return write(run, tmp_path_factory.mktemp("recording") / "recording.rrd")
+    return write(tmp_path_factory.mktemp("recording") / "recording.rrd", run.result, run.report)
 
 
 PATHS = [
@@ -160,7 +153,7 @@ def test_forces_have_the_stated_scale_and_vanish_without_contact(run, recording)
 
 def test_slip_changes_with_the_stance(run, recording):
     times, values = recording.columns("/series/slip", "scalars")
-    ends = [phase.end for phase in run.schedule.phases if phase.swing is not None]
+    ends = [phase.end for phase in run.plan.schedule.phases if phase.swing is not None]
     np.testing.assert_allclose(times[:-1], [0.0, *ends], rtol=0, atol=1e-6)  # nanoseconds in the recording
     np.testing.assert_allclose(np.ravel(values)[:-1], 1e3 * np.array(run.execution.slip), rtol=1e-9)
 
@@ -174,36 +167,34 @@ def test_made_contacts_add_up(run, recording):
     assert times[0] == 0.0
 
 
-@pytest.mark.parametrize(
-    ("dropped", "absent", "present"),
-    [
-        (("execution",), "/series/tracking", "/series/linear_momentum/planned"),
-        (("execution", "trajectory"), "/world/com/executed", "/world/com/optimised"),
-        (("execution", "trajectory", "motion"), "/world/com/optimised", "/world/com/predicted"),
-        (("execution", "trajectory", "motion", "solution", "schedule", "search"), "/world/plan", "/world/surfaces"),
-    ],
-)
-def test_a_run_that_failed_is_recorded_as_far_as_it_came(run, tmp_path, dropped, absent, present):
-    recording = write(run, tmp_path / "part.rrd", **{name: None for name in dropped})
+STAGES = {
+    "wholebody": (lambda run: run.only(run.plan), "/series/tracking", "/series/linear_momentum/planned"),
+    "dynamics": (lambda run: run.only(run.motion_plan), "/world/com/executed", "/world/com/optimised"),
+    "search": (lambda run: replace(run.result, trial=None), "/world/com/optimised", "/world/com/predicted"),
+}
+
+
+@pytest.mark.parametrize(("result", "absent", "present"), STAGES.values(), ids=STAGES)
+def test_a_run_that_failed_is_recorded_as_far_as_it_came(run, tmp_path, result, absent, present):
+    recording = write(tmp_path / "part.rrd", result(run), run.report)
     assert not recording.has(absent) and recording.has(present)
     assert recording.columns("/world/robot/block", "translation")[0][0] == 0.0
 
 
 def test_a_search_without_a_solution_and_a_motion_without_sense_are_recorded(run, tmp_path):
-    search = replace(run.search, solutions=(), expanded=np.zeros((0, 3)), reason="nothing leads there")
-    nothing = dict(solution=None, schedule=None, motion=None, trajectory=None, execution=None)
-    recording = write(run, tmp_path / "none.rrd", search=search, **nothing)
+    search = replace(run.result.search, solutions=(), expanded=np.zeros((0, 3)), reason="nothing leads there")
+    recording = write(tmp_path / "none.rrd", replace(run.result, search=search, trial=None), run.report)
     assert recording.has("/world/robot") and not recording.has("/world/plan")
-    broken = replace(run.motion, feasible=False, com=run.motion.com * np.nan)
-    recording = write(run, tmp_path / "broken.rrd", motion=broken, trajectory=None, execution=None)
+    motion = replace(run.plan.motion, feasible=False, com=run.plan.motion.com * np.nan)
+    recording = write(tmp_path / "broken.rrd", run.only(replace(run.motion_plan, motion=motion)), run.report)
     assert not recording.has("/world/com/optimised")
 
 
 def test_a_fall_at_once_is_recorded(run, tmp_path):
     execution = run.execution
     cut = Samples(**{item.name: getattr(execution.samples, item.name)[:1] for item in fields(Samples)})
-    short = replace(execution, samples=cut, touchdowns=(), slip=(), fell=True, fall_reason="tilted by 60 degrees")
-    recording = write(run, tmp_path / "fall.rrd", execution=short)
+    short = replace(execution, samples=cut, touchdowns=(), slip=(), fall=Failure("tilted by 60 degrees", 0.0))
+    recording = write(tmp_path / "fall.rrd", run.only(run.plan, short), run.report)
     (chunk,) = recording.chunks["/events"]
     assert "tilted by 60 degrees" in str(chunk.to_record_batch().to_pydict())
 
@@ -213,17 +204,16 @@ def test_the_summary_states_verdict_checks_and_legend(run):
     assert text.startswith("# FAIL: glider in made-up")
     for part in ("slip is 0.03 m", "| slip | 0.03 m | 0.02 m |", "NOT_CHECKED", "1 m = 1000 N", "left foot red"):
         assert part in text
-    passed = RunReport.of(
-        world="w", robot="r", seed=0, passed=True, reason="", surfaces=(), checks=(Check("fall", 0.0, "", 0.0),)
-    )
+    execution = replace(run.execution, checks=(Check("fall", 0.0, "", 0.0),))
+    passed = RunReport.of(replace(run.result, trial=Trial(run.solution, run.plan, execution)))
     assert summary(passed).startswith("# PASS") and "FAIL" not in summary(passed)
     assert json.dumps(passed.as_dict())
 
 
 def test_the_search_s_summary_has_a_row_per_solution(run):
-    text = search_summary(run.search)
+    text = search_summary(run.result.search)
     assert "| 0.100 s | 9.000 | unknown | 6 |" in text and "| 0.600 s | 7.000 | 40 % | 6 |" in text
-    assert "**no way**" in search_summary(replace(run.search, solutions=(), reason="no way"))
+    assert "**no way**" in search_summary(replace(run.result.search, solutions=(), reason="no way"))
 
 
 def test_frames_keep_the_ends():
@@ -235,13 +225,13 @@ def test_frames_keep_the_ends():
 
 def test_standing_puts_the_home_posture_on_a_frame(run):
     feet = Pose.from_yaw(np.array([1.0, 2.0, 0.5]), np.pi / 2)
-    qpos = standing(run.robot, feet)[0]
-    np.testing.assert_allclose(qpos[:3], [1.0, 2.0, 0.5 + run.robot.home[2]], rtol=0, atol=1e-12)
+    qpos = standing(run.plan.robot, feet)[0]
+    np.testing.assert_allclose(qpos[:3], [1.0, 2.0, 0.5 + run.plan.robot.home[2]], rtol=0, atol=1e-12)
     np.testing.assert_allclose(qpos[3:7], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)], rtol=0, atol=1e-12)
 
 
 def test_a_recording_of_surfaces_alone_needs_no_robot(run, tmp_path):
     stream = draw.start_recording(tmp_path / "surfaces.rrd", "surfaces", "made-up")
-    draw.draw_surfaces(stream, run.world.surfaces)
+    draw.draw_surfaces(stream, run.plan.world.surfaces)
     stream.disconnect()
     assert Recording(tmp_path / "surfaces.rrd").has("/world/surfaces/palm/fill")

@@ -109,7 +109,7 @@ def test_palm_forces_are_compared_where_palms_are_planned_to_push():
 GOOD = {
     "arrived": True,
     "replays": True,
-    "max_slip": 0.029,
+    "max_slip": 0.019,
     "unplanned_contacts": 0,
     "max_torque_ratio": 1.0,
     "max_velocity_ratio": 1.0,
@@ -121,7 +121,7 @@ GOOD = {
     [
         ("arrived", False),
         ("replays", False),
-        ("max_slip", 0.03),
+        ("max_slip", 0.021),
         ("max_slip", float("nan")),
         ("unplanned_contacts", 1),
         ("max_torque_ratio", 1.01),

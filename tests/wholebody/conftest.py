@@ -1,11 +1,10 @@
 """A statically balanced walk on any terrain, made by hand: the whole-body stage needs no optimiser to be tested."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
 from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_problem
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
@@ -27,13 +26,6 @@ FIRST = 0.15  # m, where the stairs begin
 @pytest.fixture(scope="session", params=ROBOTS)
 def robot(request):
     return load_robot(request.param)
-
-
-@dataclass(frozen=True)
-class Walk:
-    world: World
-    schedule: ContactSchedule
-    motion: CentroidalMotion
 
 
 def world_of(geoms: str) -> World:
@@ -67,14 +59,16 @@ def foot_contact(robot, limb: Limb, x: float, height: float) -> Contact:
     return Contact(limb, Pose.from_yaw(np.array([x, side, height]), 0.0), 0.8, 0)
 
 
-def schedule_of(robot, moves, height=lambda x: 0.0) -> ContactSchedule:
-    """Schedule of (limb, x of a foot, palm contact, or None) moves from a stance at x = 0."""
+def planned_walk(robot, world: World, moves, height=lambda x: 0.0) -> MotionPlan:
+    """A balanced walk of (limb, x of a foot, palm contact, or None) moves from a stance at x = 0."""
     start = Stance(tuple(foot_contact(robot, foot, 0.0, height(0.0)) for foot in FEET))
     transitions, timing = [], Timing(0.8, 0.8)
     for limb, target in moves:
         contact = foot_contact(robot, limb, target, height(target)) if limb.is_foot else target
         transitions.append(ContactTransition(limb, contact, timing))
-    return ContactSchedule.of(ContactSequence(start, tuple(transitions)), final_rest=0.8)
+    sequence = ContactSequence(start, tuple(transitions))
+    schedule = ContactSchedule.of(sequence, final_rest=0.8)
+    return MotionPlan(robot, world, sequence, schedule, balanced(robot, schedule))
 
 
 def balanced(robot, schedule: ContactSchedule) -> CentroidalMotion:
@@ -121,22 +115,20 @@ def _shares(feet: dict[Limb, np.ndarray], com: np.ndarray) -> dict[Limb, float]:
 
 
 @pytest.fixture(scope="session")
-def flat_walk(robot) -> Walk:
+def flat_walk(robot) -> MotionPlan:
     moves = [(Limb.LEFT_FOOT, 0.2), (Limb.RIGHT_FOOT, 0.35), (Limb.LEFT_FOOT, 0.35)]
-    schedule = schedule_of(robot, moves)
-    return Walk(world_of(""), schedule, balanced(robot, schedule))
+    return planned_walk(robot, world_of(""), moves)
 
 
 @pytest.fixture(scope="session")
-def stair_walk(robot) -> Walk:
+def stair_walk(robot) -> MotionPlan:
     first, second = FIRST + TREAD / 2, FIRST + 1.5 * TREAD
     moves = [(Limb(foot), x) for x in (first, second) for foot in FEET]
-    schedule = schedule_of(robot, moves, lambda x: stair_height(x, 2))
-    return Walk(world_of(stairs(2)), schedule, balanced(robot, schedule))
+    return planned_walk(robot, world_of(stairs(2)), moves, lambda x: stair_height(x, 2))
 
 
 @pytest.fixture(scope="session")
-def palm_walk(robot) -> Walk:
+def palm_walk(robot) -> MotionPlan:
     """A palm is put on a side wall, moved along it, and taken back."""
     if Limb.LEFT_PALM not in robot.arms:
         pytest.skip("a robot without palms")
@@ -155,6 +147,5 @@ def palm_walk(robot) -> Walk:
         (Limb.LEFT_FOOT, 0.1),
         (Limb.LEFT_PALM, None),
     ]
-    schedule = schedule_of(robot, moves)
     geom = f'<geom name="wall" type="box" size="2 0.05 0.9" pos="0 {wall[1] + 0.05} 0.9" friction="0.8"/>'
-    return Walk(world_of(geom), schedule, balanced(robot, schedule))
+    return planned_walk(robot, world_of(geom), moves)

@@ -9,6 +9,7 @@ from toolkit.wholebody.collision import first_collision
 from toolkit.wholebody.ik_config import IKConfig
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import solve_ik
+from toolkit.world.scene import compose_scene
 
 
 @pytest.fixture
@@ -35,7 +36,7 @@ def outermost(robot, qpos):
 
 def test_nothing_pushes_in_the_open(robot, hand):
     """At home some links are near others, none so near that its damper asks for a motion."""
-    avoidance = ArmAvoidance(robot, world_of(""))
+    avoidance = ArmAvoidance(robot, compose_scene(robot, world_of("")))
     rows, bound = avoidance.rows(robot.home, np.zeros(6), 0.01, set())
     assert rows.shape == (len(bound), len(robot.joint_names))
     assert (bound > 0.0).all()
@@ -44,7 +45,7 @@ def test_nothing_pushes_in_the_open(robot, hand):
 def test_rows_are_derivatives_of_the_distance(robot, hand):
     """Moving the joints changes each distance as the row says, by finite differences on MuJoCo's distances."""
     world = side_wall(hand[1] + 0.08)
-    avoidance, tick, h = ArmAvoidance(robot, world), 0.01, 1e-5
+    avoidance, tick, h = ArmAvoidance(robot, compose_scene(robot, world)), 0.01, 1e-5
     rows, bound = avoidance.rows(robot.home, np.zeros(6), tick, set())
     assert len(rows) > 0
     rng = np.random.default_rng(0)
@@ -59,7 +60,7 @@ def test_rows_are_derivatives_of_the_distance(robot, hand):
 
 
 def test_a_reaching_hand_may_touch(robot, hand):
-    avoidance = ArmAvoidance(robot, side_wall(hand[1] + 0.03))
+    avoidance = ArmAvoidance(robot, compose_scene(robot, side_wall(hand[1] + 0.03)))
     free, _ = avoidance.rows(robot.home, np.zeros(6), 0.01, set())
     reaching, _ = avoidance.rows(robot.home, np.zeros(6), 0.01, set(PALMS))
     assert len(reaching) < len(free)
@@ -71,17 +72,18 @@ def test_arms_are_drawn_in_beside_a_wall(robot, flat_walk, hand):
     times = np.linspace(0.0, flat_walk.schedule.duration, int(50 * flat_walk.schedule.duration) + 1)
     free = solve_ik(robot, paths, flat_walk.motion, times, IKConfig())
     world = side_wall(max(outermost(robot, qpos) for qpos in free) + 0.02)
-    hit = first_collision(robot, world, times, free)
-    assert hit is not None and "world/wall" in hit.text
-    drawn_in = solve_ik(robot, paths, flat_walk.motion, times, IKConfig(), world)
-    assert first_collision(robot, world, times, drawn_in) is None
+    scene = compose_scene(robot, world)
+    hit = first_collision(robot, scene, times, free)
+    assert hit is not None and "world/wall" in hit.reason
+    drawn_in = solve_ik(robot, paths, flat_walk.motion, times, IKConfig(), scene)
+    assert first_collision(robot, scene, times, drawn_in) is None
 
 
 def test_boxes_are_seen_edge_to_edge(robot, hand):
     """A box whose edge points at the hand, where MuJoCo's collision of boxes with a margin finds nothing."""
     place = f"{hand[0]} {hand[1] + 0.3} {hand[2]}"
     world = world_of(f'<geom name="post" type="box" size="0.15 0.15 0.02" pos="{place}" euler="30 20 45"/>')
-    avoidance = ArmAvoidance(robot, world)
+    avoidance = ArmAvoidance(robot, compose_scene(robot, world))
     avoidance._place(robot.home)
     model, data, post = avoidance.model, avoidance.data, avoidance.model.geom("world/post").id
     pairs = avoidance._box_pairs()

@@ -10,21 +10,21 @@ from tests.wholebody.conftest import world_of
 from toolkit.geometry.limb import Limb
 from toolkit.wholebody.check import check
 from toolkit.wholebody.collision import first_collision
-from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.motion_dynamics import contact_wrenches, inverse_dynamics
 from toolkit.wholebody.plan import whole_body
+from toolkit.world.scene import compose_scene
 
 
 @pytest.fixture(scope="module")
 def good(robot, flat_walk):
-    paths = limb_paths(robot, flat_walk.world, flat_walk.schedule, flat_walk.motion)
-    trajectory = whole_body(robot, flat_walk.world, flat_walk.schedule, flat_walk.motion)
-    return paths, trajectory.times, trajectory.qpos
+    plan = whole_body(flat_walk, compose_scene(robot, flat_walk.world))
+    return plan.paths, plan.trajectory.times, plan.trajectory.qpos
 
 
 def reasons(robot, walk, good, *, world=None, qpos=None, paths=None):
     kept, times, states = good
-    report = check(robot, world or walk.world, paths or kept, walk.motion, times, states if qpos is None else qpos)
+    scene = compose_scene(robot, world or walk.world)
+    report = check(robot, scene, paths or kept, walk.motion, times, states if qpos is None else qpos)
     return report, "; ".join(report.reasons)
 
 
@@ -91,8 +91,8 @@ def test_soles_may_rest_but_not_sink(robot, flat_walk, good):
     for depth, expected in ((0.003, ""), (0.006, "world/floor")):
         qpos = states.copy()
         qpos[:, 2] -= depth
-        hit = first_collision(robot, flat_walk.world, times, qpos)
-        assert (hit is None) if expected == "" else (hit is not None and expected in hit.text and hit.time == 0.0)
+        hit = first_collision(robot, compose_scene(robot, flat_walk.world), times, qpos)
+        assert (hit is None) if expected == "" else (hit is not None and expected in hit.reason and hit.time == 0.0)
 
 
 def test_folding_the_body_into_itself_collides(robot, flat_walk, good):
@@ -101,8 +101,8 @@ def test_folding_the_body_into_itself_collides(robot, flat_walk, good):
     rng, qpos = np.random.default_rng(0), states.copy()
     qpos[:, 2] += 2.0  # off the ground
     qpos[:, 7:] = rng.uniform(robot.lower, robot.upper, size=qpos[:, 7:].shape)
-    hit = first_collision(robot, flat_walk.world, times, qpos)
-    assert hit is not None and "collide at" in hit.text
+    hit = first_collision(robot, compose_scene(robot, flat_walk.world), times, qpos)
+    assert hit is not None and "collide at" in hit.reason
 
 
 def test_not_a_number_fails(robot, flat_walk, good):
@@ -114,9 +114,10 @@ def test_not_a_number_fails(robot, flat_walk, good):
 
 def test_a_blocked_swing_is_reported(robot, flat_walk):
     world = world_of('<geom name="slab" type="box" size="0.01 1 1" pos="0.17 0 1"/>')
-    trajectory = whole_body(robot, world, flat_walk.schedule, flat_walk.motion)
-    assert not trajectory.feasible
-    assert "finds no way clear of the world in transition 0" in trajectory.reason
+    trajectory = whole_body(dataclasses.replace(flat_walk, world=world), compose_scene(robot, world)).trajectory
+    assert not trajectory.feasible and trajectory.failure is not None
+    assert "finds no way clear of the world in transition 0" in trajectory.failure.reason
+    assert trajectory.failure.transition == 0 and trajectory.failure.time == flat_walk.schedule.phases[1].start
 
 
 def test_planned_forces_carry_the_weight(robot, flat_walk, good):

@@ -7,12 +7,13 @@ import pytest
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import whole_body
+from toolkit.world.scene import compose_scene
 
 
 @pytest.fixture(scope="module", params=["flat_walk", "stair_walk", "palm_walk"])
 def planned(request, robot):
     walk = request.getfixturevalue(request.param)
-    return walk, whole_body(robot, walk.world, walk.schedule, walk.motion)
+    return walk, whole_body(walk, compose_scene(robot, walk.world)).trajectory
 
 
 def test_walks_are_feasible(planned):
@@ -91,7 +92,8 @@ def test_velocities_are_mujocos(robot, planned):
 
 def test_an_infeasible_motion_is_refused(robot, flat_walk):
     motion = dataclasses.replace(flat_walk.motion, feasible=False, status="no luck")
-    trajectory = whole_body(robot, flat_walk.world, flat_walk.schedule, motion)
+    plan = dataclasses.replace(flat_walk, motion=motion)
+    trajectory = whole_body(plan, compose_scene(robot, flat_walk.world)).trajectory
     assert not trajectory.feasible
     assert trajectory.reason == "the centroidal motion is not feasible: no luck"
 

@@ -146,7 +146,7 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
         robot: its limbs.
         margins: kept off each limit.
     """
-    p, n = motion.problem, motion.problem.steps
+    p, n = motion.solved, motion.problem.steps
     violation: dict[str, np.ndarray] = {}
 
     def enter(name: str, at: np.ndarray, limb: np.ndarray | int, value: np.ndarray) -> None:
@@ -194,7 +194,7 @@ def lowest_foot(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
 
 def _enter_torques(motion: CentroidalMotion, robot: RobotModel, limb: Limb, part: float, enter) -> None:
     """Enter how far the torques of a leg exceed `part` of their limits."""
-    p, leg = motion.problem, robot.legs[limb]
+    p, leg = motion.solved, robot.legs[limb]
     step = np.flatnonzero(p.active[:, limb])
     if not len(step):
         return

@@ -7,7 +7,7 @@ The first solution on a machine compiles the kernels (numba), which are then kep
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -56,13 +56,11 @@ def solve(problem: CentroidalProblem, *, config: FastConfig | None = None) -> Ce
         status=STATUS[code],
         **arrays._asdict(),
         objective=np.inf,
-        seconds=perf_counter() - start,
+        seconds=0.0,
         iterations=iterations,
     )
-    if code in MOTION:
-        motion = confirmed(motion)
-        object.__setattr__(motion, "seconds", perf_counter() - start)
-    return motion
+    motion = confirmed(motion) if code in MOTION else motion
+    return replace(motion, seconds=perf_counter() - start)
 
 
 def wrenches(problem: CentroidalProblem, *, config: FastConfig | None = None) -> MotionArrays | None:

@@ -18,10 +18,11 @@ by the weight, torques are not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from toolkit.contacts.failure import Failure
 from toolkit.physics.momentum import ballistic
 
 STANDARD_GRAVITY = 9.81  # m/s^2
@@ -135,12 +136,12 @@ class CentroidalProblem:
 
 @dataclass(frozen=True)
 class CentroidalMotion:
-    """Result of an optimisation; meaningless where `feasible` is False except for `status`.
+    """Result of an optimisation; meaningless where `feasible` is False except for `status` and `failure`.
 
     Attributes:
-        problem: what was solved.
+        problem: what was asked.
         feasible: the residual check passed, not merely the solver's flag.
-        status: the solver's word, for messages.
+        status: the solver's word.
         com: (N + 1, 3) m.
         linear_momentum: (N + 1, 3) kg m/s.
         angular_momentum: (N + 1, 3) kg m^2/s about the CoM.
@@ -150,7 +151,9 @@ class CentroidalMotion:
         objective: value of the paper's objective, recomputed in NumPy.
         seconds: wall-clock time, everything counted.
         iterations: of the solver.
-        failure_time: s; when a constraint is violated most, None where feasible or unknown.
+        failure: The constraint that is violated most; None where feasible, or where nobody looked for it.
+        kept: The margins that the motion keeps; None where they are those of the problem.
+        landed: (N, 4, 3) m; centres of the patches where the optimiser moved them; None where they are the problem's.
     """
 
     problem: CentroidalProblem
@@ -165,7 +168,23 @@ class CentroidalMotion:
     objective: float
     seconds: float
     iterations: int
-    failure_time: float | None = None
+    failure: Failure | None = None
+    kept: Margins | None = None
+    landed: np.ndarray | None = None
+
+    @property
+    def solved(self) -> CentroidalProblem:
+        """The problem that the motion solves: contacts where they landed, within the margins that it keeps."""
+        solved = self.problem
+        if self.landed is not None:
+            shift = (self.landed[-1, :2] - solved.position[-1, :2]).mean(0)
+            solved = replace(solved, position=self.landed, final_center=solved.final_center + shift)
+        return solved if self.kept is None else replace(solved, margins=self.kept)
+
+    @property
+    def outcome(self) -> str:
+        """The solver's word and, where the motion failed, why: for messages."""
+        return self.status if self.failure is None else f"{self.status}; {self.failure.reason}"
 
     def sample(self, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """CoM position, velocity and acceleration (3,) at a time in s, exact between knots, clamped at the ends."""

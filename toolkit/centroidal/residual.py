@@ -110,7 +110,7 @@ def _evaluated(motion: CentroidalMotion) -> tuple[Residuals, float]:
     shapes = (knots, knots, knots, (n, 4, 3), (n, 4, 2), (n, 4))
     if any(array.shape != shape for array, shape in zip(arrays, shapes, strict=True)):
         return UNDEFINED, np.inf
-    return evaluate(ProblemArrays.of(motion.problem), arrays)
+    return evaluate(ProblemArrays.of(motion.solved), arrays)
 
 
 @compiled(kept=True)

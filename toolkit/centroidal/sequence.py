@@ -2,13 +2,12 @@
 
 The paper's objective under exact cones, with what the body can do (`toolkit.centroidal.body`), and with margins: the
 wanted margins may be relaxed at a price, so they shrink only where nothing else is feasible, and the motion says how
-far (its problem's margins). Solved by Ipopt.
+far. Solved by Ipopt.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import casadi as ca
@@ -21,6 +20,7 @@ from toolkit.centroidal.pieces import WRENCH, G
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem, Margins, Weights
 from toolkit.centroidal.program import Landing, Program, Regularisers
 from toolkit.centroidal.verdict import judged
+from toolkit.contacts.failure import Failure
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.errors import InputError
 from toolkit.geometry.limb import FEET
@@ -71,12 +71,11 @@ def optimise(
         com_velocity: (3,) m/s.
         config: see the class.
         room: (transitions, 2, 2) m; lowest and highest displacement of each transition's contact along its own axes,
-            where feet may land elsewhere; the motion's problem has the contacts where they landed. As planned where
-            None.
+            where feet may land elsewhere: `CentroidalMotion.landed` says where. As planned where None.
 
     Returns:
-        The motion. Feasible where NumPy confirms it within `motion.problem.margins` and the body's limits; else
-        `status` names the constraint that is violated most, and where.
+        The motion. Feasible where NumPy confirms it within the margins that it keeps and the body's limits; else its
+        failure names the constraint that is violated most, and where.
 
     Raises:
         InputError: as `sequence_problem`, or a contact is not finite.
@@ -84,33 +83,23 @@ def optimise(
     start = time.perf_counter()
     problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem)
     landings = None if room is None else _landings(problem, schedule, room)
-    motion = optimise_problem(robot, problem, config=config, landings=landings)
-    ends = np.array([phase.end for phase in schedule.phases])
-    status = motion.status
-    if "at knot" in status:
-        before, _, rest = status.rpartition("at knot ")
-        knot = min(int(rest), problem.steps - 1)
-        middle = (problem.times[knot] + problem.times[knot + 1]) / 2
-        phase = schedule.phases[min(int(np.searchsorted(ends, middle)), len(ends) - 1)]
-        status = f"{before}in transition {phase.transition}, {problem.times[knot]:.2f} s"
-    return replace(motion, status=status, seconds=time.perf_counter() - start)
-
-
-def optimise_problem(
-    robot: RobotModel,
-    problem: CentroidalProblem,
-    *,
-    config: SequenceConfig = SequenceConfig(),
-    landings: Sequence[Landing] | None = None,
-) -> CentroidalMotion:
-    """Optimise a problem whose margins are the wanted ones; as `optimise`."""
-    start = time.perf_counter()
     program = Program(problem, robot, config.body, config.regularisers, landings)
     if not np.isfinite(program.assembly.parameters).all():
         raise InputError("a contact pose, a friction coefficient or a timing of the sequence is not finite")
     x, status, iterations = _solve(program, config)
     motion = judged(_motion(program, x, status), robot, x[program.layout.slack])
-    return replace(motion, iterations=iterations, seconds=time.perf_counter() - start)
+    failure = None if motion.failure is None else _placed(motion.failure, problem, schedule)
+    return replace(motion, failure=failure, iterations=iterations, seconds=time.perf_counter() - start)
+
+
+def _placed(failure: Failure, problem: CentroidalProblem, schedule: ContactSchedule) -> Failure:
+    """The failure with the transition that it belongs to, in words as well."""
+    if failure.knot is None or failure.time is None:
+        return failure
+    step = min(failure.knot, problem.steps - 1)
+    transition = schedule.phase_at(failure.time).transition
+    words = f"{failure.reason} in transition {transition}, {problem.times[step]:.2f} s"
+    return replace(failure, reason=words, transition=transition)
 
 
 def _solve(program: Program, config: SequenceConfig) -> tuple[np.ndarray, str, int]:
@@ -193,11 +182,11 @@ def _landings(problem: CentroidalProblem, schedule: ContactSchedule, room: np.nd
     return landings
 
 
-def _landed(program: Program, x: np.ndarray) -> CentroidalProblem:
-    """The problem with its contacts where the variables have them."""
+def _landed(program: Program, x: np.ndarray) -> np.ndarray | None:
+    """(N, 4, 3) m; contacts where the variables have them; None where they cannot move."""
     p, layout = program.problem, program.layout
     if not layout.moving:
-        return p
+        return None
     position, step = p.position.copy(), np.arange(p.steps)
     for foot in FEET:
         moved = np.einsum("tij,tj->ti", p.rotation[:, foot, :, :2], x[layout.pair(step, foot)])
@@ -205,13 +194,12 @@ def _landed(program: Program, x: np.ndarray) -> CentroidalProblem:
         position[on, foot] += moved[on]
         held = np.maximum.accumulate(np.where(on, step, -1))  # in the air, the contact it left
         position[held >= 0, foot] = position[held[held >= 0], foot]
-    shift = (position[-1, :2] - p.position[-1, :2]).mean(0)
-    return replace(p, position=position, final_center=p.final_center + shift)
+    return position
 
 
 def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
     """The motion of the program's variables, its knots integrated exactly from the wrenches."""
-    p, layout = _landed(program, x), program.layout
+    p, layout = program.problem, program.layout
     n, weight = p.steps, p.mass * G
     local, moment = np.zeros((n, 4, 3)), np.zeros((n, 4, 3))
     step, limb = np.nonzero(p.active)
@@ -233,4 +221,5 @@ def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
         objective=np.inf,
         seconds=0.0,
         iterations=0,
+        landed=_landed(program, x),
     )

@@ -12,6 +12,7 @@ import numpy as np
 from toolkit.centroidal.body import BodyResiduals, body_residuals
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion, Margins
 from toolkit.centroidal.residual import TOLERANCE, check, confirmed
+from toolkit.contacts.failure import Failure
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 
@@ -23,26 +24,24 @@ def judged(motion: CentroidalMotion, robot: RobotModel, slack: np.ndarray) -> Ce
     """The motion with the margins that it keeps, and the verdict of the independent checks.
 
     Args:
-        motion: as the solver left it, its problem with the wanted margins.
+        motion: as the solver left it; its problem has the wanted margins.
         robot: for the limits of the body.
         slack: (N + 1, 2); the excess beyond contacts' physical limits in weights, and the body's slack, by knot. Used
             only to say where an infeasible sequence is worst.
     """
     verdict = motion
-    for margins in _margins(motion):
-        verdict = confirmed(replace(motion, problem=replace(motion.problem, margins=margins)), TOLERANCE)
+    for margins in (None, *_wider(motion)):
+        verdict = confirmed(replace(motion, kept=margins), TOLERANCE)
         if verdict.feasible:
             break
     body = body_residuals(verdict, robot)
     if verdict.feasible and body.largest <= BODY_TOLERANCE:
         return verdict
-    reason, knot = _reason(verdict, body, slack)
-    time = None if knot is None else float(verdict.problem.times[knot])
-    return replace(verdict, feasible=False, status=f"{motion.status}; {reason}", failure_time=time)
+    return replace(verdict, feasible=False, status=motion.status, failure=_failure(verdict, body, slack))
 
 
-def _margins(motion: CentroidalMotion) -> list[Margins]:
-    """Margins that a motion may keep, the wanted ones first and the physical limits last.
+def _wider(motion: CentroidalMotion) -> list[Margins]:
+    """Margins that a motion may keep where it does not keep the wanted ones, the physical limits last.
 
     Friction and CoP factors follow from the forces. The yaw range also depends on them and has no such simple answer:
     ever wider margins are offered. A larger yaw factor alone is no looser where the other forces demand a yaw moment.
@@ -58,24 +57,25 @@ def _margins(motion: CentroidalMotion) -> list[Margins]:
     less = kept < p.half_size - p.reduced_half_size
     cop = np.min(kept, axis=0, where=less, initial=np.inf)
     friction, (cop_x, cop_y) = min(float(friction), 1.0), np.clip(cop, 0.0, wanted.cop).tolist()
-    offers = [wanted]
+    offers = []
     for part in np.linspace(0.0, 1.0, 6).tolist():
         wider = friction + part * (1.0 - friction), ((1 - part) * cop_x, (1 - part) * cop_y)
         offers += [Margins(*wider, wanted.yaw + part * (1.0 - wanted.yaw)), Margins(*wider, 1.0)]
     return offers
 
 
-def _reason(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) -> tuple[str, int | None]:
-    """Which constraint is violated most, by how much, and where; and the knot, None where unknown."""
-    name, knot, limb = body.worst
-    limits = f"infeasible: {name} of {limb.label} beyond its limit by {body.largest:.3g} at knot {knot}", int(knot)
+def _failure(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) -> Failure:
+    """Which constraint is violated most, by how much, and where."""
+    times = motion.problem.times
     step = int(np.argmax(slack[:-1, 0]))
     excess = slack[step, 0]
     if body.largest > BODY_TOLERANCE and (slack[:, 1].max() - 1.0 >= excess or excess < CHEATED):
-        return limits
+        name, knot, limb = body.worst
+        reason = f"infeasible: {name} of {limb.label} beyond its limit by {body.largest:.3g}"
+        return Failure(reason, float(times[knot]), limb=limb, knot=int(knot))
     residuals = check(motion)
     if excess < CHEATED and residuals.largest < 1e-3:
-        return f"unsolved: {residuals.worst.replace('_', ' ')} is violated by {residuals.largest:.2g}", None
+        return Failure(f"unsolved: {residuals.worst.replace('_', ' ')} is violated by {residuals.largest:.2g}")
     p = motion.problem
     local = np.einsum("lji,lj->li", p.rotation[step], motion.force[step]) / (p.mass * -GRAVITY[2])
     friction = np.hypot(local[:, 0], local[:, 1]) - p.friction[step] * local[:, 2]
@@ -84,4 +84,5 @@ def _reason(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) ->
     kind, worst = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
     what = ("friction", "centre of pressure")[kind] if beyond[kind, worst] > 0.0 else "yaw moment"
     limb = Limb(int(worst))
-    return f"infeasible: {what} of {limb.label} beyond the physical limit at knot {step}", step
+    reason = f"infeasible: {what} of {limb.label} beyond the physical limit"
+    return Failure(reason, float(times[step]), limb=limb, knot=step)

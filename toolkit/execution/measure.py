@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.failure import Failure
 from toolkit.control.sampled_plan import Reference
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.execution.slip import BEARING_FORCE, CONTACT_GAP, SETTLE_TIME, ContactInterval, contact_intervals
-from toolkit.execution.verdict import Measured, execution_checks
+from toolkit.execution.verdict import Measured, execution_checks, failure_reason
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.robot.model import RobotModel
-from toolkit.world.world import World
+from toolkit.wholebody.plan import WholeBodyPlan
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,7 @@ def measure(
     log: RunLog,
     recorder: Recorder,
     reference: Reference,
-    robot: RobotModel,
-    world: World,
-    sequence: ContactSequence,
+    plan: WholeBodyPlan,
     config: ExecutionConfig,
 ) -> Execution:
     """Measure a run.
@@ -62,18 +60,16 @@ def measure(
         log: what the loop knows.
         recorder: what was sampled.
         reference: the plan at the ticks.
-        robot: the robot.
-        world: its goal counts.
-        sequence: the planned contacts.
+        plan: what was executed.
         config: settings and limits.
 
     Returns:
         The execution with its checks.
     """
-    count = recorder.count
+    robot, goal, count = plan.robot, plan.world.goal, recorder.count
     times = reference.times[:count]
     intervals = _intervals(recorder, robot, config)
-    slip = _slip_by_stance(intervals, times, reference, len(sequence.stances))
+    slip = _slip_by_stance(intervals, times, reference, len(plan.sequence.stances))
     touchdowns = _touchdowns(intervals, recorder, reference, config)
     missing = sum(swing.contact is not None for swing in reference.swings) - len(touchdowns)
     error = recorder.com[:count] - log.com_aim
@@ -81,7 +77,7 @@ def measure(
     joints, speed = recorder.qpos[:count, 7:], np.abs(recorder.qvel[:count, 6:])
     excess = np.maximum(joints - robot.upper, robot.lower - joints).max()
     feet = log.final_feet.mean(0)[:2]
-    distance = float(np.hypot(*(feet - world.goal.position[:2])))
+    distance = float(np.hypot(*(feet - goal.position[:2])))
     fell = bool(recorder.fall)
     measured = Measured(
         completed=log.finished and not fell,
@@ -92,11 +88,15 @@ def measure(
         max_velocity_ratio=float((speed / robot.velocity_limit).max()),
         range_excess=float(max(excess, 0.0)),
         final_goal_distance=distance,
-        goal_radius=world.goal.radius,
+        goal_radius=goal.radius,
         unplanned_contacts=len(recorder.meter.unplanned),
         friction_mismatches=recorder.meter.friction_mismatches,
         missed_touchdowns=missing,
     )
+    checks = execution_checks(measured, config)
+    when = _failure_time(fell, recorder, slip, times, reference, config)
+    reason = failure_reason(checks, recorder.fall)
+    transition = None if when is None else plan.schedule.phase_at(when).transition
     simulated = len(log.ctrl) * config.timestep
     mass = float(log.scene.body_subtreemass[0])
     return Execution(
@@ -121,9 +121,8 @@ def measure(
         touchdowns=touchdowns,
         slip=slip,
         completed=measured.completed,
-        fell=fell,
-        fall_reason=recorder.fall,
-        goal_reached=not fell and distance <= world.goal.radius,
+        fall=Failure(recorder.fall, float(times[-1])) if fell else None,
+        goal_reached=not fell and distance <= goal.radius,
         final_goal_distance=distance,
         max_slip=measured.max_slip,
         max_touchdown_error=max((touchdown["position_error"] for touchdown in touchdowns), default=0.0),
@@ -134,9 +133,9 @@ def measure(
         unplanned_contacts=recorder.meter.unplanned_names,
         simulated_seconds=simulated,
         real_time_factor=simulated / log.wall_seconds,
-        checks=execution_checks(measured, config),
+        checks=checks,
         replayable=config.disturbance.replayable,
-        failure_time=_failure_time(fell, recorder, slip, times, reference, config),
+        failure=Failure(reason, when, transition) if reason else None,
         replanning=log.replanning,
     )
 

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from toolkit.contacts.failure import Failure
 from toolkit.execution.check import Check
 from toolkit.replanning.replanner import ReplanCounts
 
@@ -73,15 +74,15 @@ class Execution:
         touchdowns: one dict per transition: `transition`, `limb`, `time`, `planned_time`, `position_error` m.
         slip: one entry per stance: largest tangential displacement of any patch while it was in contact, m.
         completed: the plan was run to its end.
-        fell: base too low, tilted, or body contact with the world.
-        fall_reason: one line, "" if it did not fall.
+        fall: How the robot fell: base too low, tilted, or body contact with the world. None where it did not.
         solver_failures: control ticks whose QP was not solved.
         com_rms_error: m; from the plan as replanned: a robot that recovers from a push is not asked to be where it
             would be without, and a run that nothing disturbs has no other plan than the first one.
         unplanned_contacts: distinct (robot geom, world geom) names that touched outside the patches.
         simulated_seconds, real_time_factor: of the whole loop.
         checks: every check of the verdict that execution decides.
-        failure_time: s; the fall, the first unplanned contact or the stance that slipped too far; None without any.
+        failure: The first check that did not pass, or the fall; its time is that of the fall, the first unplanned
+            contact or the stance that slipped too far. None where every check passed.
         replayable: the controls alone reproduce the run; False where it was pushed.
     """
 
@@ -91,8 +92,7 @@ class Execution:
     touchdowns: tuple[dict, ...]
     slip: tuple[float, ...]
     completed: bool
-    fell: bool
-    fall_reason: str
+    fall: Failure | None
     goal_reached: bool
     final_goal_distance: float
     max_slip: float
@@ -106,16 +106,23 @@ class Execution:
     real_time_factor: float
     checks: tuple[Check, ...]
     replayable: bool = True
-    failure_time: float | None = None
+    failure: Failure | None = None
     replanning: ReplanCounts = ReplanCounts()
 
     def named(self) -> dict[str, Any]:
         """Everything but the scene by its name, as report.json and execution.npz have it: the groups taken apart."""
-        values: dict[str, Any] = {}
+        fall = "" if self.fall is None else self.fall.reason
+        when = None if self.failure is None else self.failure.time
+        values: dict[str, Any] = {"fell": self.fell, "fall_reason": fall, "failure_time": when}
         for item in fields(self):
             value = getattr(self, item.name)
             if isinstance(value, (Controls, Samples, ReplanCounts)):
                 values |= {part.name: getattr(value, part.name) for part in fields(value)}
-            elif item.name != "scene":
+            elif item.name not in ("scene", "fall", "failure"):
                 values[item.name] = value
         return values
+
+    @property
+    def fell(self) -> bool:
+        """Whether the robot fell."""
+        return self.fall is not None

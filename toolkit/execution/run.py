@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from time import perf_counter
 
 import mujoco
 import numpy as np
 
-from toolkit.centroidal.problem import CentroidalMotion
-from toolkit.contacts.schedule import ContactSchedule
-from toolkit.contacts.sequence import ContactSequence
 from toolkit.control.controller import Controller
 from toolkit.control.sampled_plan import sample_reference
 from toolkit.errors import ExecutionError
@@ -22,11 +20,7 @@ from toolkit.execution.result import Execution
 from toolkit.execution.scene_index import SceneIndex
 from toolkit.replanning.nominal import Nominal
 from toolkit.replanning.replanner import ReplanCounts, Replanner
-from toolkit.robot.model import RobotModel
-from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
-from toolkit.wholebody.trajectory import WholeBodyTrajectory
-from toolkit.world.scene import compose_scene
-from toolkit.world.world import World
+from toolkit.wholebody.plan import WholeBodyPlan
 
 Observer = Callable[[float, str], None]
 """Told of progress: the share of the run that is done, and a word on it."""
@@ -36,15 +30,9 @@ _DEFAULT = ExecutionConfig()
 
 
 def execute(
-    robot: RobotModel,
-    world: World,
-    sequence: ContactSequence,
-    schedule: ContactSchedule,
-    motion: CentroidalMotion,
-    trajectory: WholeBodyTrajectory,
+    plan: WholeBodyPlan,
     *,
     config: ExecutionConfig = _DEFAULT,
-    paths: LimbPaths | None = None,
     rng: np.random.Generator | None = None,
     observer: Observer | None = None,
 ) -> Execution:
@@ -54,14 +42,8 @@ def execute(
     push that `config.disturbance` asks for). The run ends `EXTRA_REST` after the plan, or with a fall.
 
     Args:
-        robot: the robot, as the controller knows it.
-        world: the world.
-        sequence: the planned contacts.
-        schedule: when they hold.
-        motion: of the CoM, with wrenches.
-        trajectory: of the joints.
+        plan: what to do; its robot is the robot as the controller knows it, its scene stays as it is.
         config: settings.
-        paths: planned motion of the limbs; found again from the schedule where None.
         rng: draws disturbances; one with seed 0 where None.
         observer: told of progress every 0.1 s of simulated time.
 
@@ -72,24 +54,27 @@ def execute(
         ExecutionError: the plan's parts do not fit each other or the robot.
     """
     rng = np.random.default_rng(0) if rng is None else rng
-    scene = compose_scene(robot, world)
+    robot, motion, trajectory = plan.robot, plan.motion, plan.trajectory
+    scene = copy.copy(plan.scene)
     scene.opt.timestep = config.timestep
     index = SceneIndex(scene, robot)
-    _check_plan(robot, schedule, motion, trajectory)
+    _check_plan(plan)
     qpos0, qvel0 = trajectory.qpos[0].copy(), trajectory.qvel[0].copy()
     config.disturbance.disturb_model(scene, index.robot_geom, _touched(scene, index, qpos0), rng)
     period = config.control_period
-    ticks = int(np.ceil((schedule.duration + EXTRA_REST) / period - 1e-9))
-    paths = limb_paths(robot, world, schedule, motion) if paths is None else paths
-    reference = sample_reference(period * np.arange(ticks), sequence, schedule, motion, trajectory, paths, robot)
+    ticks = int(np.ceil((plan.schedule.duration + EXTRA_REST) / period - 1e-9))
+    reference = sample_reference(
+        period * np.arange(ticks), plan.sequence, plan.schedule, motion, trajectory, plan.paths, robot
+    )
+    margins = motion.solved.margins
     replanner = None
-    if config.replanning.enabled and motion.problem.margins.friction <= config.replanning.max_friction:
+    if config.replanning.enabled and margins.friction <= config.replanning.max_friction:
         nominal = Nominal.of(motion, reference, robot, config.replanning.horizon)
-        replanner = Replanner(reference, nominal, robot, world.surfaces, config.replanning)
-    controller = Controller(robot, reference, motion.problem.margins, period, config.controller, replanner)
+        replanner = Replanner(reference, nominal, robot, plan.world.surfaces, config.replanning)
+    controller = Controller(robot, reference, margins, period, config.controller, replanner)
     recorder = Recorder(ticks, scene, robot, index)
     told = StateFilter(config.disturbance, period, rng)
-    push_time, push = config.disturbance.draw_push(schedule.duration, rng)
+    push_time, push = config.disturbance.draw_push(plan.schedule.duration, rng)
     data = mujoco.MjData(scene)
     data.qpos[:], data.qvel[:] = qpos0, qvel0
     ctrl = np.zeros((ticks * config.control_decimation, scene.nu))
@@ -134,13 +119,12 @@ def execute(
         com_aim=com_aim[: recorder.count],
         replanning=replanner.counts if replanner else ReplanCounts(),
     )
-    return measure(log, recorder, reference, robot, world, sequence, config)
+    return measure(log, recorder, reference, plan, config)
 
 
-def _check_plan(
-    robot: RobotModel, schedule: ContactSchedule, motion: CentroidalMotion, trajectory: WholeBodyTrajectory
-) -> None:
+def _check_plan(plan: WholeBodyPlan) -> None:
     """Refuse plans whose parts do not belong together."""
+    robot, schedule, motion, trajectory = plan.robot, plan.schedule, plan.motion, plan.trajectory
     count = len(robot.joint_names)
     if trajectory.qpos.shape[1] != 7 + count or trajectory.qvel.shape[1] != 6 + count:
         raise ExecutionError(

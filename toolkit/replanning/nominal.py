@@ -122,7 +122,7 @@ class Nominal:
 
 def _refined(motion: CentroidalMotion, horizon: float) -> CentroidalMotion:
     """The same motion on a finer grid, with a rest at its end."""
-    problem = motion.problem
+    problem = motion.solved
     count = np.maximum(np.ceil(problem.dt / MAX_DT - 1e-9).astype(int), 1)
     step = np.repeat(np.arange(problem.steps), count)
     dt = (problem.dt / count)[step]
@@ -148,6 +148,8 @@ def _refined(motion: CentroidalMotion, horizon: float) -> CentroidalMotion:
     return replace(
         motion,
         problem=fine,
+        kept=None,
+        landed=None,
         com=np.concatenate([com, np.tile(motion.com[-1], (rest + 1, 1))]),
         linear_momentum=np.concatenate([momentum, zero]),
         angular_momentum=np.concatenate([spin, zero]),

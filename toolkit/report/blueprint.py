@@ -10,9 +10,7 @@ from toolkit.report.motion_scene import TIMELINE
 from toolkit.report.views import best_direction
 
 
-def blueprint(
-    model: mujoco.MjModel, way: np.ndarray, *, executed: bool, momenta: bool, searched: bool
-) -> rrb.Blueprint:
+def blueprint(model: mujoco.MjModel, way: np.ndarray, *, executed: bool, momenta: bool) -> rrb.Blueprint:
     """Big 3D view with the contact lanes below it on the left; curves in tabs and the text on the right.
 
     Args:
@@ -20,7 +18,6 @@ def blueprint(
         way: (k, 3) m, k >= 2, points on the ground from start to goal.
         executed: whether there are measured curves.
         momenta: whether there are planned or measured momenta.
-        searched: whether there is a search to show.
 
     Returns:
         The blueprint, on the run's timeline, playing.
@@ -46,12 +43,11 @@ def blueprint(
         contacts = _curves("cop_margin", "CoP to the edge [mm]"), _curves("force", "Contact force [N]")
         tabs.append(rrb.Vertical(*contacts, name="Contacts"))
         tabs.append(rrb.Vertical(_curves("torque_ratio", "Largest torque / limit"), name="Torques"))
-    if searched:
-        bars = rrb.BarChartView(origin="search/best_cost", name="Cost of the best solution over the search's seconds")
-        solutions = rrb.TextDocumentView(origin="search/solutions", name="Solutions")
-        tabs.append(rrb.Vertical(bars, solutions, name="Search"))
+    bars = rrb.BarChartView(origin="search/best_cost", name="Cost of the best solution over the search's seconds")
+    solutions = rrb.TextDocumentView(origin="search/solutions", name="Solutions")
+    tabs.append(rrb.Vertical(bars, solutions, name="Search"))
     text = rrb.TextDocumentView(origin="summary", name="Verdict")
-    right = rrb.Vertical(rrb.Tabs(*tabs, active_tab=0), text, row_shares=[3, 2]) if tabs else text
+    right = rrb.Vertical(rrb.Tabs(*tabs, active_tab=0), text, row_shares=[3, 2])
     return rrb.Blueprint(
         rrb.Horizontal(rrb.Vertical(scene, lanes, row_shares=[7, 2]), right, column_shares=[3, 2]),
         rrb.BlueprintPanel(state="collapsed"),

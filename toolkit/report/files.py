@@ -9,6 +9,7 @@ import os
 import shutil
 import time
 import uuid
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -16,6 +17,7 @@ from typing import Any
 import mujoco
 
 from toolkit.errors import InputError
+from toolkit.execution.check import Check
 
 REPORT = "report.json"
 PLAN = "plan.json"
@@ -153,6 +155,13 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
+def check_entries(checks: Sequence[Check]) -> list[dict[str, Any]]:
+    """Checks as JSON holds them, with their result."""
+    return [
+        {"name": c.name, "value": c.value, "limit": c.limit, "unit": c.unit, "result": c.result.value} for c in checks
+    ]
+
+
 def write_json(path: Path, value: Any) -> None:
     """Write strict JSON (see `plain`), indented, lists of numbers on one line, ending in a line break."""
     path.write_text(_json_text(plain(value), "") + "\n", encoding="utf-8")
@@ -187,15 +196,3 @@ def read_json(path: Path) -> Any:
 def write_scene(path: Path, scene: mujoco.MjModel) -> None:
     """Save a compiled model; `mujoco.MjModel.from_binary_path` reads it."""
     mujoco.mj_saveModel(scene, str(path), None)
-
-
-def read_scene(path: Path) -> mujoco.MjModel:
-    """Load a model saved by `write_scene`.
-
-    Raises:
-        InputError: the file is missing, truncated, or from another MuJoCo version.
-    """
-    try:
-        return mujoco.MjModel.from_binary_path(str(path))
-    except ValueError as error:
-        raise InputError(f"{path}: MuJoCo {mujoco.__version__} cannot load this compiled model ({error})") from error

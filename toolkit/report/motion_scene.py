@@ -153,7 +153,7 @@ def draw_made_contacts(stream: rr.RecordingStream, execution: Execution, half_si
     times = execution.samples.tick_times
     start = [limb for limb in Limb if np.linalg.norm(execution.samples.wrench[:1, limb, :3]) > LEAST_FORCE]
     events = [(0.0, limb) for limb in start]
-    events += [(float(touch["time"]), limb_of(touch["limb"])) for touch in execution.touchdowns if touch.get("time")]
+    events += [(touch["time"], Limb.from_label(touch["limb"])) for touch in execution.touchdowns]
     for time, limb in sorted(events):
         row = min(int(np.searchsorted(times, time)), len(times) - 1)
         pose = execution.samples.limb_pose[row, limb]
@@ -164,11 +164,6 @@ def draw_made_contacts(stream: rr.RecordingStream, execution: Execution, half_si
         stream.set_time(TIMELINE, duration=time)
         stream.log("world/executed/contacts", rr.LineStrips3D(made, radii=0.003, colors=EXECUTED))
     stream.reset_time()
-
-
-def limb_of(value: Limb | int | str) -> Limb:
-    """A limb given as `Limb`, index or label."""
-    return Limb.from_label(value) if isinstance(value, str) else Limb(value)
 
 
 def draw_forces(

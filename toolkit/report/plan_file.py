@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.category import category_of
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
@@ -20,29 +21,19 @@ from toolkit.world.timing import Timing
 SCHEMA = 1
 
 
-def write_plan(
-    path: Path,
-    sequence: ContactSequence,
-    *,
-    world: str,
-    robot: str,
-    initial_rest: float = 0.0,
-    solution: Solution | None = None,
-) -> None:
+def write_plan(path: Path, plan: MotionPlan, solution: Solution) -> None:
     """Write plan.json.
 
     Args:
-        path: the file.
-        sequence: start stance and transitions.
-        world: name of the world.
-        robot: name of the robot.
-        initial_rest: s before the first transition begins, added to the absolute times.
-        solution: the search's solution, for its cost and the predicted CoM.
+        path: The file.
+        plan: The contacts and when they hold.
+        solution: The search's solution, for its cost and the predicted CoM.
     """
     entries: list[dict[str, Any]] = []
-    time = initial_rest
-    stances = sequence.stances
-    for index, transition in enumerate(sequence.transitions):
+    stances, transitions = plan.sequence.stances, plan.sequence.transitions
+    # The first phase is the first transition's shift, with the rest before it.
+    time = plan.schedule.phases[0].duration - transitions[0].timing.shift if transitions else 0.0
+    for index, transition in enumerate(transitions):
         lift_off = time + transition.timing.shift
         touchdown = lift_off + transition.timing.swing
         contact = {} if transition.contact is None else _contact_entry(transition.contact)
@@ -62,12 +53,17 @@ def write_plan(
             }
         )
         time = touchdown
-    plan: dict[str, Any] = {"schema": SCHEMA, "world": world, "robot": robot}
-    if solution is not None:
-        plan |= {"cost": solution.cost, "bound": solution.bound, "predicted_com": solution.com}
-    plan["start"] = [_contact_entry(contact) for contact in sequence.start.contacts]
-    plan["transitions"] = entries
-    write_json(path, plan)
+    content = {
+        "schema": SCHEMA,
+        "world": plan.world.name,
+        "robot": plan.robot.name,
+        "cost": solution.cost,
+        "bound": solution.bound,
+        "predicted_com": solution.com,
+        "start": [_contact_entry(contact) for contact in plan.sequence.start.contacts],
+        "transitions": entries,
+    }
+    write_json(path, content)
 
 
 def read_plan(path: Path) -> ContactSequence:

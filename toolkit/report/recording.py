@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.execution.result import Execution
+from toolkit.pipeline.loop import PipelineResult
 from toolkit.report.blueprint import blueprint
 from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, start_recording
 from toolkit.report.motion_scene import (
@@ -29,59 +29,38 @@ from toolkit.report.run_report import RunReport
 from toolkit.report.series import plot_execution, plot_motion, send_contact_states, touchdown_entries
 from toolkit.report.summary import search_summary, summary
 from toolkit.robot.model import RobotModel
-from toolkit.search.result import SearchResult, Solution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.world import World
 
 APPLICATION = "humanoid contact planning"
 
 
-def write_recording(
-    path: Path,
-    *,
-    world: World,
-    robot: RobotModel,
-    report: RunReport | None = None,
-    search: SearchResult | None = None,
-    solution: Solution | None = None,
-    sequence: ContactSequence | None = None,
-    schedule: ContactSchedule | None = None,
-    motion: CentroidalMotion | None = None,
-    trajectory: WholeBodyTrajectory | None = None,
-    execution: Execution | None = None,
-    rate: float = 30.0,
-) -> None:
+def write_recording(path: Path, result: PipelineResult, report: RunReport, rate: float = 30.0) -> None:
     """Write the recording of a run, as far as the run came.
 
     Entities: `world/...` is the 3D scene in metres, `series/...` the curves, `contacts/...` the lanes of contacts,
     `search/...` the search on its own timeline, `summary` the text, `events` a log. Time is in seconds of the motion.
 
     Args:
-        path: file to write.
-        world: the world.
-        robot: the robot.
-        report: verdict and checks for the text.
-        search: result of the contact search.
-        solution: the solution that was taken, for the CoM that the search predicted.
-        sequence: the planned contacts; None for the solution's.
-        schedule: when they hold; None where no motion was planned, or for `ContactSchedule.of(sequence)`.
-        motion: centroidal motion.
-        trajectory: whole-body trajectory; moves the robot where there is no execution.
-        execution: simulated run.
+        path: File to write.
+        result: What the pipeline returned; of a search of which no sequence was tested, the newest one is shown.
+        report: Verdict and checks for the text.
         rate: Hz of everything drawn in 3D.
     """
-    if solution is None and sequence is None and search is not None and search.solutions:
+    world, robot, search, trial = result.world, result.robot, result.search, result.trial
+    solution = sequence = schedule = motion = trajectory = execution = None
+    if trial is not None:
+        solution, trajectory, execution = trial.solution, trial.trajectory, trial.execution
+        sequence, schedule, motion = trial.plan.sequence, trial.plan.schedule, trial.plan.motion
+    elif search.solutions:
         solution = search.solutions[-1]
-    if sequence is None and solution is not None:
-        sequence = solution.sequence
-    if schedule is None and sequence is not None:
-        schedule = ContactSchedule.of(sequence)
+        sequence, schedule = solution.sequence, ContactSchedule.of(solution.sequence)
     executed = execution is not None and len(execution.samples.tick_times) > 0
     feasible = motion is not None and motion.feasible
 
     stream = start_recording(path, APPLICATION, f"{robot.name} in {world.name}")
     try:
-        shown = {"executed": executed, "momenta": executed or feasible, "searched": search is not None}
+        shown = {"executed": executed, "momenta": executed or feasible}
         stream.send_blueprint(blueprint(world.mujoco_model, _way(world, sequence), **shown))
         stream.log("summary", rr.TextDocument(summary(report), media_type=rr.MediaType.MARKDOWN), static=True)
         draw_scene(stream, world.mujoco_model)
@@ -102,17 +81,16 @@ def write_recording(
             for time, text in touchdown_entries(execution):
                 stream.set_time(TIMELINE, duration=time)
                 stream.log("events", rr.TextLog(text))
-            if execution.fell:
+            if execution.fall is not None:
                 stream.set_time(TIMELINE, duration=float(execution.samples.tick_times[-1]))
-                stream.log("events", rr.TextLog(execution.fall_reason, level=rr.TextLogLevel.ERROR))
+                stream.log("events", rr.TextLog(execution.fall.reason, level=rr.TextLogLevel.ERROR))
             stream.reset_time()
         elif motion is not None and motion.feasible:
             plot_motion(stream, motion)
         send_contact_states(stream, schedule, execution)
-        if search is not None:
-            text = rr.TextDocument(search_summary(search), media_type=rr.MediaType.MARKDOWN)
-            stream.log("search/solutions", text, static=True)
-            draw_search(stream, search, _heights(_way(world, sequence)))
+        text = rr.TextDocument(search_summary(search), media_type=rr.MediaType.MARKDOWN)
+        stream.log("search/solutions", text, static=True)
+        draw_search(stream, search, _heights(_way(world, sequence)))
     finally:
         stream.disconnect()
 

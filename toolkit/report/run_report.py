@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import importlib.metadata
 import platform
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.centroidal.residual import check, cop_margin, friction_margin
-from toolkit.errors import InputError
 from toolkit.execution.check import Check
 from toolkit.execution.result import Execution
-from toolkit.report.checks import check_entries, read_checks
-from toolkit.report.files import read_json, write_json
-from toolkit.search.result import SearchResult, Solution
-from toolkit.wholebody.trajectory import WholeBodyTrajectory
-from toolkit.world.surface import Surface
+from toolkit.pipeline.loop import PipelineResult
+from toolkit.report.files import check_entries, write_json
+from toolkit.world.world import World
 
 SCHEMA = 1
 PACKAGES = ("mujoco", "placo", "pin", "casadi", "daqp", "numpy", "scipy", "numba", "rerun-sdk")
@@ -78,7 +74,7 @@ class RunReport:
 
     Attributes:
         world, robot: names.
-        seed: of every random draw.
+        seed: Seed of every random draw.
         verdict: "PASS" or "FAIL".
         reason: one line where the verdict is FAIL, else "".
         stages: stage -> figure -> value; SI units, radians; see `STAGES`.
@@ -99,57 +95,42 @@ class RunReport:
 
     @classmethod
     def of(
-        cls,
-        *,
-        world: str,
-        robot: str,
-        seed: int,
-        passed: bool,
-        reason: str,
-        surfaces: Sequence[Surface],
-        surface_seconds: float | None = None,
-        search: SearchResult | None = None,
-        solution: Solution | None = None,
-        sequences_tested: int = 0,
-        motion: CentroidalMotion | None = None,
-        trajectory: WholeBodyTrajectory | None = None,
-        execution: Execution | None = None,
-        checks: Sequence[Check] = (),
-        options: dict[str, Any] | None = None,
+        cls, result: PipelineResult, surface_seconds: float | None = None, settings: dict[str, Any] | None = None
     ) -> RunReport:
-        """Assemble the report of a run from what its stages made; a stage that was not reached is None.
+        """The report of a pipeline's result.
 
         Args:
-            world: name of the world.
-            robot: name of the robot.
-            seed: of every random draw.
-            passed: the verdict.
-            reason: one line where it did not pass.
-            surfaces: of the world.
-            surface_seconds: wall-clock of their extraction.
-            search: result of the contact search.
-            solution: the one of its solutions that the later stages belong to; None for the newest.
-            sequences_tested: contact sequences that were tested.
-            motion: centroidal motion.
-            trajectory: whole-body trajectory.
-            execution: simulated execution.
-            checks: of the verdict.
-            options: further settings worth keeping.
+            result: What the pipeline returned.
+            surface_seconds: Wall-clock of loading the world.
+            settings: Further settings worth keeping.
         """
-        stages: dict[str, dict[str, Any]] = {
-            "surfaces": {
-                "count": len(surfaces),
-                "foot": sum(surface.serves_foot for surface in surfaces),
-                "palm": sum(surface.serves_palm for surface in surfaces),
-                "seconds": surface_seconds,
-            },
-            "planning": _planning(search, solution, sequences_tested),
-            "dynamics": _dynamics(motion),
-            "wholebody": _figures(WHOLEBODY, trajectory),
-            "execution": _execution(execution),
+        trial = result.trial
+        stages = {
+            "surfaces": _surfaces(result.world, surface_seconds),
+            "planning": _planning(result),
+            "dynamics": _dynamics(None if trial is None else trial.plan.motion),
+            "wholebody": _figures(WHOLEBODY, None if trial is None else trial.trajectory),
+            "execution": _execution(None if trial is None else trial.execution),
         }
-        verdict = "PASS" if passed else "FAIL"
-        return cls(world, robot, seed, verdict, "" if passed else reason, stages, tuple(checks), options or {})
+        verdict, reason = ("PASS", "") if result.passed else ("FAIL", result.reason)
+        names = result.world.name, result.robot.name
+        return cls(*names, result.config.seed, verdict, reason, stages, result.checks, settings or {})
+
+    @classmethod
+    def without_search(cls, world: World, robot: str, seed: int, reason: str, settings: dict[str, Any]) -> RunReport:
+        """The report of a run that ended in an error before there was any result.
+
+        Args:
+            world: The world.
+            robot: Name of the robot.
+            seed: Seed of every random draw.
+            reason: The error in one line.
+            settings: Further settings worth keeping.
+        """
+        stages = {stage: _figures(names, None) for stage, names in STAGES.items()}
+        return cls(
+            world.name, robot, seed, "FAIL", reason, stages | {"surfaces": _surfaces(world, None)}, options=settings
+        )
 
     @property
     def passed(self) -> bool:
@@ -177,30 +158,6 @@ def write_report(path: Path, report: RunReport) -> None:
     write_json(path, report.as_dict())
 
 
-def read_report(path: Path) -> RunReport:
-    """Read report.json.
-
-    A check's value or limit that was not finite comes back as inf, so that the check's result stays the same.
-
-    Raises:
-        InputError: the file cannot be read, or a key is missing or wrong.
-    """
-    content = read_json(path)
-    try:
-        if content["schema"] != SCHEMA:
-            raise InputError(f"{path}: has schema {content['schema']}, this version reads {SCHEMA}")
-        checks = read_checks(content["checks"])
-        names = ("world", "robot", "seed", "verdict", "reason", "stages")
-        return RunReport(
-            *[content[name] for name in names],
-            checks=checks,
-            options=content.get("options", {}),
-            versions=content["versions"],
-        )
-    except (KeyError, TypeError) as error:
-        raise InputError(f"{path}: is not a run report, {error} is missing or wrong") from error
-
-
 def _figures(names: tuple[str, ...], stage: Any) -> dict[str, Any]:
     """Attributes of a stage's result by name; where it was not reached, the first is False and the rest None."""
     if stage is None:
@@ -208,15 +165,21 @@ def _figures(names: tuple[str, ...], stage: Any) -> dict[str, Any]:
     return {name: getattr(stage, name) for name in names}
 
 
-def _planning(search: SearchResult | None, solution: Solution | None, tested: int) -> dict[str, Any]:
+def _surfaces(world: World, seconds: float | None) -> dict[str, Any]:
+    """Figures of the extracted surfaces."""
+    surfaces = world.surfaces
+    feet, palms = (sum(serves) for serves in ([s.serves_foot for s in surfaces], [s.serves_palm for s in surfaces]))
+    return {"count": len(surfaces), "foot": feet, "palm": palms, "seconds": seconds}
+
+
+def _planning(result: PipelineResult) -> dict[str, Any]:
     """Figures of the contact search."""
-    if search is None:
-        return _figures(PLANNING, None)
+    search, chosen = result.search, None if result.trial is None else result.trial.solution
     solutions = [
         {"seconds": s.seconds, "cost": s.cost, "contacts": len(s.sequence.transitions), "bound": s.bound}
         for s in search.solutions
     ]
-    chosen = solution or (search.solutions[-1] if search.solutions else None)
+    chosen = chosen or (search.solutions[-1] if search.solutions else None)
     made = [t.limb for t in chosen.sequence.transitions if t.contact is not None] if chosen else []
     return {
         "found": bool(search.solutions),
@@ -227,7 +190,7 @@ def _planning(search: SearchResult | None, solution: Solution | None, tested: in
         "solutions": solutions,
         "contacts": len(chosen.sequence.transitions) if chosen else None,
         "palm_contacts": sum(not limb.is_foot for limb in made) if chosen else None,
-        "sequences_tested": tested,
+        "sequences_tested": result.tested,
     }
 
 
@@ -242,7 +205,7 @@ def _dynamics(motion: CentroidalMotion | None) -> dict[str, Any]:
         "max_residual": check(motion).largest,
         "min_friction_margin": friction_margin(motion) if motion.feasible else None,
         "min_cop_margin": cop_margin(motion) if motion.feasible else None,
-        "status": motion.status,
+        "status": motion.outcome,
     }
 
 
@@ -254,5 +217,5 @@ def _execution(execution: Execution | None) -> dict[str, Any]:
     figures = {name: named[name] for name in EXECUTION}
     figures["unplanned_contacts"] = len(execution.unplanned_contacts)
     figures["unplanned_contact_geoms"] = [list(pair) for pair in execution.unplanned_contacts]
-    figures["fall_reason"] = execution.fall_reason
+    figures["fall_reason"] = named["fall_reason"]
     return figures

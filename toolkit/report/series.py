@@ -13,7 +13,7 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.execution.result import Execution
 from toolkit.geometry.limb import Limb
 from toolkit.report.colors import AXES, EXECUTED, LIMB_COLORS, LIMIT, Color
-from toolkit.report.motion_scene import LEAST_FORCE, TIMELINE, at, limb_of, stance_times
+from toolkit.report.motion_scene import LEAST_FORCE, TIMELINE, at, stance_times
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 RATE = 100.0
@@ -174,12 +174,7 @@ def touchdown_entries(execution: Execution) -> list[tuple[float, str]]:
     """(s, text) of every touchdown, for the log."""
     entries = []
     for touch in execution.touchdowns:
-        if touch.get("time") is None:
-            continue
-        text = f"{int(touch['transition']) + 1}: {limb_of(touch['limb']).label} touched down"
-        if touch.get("planned_time") is not None:
-            text += f" {1e3 * (touch['time'] - touch['planned_time']):+.0f} ms from plan"
-        if touch.get("position_error") is not None:
-            text += f", {1e3 * touch['position_error']:.1f} mm off"
-        entries.append((float(touch["time"]), text))
+        late, off = 1e3 * (touch["time"] - touch["planned_time"]), 1e3 * touch["position_error"]
+        text = f"{touch['transition'] + 1}: {touch['limb']} touched down {late:+.0f} ms from plan, {off:.1f} mm off"
+        entries.append((touch["time"], text))
     return entries

@@ -24,10 +24,8 @@ LEGEND = f"""## Legend
 """
 
 
-def summary(report: RunReport | None) -> str:
-    """Markdown text of a run; only the legend where there is no report."""
-    if report is None:
-        return LEGEND
+def summary(report: RunReport) -> str:
+    """Markdown text of a run."""
     lines = [f"# {report.verdict}: {report.robot} in {report.world}", ""]
     if report.reason:
         lines += [f"**{report.reason}**", ""]

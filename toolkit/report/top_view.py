@@ -11,7 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, PathPatch, Polygon
 from matplotlib.path import Path as Outline
 
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
 from toolkit.report.colors import (
     EXECUTED,
@@ -25,7 +27,6 @@ from toolkit.report.colors import (
     START,
     unit,
 )
-from toolkit.robot.model import RobotModel
 from toolkit.search.result import Solution
 from toolkit.world.surface import Surface
 from toolkit.world.world import World
@@ -33,26 +34,18 @@ from toolkit.world.world import World
 BORDER = 0.4  # m shown around everything
 
 
-def draw_top_view(
-    path: Path,
-    world: World,
-    robot: RobotModel,
-    solution: Solution | None,
-    motion: CentroidalMotion | None = None,
-    executed: np.ndarray | None = None,
-) -> None:
+def draw_top_view(path: Path, plan: MotionPlan, solution: Solution, executed: np.ndarray | None = None) -> None:
     """Write a picture of a plan from above: surfaces, numbered contacts, the CoM, start and goal; axes in metres.
 
     Args:
         path: file; the ending gives the format (png, pdf, svg).
-        world: surfaces, start and goal.
-        robot: sizes of the patches.
-        solution: contacts and predicted CoM; None for the world alone.
-        motion: optimised CoM; left out where it is not feasible.
+        plan: Contacts, optimised CoM (left out where it is not feasible), and the world.
+        solution: The search's solution, for the predicted CoM and the cost.
         executed: (C, 3) m, measured CoM.
     """
-    contacts = _numbered(solution)
-    paths = _centres(solution, motion, executed)
+    world, robot = plan.world, plan.robot
+    contacts = _numbered(plan.sequence)
+    paths = _centres(solution, plan.motion, executed)
     low, high = _extent(world, [contact.pose.position[:2] for contact, _ in contacts])
     width, height = high - low
     scale = min(14.0 / width, 9.0 / height)
@@ -82,29 +75,25 @@ def draw_top_view(
     entries += [Line2D([], [], marker="o", ls="", mfc="none", mec=unit(GOAL), mew=2, label="goal")]
     entries += [Line2D([], [], color=unit(color), label=f"CoM {name}") for name, (_, color, _) in paths.items()]
     figure.legend(handles=entries, loc="outside lower center", ncols=len(entries), frameon=False, fontsize=8)
-    if solution is not None:
-        count = len(solution.sequence.transitions)
-        axes.set_title(f"{robot.name} in {world.name}: {count} transitions, cost {solution.cost:.2f}", fontsize=10)
+    count = len(plan.sequence.transitions)
+    axes.set_title(f"{robot.name} in {world.name}: {count} transitions, cost {solution.cost:.2f}", fontsize=10)
     FigureCanvasAgg(figure).print_figure(str(path), dpi=130)
 
 
-def _numbered(solution: Solution | None) -> list[tuple[Contact, int]]:
+def _numbered(sequence: ContactSequence) -> list[tuple[Contact, int]]:
     """Contacts with the number of their transition, 0 for the start."""
-    if solution is None:
-        return []
-    sequence = solution.sequence
     made = [(t.contact, i + 1) for i, t in enumerate(sequence.transitions) if t.contact is not None]
     return [*((contact, 0) for contact in sequence.start.contacts), *made]
 
 
 def _centres(
-    solution: Solution | None, motion: CentroidalMotion | None, executed: np.ndarray | None
+    solution: Solution, motion: CentroidalMotion, executed: np.ndarray | None
 ) -> dict[str, tuple[np.ndarray, tuple[int, int, int], str]]:
     """Name -> CoM path, colour and line style of those that there are."""
     paths: dict[str, tuple[np.ndarray, tuple[int, int, int], str]] = {}
-    if solution is not None and len(solution.com):
+    if len(solution.com):
         paths["predicted"] = (solution.com, PREDICTED, "o--")
-    if motion is not None and motion.feasible:
+    if motion.feasible:
         times = np.linspace(0, motion.problem.times[-1], 20 * motion.problem.steps + 1)
         paths["optimised"] = (np.array([motion.sample(float(time))[0] for time in times]), OPTIMISED, "-")
     if executed is not None:

@@ -10,13 +10,13 @@ and are left to the final collision check.
 
 from __future__ import annotations
 
+import copy
+
 import mujoco
 import numpy as np
 
 from toolkit.geometry.limb import PALMS, Limb
 from toolkit.robot.model import RobotModel
-from toolkit.world.scene import compose_scene
-from toolkit.world.world import World
 
 NOTICE = 0.12  # m; distances below this are looked at
 SAFE_WORLD, SAFE_SELF = 0.06, 0.012  # m; wanted distance of an arm from the world and from the rest of the robot
@@ -27,14 +27,14 @@ MAX_ROWS = 16  # dampers at a time, the nearest ones: each costs the solver, and
 class ArmAvoidance:
     """Distances of the arms in the composed scene, tick after tick."""
 
-    def __init__(self, robot: RobotModel, world: World):
-        """Compose the scene once.
+    def __init__(self, robot: RobotModel, scene: mujoco.MjModel):
+        """Prepare a copy of the scene.
 
         Args:
             robot: the robot; one without palms has no arms to speak of.
-            world: what to avoid.
+            scene: robot and world in one model; what to avoid.
         """
-        self.model = compose_scene(robot, world)
+        self.model = copy.copy(scene)
         self.data = mujoco.MjData(self.model)
         self.static = self.model.body_weldid[self.model.geom_bodyid] == 0
         self.arm_of = _arm_of_geoms(robot, self.model)

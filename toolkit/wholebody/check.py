@@ -8,13 +8,12 @@ import mujoco
 import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.contacts.failure import Failure
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.collision import first_collision
-from toolkit.wholebody.finding import Finding
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.motion_dynamics import inverse_dynamics, velocities
-from toolkit.world.world import World
 
 # What a whole-body motion may deviate by from its plan.
 COM_ERROR = 0.02  # m; of the CoM
@@ -44,17 +43,17 @@ class CheckReport:
     torque: np.ndarray
     base_residual: np.ndarray
     limits_respected: bool
-    findings: tuple[Finding, ...]
+    findings: tuple[Failure, ...]
 
     @property
     def reasons(self) -> tuple[str, ...]:
         """One line per violated check."""
-        return tuple(finding.text for finding in self.findings)
+        return tuple(finding.reason for finding in self.findings)
 
 
 def check(
     robot: RobotModel,
-    world: World,
+    scene: mujoco.MjModel,
     paths: LimbPaths,
     motion: CentroidalMotion,
     times: np.ndarray,
@@ -64,7 +63,7 @@ def check(
 
     Args:
         robot: the robot.
-        world: for collisions.
+        scene: robot and world in one model, for collisions.
         paths: planned poses of the limbs.
         motion: planned CoM and wrenches.
         times: (T,) s, uniform.
@@ -74,7 +73,7 @@ def check(
     torque, residual = inverse_dynamics(robot, motion, times, qpos)
     bearing = robot.carrying(limb for limb in robot.limbs if motion.problem.active[:, limb].any())
     limits = _limits(robot, times, qpos, torque, bearing)
-    hit = first_collision(robot, world, times, qpos)
+    hit = first_collision(robot, scene, times, qpos)
     findings = tracking + limits + ([hit] if hit else [])
     return CheckReport(position, orientation, torque, residual, not limits, tuple(findings))
 
@@ -85,7 +84,7 @@ def _tracking(
     motion: CentroidalMotion,
     times: np.ndarray,
     qpos: np.ndarray,
-) -> tuple[float, float, list[Finding]]:
+) -> tuple[float, float, list[Failure]]:
     """Largest position and orientation error over CoM and contacts, and the reasons to fail."""
     model = robot.mujoco_model
     data = mujoco.MjData(model)
@@ -118,7 +117,7 @@ def _tracking(
             position = max(position, note(limb.label, "m", error, limit, time))
             orientation = max(orientation, note(limb.label, "rad", turn, ORIENTATION_ERROR, time))
     findings = [
-        Finding(f"{thing} is {error:.3g} {unit} off its plan at {time:.2f} s (limit {limit:.3g} {unit})", float(time))
+        Failure(f"{thing} is {error:.3g} {unit} off its plan at {time:.2f} s (limit {limit:.3g} {unit})", float(time))
         for (thing, unit), (error, limit, time) in worst.items()
         if error > limit
     ]
@@ -139,7 +138,7 @@ def _limits(
     qpos: np.ndarray,
     torque: np.ndarray,
     bearing: np.ndarray,
-) -> list[Finding]:
+) -> list[Failure]:
     """Reasons to fail: range, velocity, torque."""
     findings = []
     joints = qpos[:, 7:]
@@ -150,7 +149,7 @@ def _limits(
             f"joint {robot.joint_names[column]} is at {joints[row, column]:.3f} rad at {times[row]:.2f} s "
             f"(range {robot.lower[column]:.3f} to {robot.upper[column]:.3f} rad)"
         )
-        findings.append(Finding(text, float(times[row])))
+        findings.append(Failure(text, float(times[row])))
     torque_ratio = np.where(bearing, 1.0, FREE_TORQUE_RATIO)
     speed = velocities(robot.mujoco_model, times, qpos)[:, 6:]
     for values, limit, allowed, what, unit in (
@@ -163,7 +162,7 @@ def _limits(
                 f"joint {robot.joint_names[column]} {what} {values[row, column]:.3g} {unit} at {times[row]:.2f} s "
                 f"(limit {allowed[column] * limit[column]:.3g} {unit})"
             )
-            findings.append(Finding(text, float(times[row])))
+            findings.append(Failure(text, float(times[row])))
     return findings
 
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from toolkit.contacts.failure import Failure
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.finding import Finding
-from toolkit.world.scene import compose_scene
-from toolkit.world.world import World
 
 RATE = 25.0  # Hz; at most this many postures per second are looked at: at 1 m/s a limb moves 4 cm between two
 PATCH_DEPTH = 4e-3  # m; a limb's last link may press this deep into the world: it makes the planned contacts
@@ -16,19 +14,18 @@ BODY_DEPTH = 1e-3  # m; any other link into the world
 SELF_DEPTH = 2e-3  # m; links of the robot into each other
 
 
-def first_collision(robot: RobotModel, world: World, times: np.ndarray, qpos: np.ndarray) -> Finding | None:
+def first_collision(robot: RobotModel, scene: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray) -> Failure | None:
     """The first collision of a motion, None if there is none.
 
     Pairs of links that touch each other in the home posture are left out.
 
     Args:
         robot: the robot.
-        world: the world.
+        scene: robot and world in one model.
         times: (T,) s, uniform.
         qpos: (T, 7 + n).
     """
-    model = compose_scene(robot, world)
-    data = mujoco.MjData(model)
+    model, data = scene, mujoco.MjData(scene)
     static = model.body_weldid[model.geom_bodyid] == 0
     patch = np.isin(model.geom_bodyid, [model.body(limb.body).id for limb in robot.limbs.values()])
     resting = _touching_at_home(model, data, static, robot.home)
@@ -46,7 +43,7 @@ def first_collision(robot: RobotModel, world: World, times: np.ndarray, qpos: np
             else:
                 allowed = np.inf if _bodies(model, first, second) in resting else SELF_DEPTH
             if depth > allowed:
-                return Finding(
+                return Failure(
                     f"{_label(model, first)} and {_label(model, second)} collide at {times[index]:.2f} s, "
                     f"{depth * 1e3:.1f} mm deep (allowed {allowed * 1e3:.1f} mm)",
                     float(times[index]),

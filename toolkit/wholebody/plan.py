@@ -1,27 +1,28 @@
-"""From a centroidal motion to a whole-body trajectory: swing paths, inverse kinematics, checks."""
+"""From a motion plan to a whole-body plan: swing paths, inverse kinematics, checks."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import mujoco
 import numpy as np
 
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.centroidal.problem import CentroidalMotion
+from toolkit.contacts.failure import Failure
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.avoidance import ArmAvoidance
-from toolkit.wholebody.check import CheckReport, check
-from toolkit.wholebody.finding import Finding
+from toolkit.wholebody.check import check
 from toolkit.wholebody.ik import WholeBodyIK, first_guess
 from toolkit.wholebody.ik_config import IKConfig
 from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
 from toolkit.wholebody.swing_task import SwingConfig
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
-from toolkit.world.world import World
 
 
 @dataclass(frozen=True)
@@ -38,47 +39,44 @@ class WholeBodyConfig:
     ik: IKConfig = field(default_factory=IKConfig)
 
 
-def whole_body(
-    robot: RobotModel,
-    world: World,
-    schedule: ContactSchedule,
-    motion: CentroidalMotion,
-    config: WholeBodyConfig | None = None,
-) -> WholeBodyTrajectory:
-    """Whole-body trajectory of a centroidal motion.
+@dataclass(frozen=True)
+class WholeBodyPlan(MotionPlan):
+    """A motion plan with what the whole-body stage added: all that an execution needs.
+
+    Attributes:
+        scene: Robot and world in one MuJoCo model, as composed; whoever disturbs it takes a copy.
+        paths: Where each limb's patch is meant to be at any time.
+        trajectory: Joint trajectories; it says itself whether it is feasible.
+    """
+
+    scene: mujoco.MjModel = field(repr=False)
+    paths: LimbPaths = field(repr=False)
+    trajectory: WholeBodyTrajectory
+
+
+def whole_body(plan: MotionPlan, scene: mujoco.MjModel, config: WholeBodyConfig | None = None) -> WholeBodyPlan:
+    """Find swing paths and a whole-body trajectory for a motion plan.
 
     Args:
-        robot: the robot.
-        world: to keep clear of.
-        schedule: the phases that `motion` was optimised for, with a final rest.
-        motion: centre of mass, momentum and wrenches.
-        config: settings.
+        plan: Contacts and motion, with a final rest.
+        scene: The plan's robot and world in one model (`toolkit.world.scene.compose_scene`).
+        config: Settings.
 
     Returns:
-        The trajectory; `feasible` says whether every check passed, `reason` which did not.
+        The plan with paths and trajectory; `trajectory.feasible` says whether every check passed.
     """
     config = config or WholeBodyConfig()
     begin = perf_counter()
-    paths = limb_paths(robot, world, schedule, motion, config.swing)
-    count = max(int(round(schedule.duration * config.rate)), 2) + 1
-    times = np.linspace(0.0, schedule.duration, count)
-    blocked = [
-        Finding(
-            f"{limb.label} finds no way clear of the world in transition {transition}",
-            next(phase.start for phase in schedule.phases if phase.transition == transition and phase.swing == limb),
-        )
-        for limb, transition in paths.blocked
-    ]
-    if not motion.feasible:
-        reason = f"the centroidal motion is not feasible: {motion.status}"
-        return _failed(robot, paths, times, reason, perf_counter() - begin)
-    try:
-        qpos = solve_ik(robot, paths, motion, times, config.ik, world)
-    except PlanningError as error:
-        reason = "; ".join([*(finding.text for finding in blocked), str(error)])
-        return _failed(robot, paths, times, reason, perf_counter() - begin)
-    report = check(robot, world, paths, motion, times, qpos)
-    return _trajectory(robot, paths, times, qpos, report, blocked, begin)
+    duration = plan.schedule.duration
+    times = np.linspace(0.0, duration, max(int(round(duration * config.rate)), 2) + 1)
+    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, config.swing)
+    if plan.motion.feasible:
+        trajectory = _trajectory(plan, scene, paths, times, config)
+    else:
+        failure = Failure(f"the centroidal motion is not feasible: {plan.motion.outcome}")
+        trajectory = replace(_without_postures(plan.robot, paths, times), failure=failure)
+    trajectory = replace(trajectory, seconds=perf_counter() - begin)
+    return WholeBodyPlan(plan.robot, plan.world, plan.sequence, plan.schedule, plan.motion, scene, paths, trajectory)
 
 
 def solve_ik(
@@ -87,15 +85,15 @@ def solve_ik(
     motion: CentroidalMotion,
     times: np.ndarray,
     config: IKConfig,
-    world: World | None = None,
+    scene: mujoco.MjModel | None = None,
 ) -> np.ndarray:
-    """(T, 7 + n) qpos on a uniform time grid; the arms keep clear of `world` where there is one.
+    """(T, 7 + n) qpos on a uniform time grid; the arms keep clear of what is in `scene` where there is one.
 
     Raises:
         PlanningError: if a quadratic program has no solution.
     """
     tick = float(times[1] - times[0]) / config.substeps
-    avoidance = None if world is None else ArmAvoidance(robot, world)
+    avoidance = None if scene is None else ArmAvoidance(robot, scene)
     solver = WholeBodyIK(robot, config, tick, avoidance)
     qpos = np.empty((len(times), len(robot.home)))
     qpos[0] = solver.start(first_guess(robot, paths, motion), paths, motion)
@@ -130,50 +128,60 @@ def _limb_arrays(paths: LimbPaths, times: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _trajectory(
-    robot: RobotModel,
-    paths: LimbPaths,
-    times: np.ndarray,
-    qpos: np.ndarray,
-    report: CheckReport,
-    blocked: list[Finding],
-    begin: float,
+    plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray, config: WholeBodyConfig
 ) -> WholeBodyTrajectory:
-    findings = [*blocked, *report.findings]
-    pose, velocity, contact = _limb_arrays(paths, times)
-    return WholeBodyTrajectory(
-        times=times,
+    """Postures and their checks."""
+    robot, motion = plan.robot, plan.motion
+    blocked, trajectory = _blocked(plan.schedule, paths), _without_postures(robot, paths, times)
+    try:
+        qpos = solve_ik(robot, paths, motion, times, config.ik, scene)
+    except PlanningError as error:
+        return replace(trajectory, failure=Failure("; ".join([*(each.reason for each in blocked), str(error)])))
+    report = check(robot, scene, paths, motion, times, qpos)
+    return replace(
+        trajectory,
         qpos=qpos,
         qvel=qvel_of(robot.mujoco_model, times, qpos),
         torque=report.torque,
-        limb_pose=pose,
-        limb_velocity=velocity,
-        in_contact=contact,
         max_position_error=report.max_position_error,
         max_orientation_error=report.max_orientation_error,
         limits_respected=report.limits_respected,
-        feasible=not findings,
-        reason="; ".join(finding.text for finding in findings),
-        seconds=perf_counter() - begin,
-        failure_time=findings[0].time if findings else None,
+        failure=_joined([*blocked, *report.findings], plan.schedule),
     )
 
 
-def _failed(robot: RobotModel, paths: LimbPaths, times: np.ndarray, reason: str, seconds: float) -> WholeBodyTrajectory:
-    """A trajectory without postures, because the inverse kinematics gave up."""
+def _blocked(schedule: ContactSchedule, paths: LimbPaths) -> list[Failure]:
+    """A failure for each swing that finds no way."""
+    starts = {(phase.swing, phase.transition): phase.start for phase in schedule.phases}
+    return [
+        Failure(f"{limb.label} finds no way clear of the world in transition {transition}", starts[limb, transition])
+        for limb, transition in paths.blocked
+    ]
+
+
+def _joined(findings: Sequence[Failure], schedule: ContactSchedule) -> Failure | None:
+    """All findings as one failure at the place of the first."""
+    if not findings:
+        return None
+    time = findings[0].time
+    transition = None if time is None else schedule.phase_at(time).transition
+    return replace(findings[0], reason="; ".join(each.reason for each in findings), transition=transition)
+
+
+def _without_postures(robot: RobotModel, paths: LimbPaths, times: np.ndarray) -> WholeBodyTrajectory:
+    """The planned paths of the limbs, with nothing known of the joints."""
     pose, velocity, contact = _limb_arrays(paths, times)
-    joints = len(robot.joint_names)
+    count, joints = len(times), len(robot.joint_names)
     return WholeBodyTrajectory(
         times=times,
-        qpos=np.full((len(times), 7 + joints), np.nan),
-        qvel=np.full((len(times), 6 + joints), np.nan),
-        torque=np.full((len(times), joints), np.nan),
+        qpos=np.full((count, 7 + joints), np.nan),
+        qvel=np.full((count, 6 + joints), np.nan),
+        torque=np.full((count, joints), np.nan),
         limb_pose=pose,
         limb_velocity=velocity,
         in_contact=contact,
         max_position_error=float("inf"),
         max_orientation_error=float("inf"),
         limits_respected=False,
-        feasible=False,
-        reason=reason,
-        seconds=seconds,
+        seconds=0.0,
     )

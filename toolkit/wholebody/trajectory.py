@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.contacts.failure import Failure
+
 
 @dataclass(frozen=True)
 class WholeBodyTrajectory:
@@ -23,10 +25,9 @@ class WholeBodyTrajectory:
         max_position_error: m, over CoM and contacts, recomputed with MuJoCo.
         max_orientation_error: rad, over contacts.
         limits_respected: joint position, velocity and torque limits hold everywhere.
-        feasible: all of the checks above passed and no unplanned collision.
-        reason: one line where not feasible, else "".
         seconds: wall-clock.
-        failure_time: s; of the failure named first in `reason`, None where feasible or unknown.
+        failure: All checks that did not pass, in words, with time and place of the first; None where all passed, a
+            check for unplanned collisions among them.
     """
 
     times: np.ndarray
@@ -39,7 +40,15 @@ class WholeBodyTrajectory:
     max_position_error: float
     max_orientation_error: float
     limits_respected: bool
-    feasible: bool
-    reason: str
     seconds: float
-    failure_time: float | None = None
+    failure: Failure | None = None
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every check passed."""
+        return self.failure is None
+
+    @property
+    def reason(self) -> str:
+        """One line where not feasible, else ""."""
+        return "" if self.failure is None else self.failure.reason

@@ -1,4 +1,4 @@
-"""Disturbances and replanning from the command line."""
+"""What the options of the commands become."""
 
 import argparse
 
@@ -7,14 +7,20 @@ import pytest
 
 from toolkit import cli
 from toolkit.errors import InputError
+from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
-from toolkit.execution.options import disturbance, execution_config
+from toolkit.world.timing import Timing
+
+
+def config_of(*options: str) -> ExecutionConfig:
+    parser = argparse.ArgumentParser()
+    cli.add_disturbance_options(parser)
+    cli.add_execution_options(parser)
+    return cli.execution_config(parser.parse_args(options))
 
 
 def parsed(*options: str) -> Disturbance:
-    parser = argparse.ArgumentParser()
-    cli.add_disturbance_options(parser)
-    return disturbance(parser.parse_args(options))
+    return config_of(*options).disturbance
 
 
 def test_nothing_differs_by_default():
@@ -49,9 +55,23 @@ def test_what_is_out_of_range_is_refused():
 
 
 def test_replanning_can_be_left_out():
-    parser = argparse.ArgumentParser()
-    cli.add_disturbance_options(parser)
-    cli.add_execution_options(parser)
-    assert execution_config(parser.parse_args([])).replanning.enabled
-    config = execution_config(parser.parse_args(["--no-replanning", "--push", "60"]))
+    assert config_of().replanning.enabled
+    config = config_of("--no-replanning", "--push", "60")
     assert not config.replanning.enabled and config.disturbance.push == 60.0
+
+
+def test_planning_options_reach_the_planner():
+    parser = argparse.ArgumentParser()
+    cli.add_planning_options(parser)
+    assert cli.PlanningOptions.of(parser.parse_args([])) == cli.PlanningOptions()
+    words = "--no-palms --steps 38 --heuristic euclidean --expansions 7 --timing 0.4,0.6 --planner optimiser"
+    options = cli.PlanningOptions.of(parser.parse_args(words.split()))
+    config = options.planner_config()
+    assert options.planner == "optimiser" and options.time_limit == 30.0
+    assert not config.palms and config.steps == 38 and config.heuristic == "euclidean"
+    assert config.search.max_expansions == 7 and config.timings == (Timing(0.4, 0.6),)
+
+
+def test_a_report_keeps_the_options_but_for_seed_and_folder():
+    args = argparse.Namespace(seed=3, out=None, planner="auto", timing=(1, 2), push=0.0, no_palms=False)
+    assert cli.plain_options(args) == {"planner": "auto", "push": 0.0, "no_palms": False}

@@ -1,0 +1,26 @@
+"""Failure: why a stage rejected a plan, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from toolkit.geometry.limb import Limb
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a stage rejected a plan; what is unknown is None.
+
+    Attributes:
+        reason: One line for a person.
+        time: When it happens first, or where it is worst, in s since the plan began.
+        transition: Index of the transition in which it happens; the number of transitions for the final rest.
+        limb: The limb that it happens to.
+        knot: The knot of the centroidal motion at which a constraint is violated most.
+    """
+
+    reason: str
+    time: float | None = None
+    transition: int | None = None
+    limb: Limb | None = None
+    knot: int | None = None

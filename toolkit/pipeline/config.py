@@ -1,0 +1,41 @@
+"""Settings of a run of the pipeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from toolkit.centroidal.sequence import SequenceConfig
+from toolkit.contacts.room import RoomConfig
+from toolkit.execution.config import ExecutionConfig
+from toolkit.wholebody.plan import WholeBodyConfig
+
+
+@dataclass(frozen=True)
+class PipelineConfig:
+    """Settings of one run.
+
+    Attributes:
+        seed: Seed of every random draw.
+        time_limit: s for the contact search; the search also ends after its own number of expansions, so that the
+            same seed gives the same plan on any machine fast enough.
+        candidates: Most contact sequences to test before giving up; those with palms at most half of them, after which
+            the search is run for the feet alone.
+        until: Last stage that tests a sequence: "dynamics" for the plan alone, "wholebody", or "execution".
+        initial_rest: s at rest before the first transition.
+        final_rest: s at rest after the last transition.
+        landing: How far feet may land from where the search put them, where margins are short; None for not at all.
+        sequence: Settings of the centroidal optimiser.
+        wholebody: Settings of the whole-body stage.
+        execution: Settings of the simulated run.
+    """
+
+    seed: int = 0
+    time_limit: float = 30.0
+    candidates: int = 16
+    until: str = "execution"
+    initial_rest: float = 0.4
+    final_rest: float = 1.0
+    landing: RoomConfig | None = field(default_factory=RoomConfig)
+    sequence: SequenceConfig = field(default_factory=SequenceConfig)
+    wholebody: WholeBodyConfig = field(default_factory=WholeBodyConfig)
+    execution: ExecutionConfig = field(default_factory=ExecutionConfig)
