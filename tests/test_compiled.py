@@ -158,7 +158,7 @@ RUN = """
 import json
 import numpy as np
 from toolkit.contacts.surface_table import SurfaceTable, _fill
-from toolkit.search.moves.legs import Legs, violated
+from toolkit.search.moves.legs import Legs, reach
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.screen import Sole, screen_swings
 from toolkit.physics.leg import LIMITS
@@ -173,13 +173,13 @@ _fill(table, np.array([[0.0, 0.2, 0.1, 0.2]]), zero, np.array([[0, 1, 0, 1]]), 0
 
 ranges = np.tile([-9.0, 9.0], (2, len(LIMITS), 1))
 legs = Legs(np.zeros((2, 3)), np.zeros((2, 3)), np.full((2, 2), 0.4), ranges)
-reason = violated(legs, 0, 0.0, 0.0, 0.7, 0.0, np.zeros(3), np.eye(3))
+reason, _ = reach(legs, 0, (0.0, 0.0, 0.7), 0.0, np.zeros(3), np.eye(3))
 
 codes = np.empty(1, np.int64)
 feet = Sole(np.array([-0.3, 0.1, 0.0]), np.eye(3), 0.0), Sole(np.array([0.0, -0.1, 0.0]), np.eye(3), 0.0)
 screen_swings(np.array([[0.3, 0.1, 0.0]]), np.zeros(1), *feet, np.array([0.11, 0.07]), 2.0, 0.04, 0.1, codes)
 
-kernels = (_fill, violated, screen_swings)
+kernels = (_fill, reach, screen_swings)
 print(json.dumps({
     "results": [int(table.near_start[1]), Reason(reason).name, Reason(codes[0]).name],
     "compiled": [sum(kernel.stats.cache_misses.values()) for kernel in kernels],

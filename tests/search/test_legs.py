@@ -7,7 +7,7 @@ from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z, rotation_on_surface
 from toolkit.physics.leg import LIMITS, ReachMargins, leg_clearances, leg_posture
 from toolkit.robot.loader import load_robot
-from toolkit.search.moves.legs import legs_of, stances_violated, violated
+from toolkit.search.moves.legs import legs_of, reach, stances_violated
 from toolkit.search.moves.reasons import OF_LIMIT, Reason
 from toolkit.search.moves.shanks import shanks_of
 
@@ -34,7 +34,7 @@ def test_same_verdict_as_the_closed_form(name):
         clearances = leg_clearances(leg, leg_posture(leg, com, yaw, position, rotation), margins)
         stacked = np.stack([clearances[limit.name] for limit in LIMITS])
         expected = np.where((stacked < 0).any(0), np.array(OF_LIMIT)[(stacked < 0).argmax(0)], 0)
-        got = np.array([violated(legs, side, *com[i], yaw[i], position[i], rotation[i]) for i in range(n)])
+        got = np.array([reach(legs, side, tuple(com[i]), yaw[i], position[i], rotation[i])[0] for i in range(n)])
         np.testing.assert_array_equal(got, expected)
         seen |= set(got.tolist())
     assert {Reason.NONE, Reason.LEG_LENGTH, Reason.ANKLE_PITCH, Reason.ANKLE_ROLL} <= seen
@@ -43,9 +43,9 @@ def test_same_verdict_as_the_closed_form(name):
 def test_a_lower_com_brings_long_strides_into_reach():
     robot = load_robot(ROBOTS[0])
     legs = legs_of(robot, ReachMargins(ankle=0.0))
-    reach = 0.45 * robot.legs[FEET[0]].max_length
+    stride = 0.45 * robot.legs[FEET[0]].max_length
     y = robot.legs[FEET[0]].hip_in_com[1]
-    left, right = np.array([[reach, y, 0.0]]), np.array([[-reach, -y, 0.0]])
+    left, right = np.array([[stride, y, 0.0]]), np.array([[-stride, -y, 0.0]])
     com, turn = np.array([[0.0, 0.0, robot.com_height]]), np.eye(3)[None]
     shanks = shanks_of(robot)
     high = stances_violated(legs, shanks, com, np.array([0.0]), np.zeros(1), left, turn, right, turn)

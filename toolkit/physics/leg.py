@@ -269,17 +269,6 @@ def leg_clearances(leg: LegGeometry, posture: LegPosture, margins: ReachMargins)
 def leg_torques(
     posture: LegPosture, sole: np.ndarray, rotation: np.ndarray, force: np.ndarray, moment: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Static torques of n stance legs; see `joint_torques`.
-
-    Args:
-        posture: of n legs.
-        sole: (n, 3) m; centres of the soles.
-        rotation: (n, 3, 3); world_from_sole.
-        force: (n, 3) N on the sole, in the world.
-        moment: (n, 3) N m on the sole about its centre, in the world.
-
-    Returns:
-        Role -> (n,) N m.
-    """
+    """Role -> (n,) N m of n stance legs; see `joint_torques` for the arguments, whose first axis is n here."""
     torques = joint_torques(posture, sole.T, np.moveaxis(rotation, 0, -1), force.T, moment.T)
     return dict(zip(TORQUE_ROLES, torques, strict=True))

@@ -24,7 +24,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z, steepness
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.robot.model import RobotModel
-from toolkit.search.moves.legs import legs_of, violated
+from toolkit.search.moves.legs import legs_of, reach
 from toolkit.search.moves.moves import MoveConfig
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.planner_config import PlannerConfig
@@ -101,11 +101,11 @@ class QuasiStaticEvaluator(TransitionEvaluator):
 
     def _reaches(self, com: np.ndarray, stance: Stance) -> bool:
         """Whether legs and arms reach every contact of a stance with this CoM."""
-        yaw, (x, y, z) = stance.mean_feet.yaw, com
+        yaw, place = stance.mean_feet.yaw, tuple(com)
         for contact in stance.contacts:
             pose = contact.pose
             if contact.limb.is_foot:
-                if violated(self._legs, int(contact.limb), x, y, z, yaw, pose.position, pose.rotation):
+                if reach(self._legs, int(contact.limb), place, yaw, pose.position, pose.rotation)[0]:
                     return False
             else:
                 arm = self._robot.arms[contact.limb]

@@ -54,7 +54,7 @@ def legs_of(robot: RobotModel, margins: ReachMargins) -> Legs:
     )
 
 
-@compiled
+@compiled(kept=True)
 def reach(legs, side, com, yaw, position, rotation):
     """The first limit that a leg breaks, as a `Reason`, and its hip, knee and ankle in m, zeros where it is too long.
 
@@ -79,12 +79,6 @@ def reach(legs, side, com, yaw, position, rotation):
         if value < ranges[k, 0] or value > ranges[k, 1]:
             return OF_LIMIT[k], points
     return 0, points
-
-
-@compiled(kept=True)
-def violated(legs, side, x, y, z, yaw, position, rotation):
-    """The first limit that a leg breaks with its CoM at x, y, z m, as a `Reason`; see `reach`."""
-    return reach(legs, side, (x, y, z), yaw, position, rotation)[0]
 
 
 @compiled(kept=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.contacts.arm_map import ArmMap
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.candidates import Candidates, mean_feet
 from toolkit.search.moves.legs import Legs, stances_violated
@@ -107,14 +108,10 @@ class ReachCheck:
             held = np.flatnonzero(after[:, palm] >= 0)
             if len(held):
                 arm = self._robot.arms[palm]
-                c, s = np.cos(candidates.yaw[held]), np.sin(candidates.yaw[held])
-                x, y, z = arm.shoulder_in_com
-                shoulder = end[held] + np.stack([c * x - s * y, s * x + c * y, np.full(len(held), z)], axis=-1)
+                turn = rotation_about_z(candidates.yaw[held])
+                shoulder = end[held] + turn @ arm.shoulder_in_com
                 reach, normal = table.position[after[held, palm]] - shoulder, table.rotation[after[held, palm], :, 2]
-                forward = np.stack([c, s, np.zeros_like(c)], axis=-1)
-                left, up = np.stack([-s, c, np.zeros_like(c)], axis=-1), np.array([0.0, 0.0, 1.0])
-                axes = (forward, left, np.broadcast_to(up, forward.shape))
-                local = [np.stack([(rows * axis).sum(1) for axis in axes], axis=-1) for rows in (reach, normal)]
+                local = [np.einsum("nij,ni->nj", turn, vectors) for vectors in (reach, normal)]
                 distance, margin = np.linalg.norm(reach, axis=1), self._config.arm_margin
                 within = (distance > arm.min_reach + margin / 2) & (distance < arm.max_reach - margin)
                 limb = candidates.limb[held]
