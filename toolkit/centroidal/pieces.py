@@ -20,7 +20,7 @@ import casadi as ca
 from toolkit.centroidal.blocks import Parameters, Piece
 from toolkit.centroidal.leg_pieces import WRENCH, displacement, leg, stretched, torque
 from toolkit.centroidal.problem import GRAVITY, STANDARD_GRAVITY
-from toolkit.physics.momentum import advanced, spin_rate
+from toolkit.physics.momentum import advanced, mean_com
 from toolkit.physics.wrench import SIGNS, pressure, pressure_rows, yaw_row
 
 STATE = 12
@@ -98,24 +98,24 @@ def _stage(contacts: int, moving: bool) -> Piece:
     wrenches, offsets = ca.SX.sym("w", WRENCH * contacts), ca.SX.sym("d", 2 * contacts * moving)
     dt = p()
     r, v, kappa, before = ca.vertsplit(x, 3)
-    total, moment = ca.SX.zeros(3), ca.SX.zeros(3)  # about the CoM at the knot
+    total, moment = ca.SX.zeros(3), ca.SX.zeros(3)  # about the mean CoM: the rate of the angular momentum
+    middle = ca.vertcat(*mean_com(dt, G, x))
     for i in range(contacts):
         rotation, position = ca.reshape(p(9), 3, 3).T, p(3)
         if moving:
             position += p() * displacement(rotation, offsets[2 * i : 2 * i + 2])
         force = rotation @ wrenches[WRENCH * i : WRENCH * i + 3]
         total += force
-        moment += ca.cross(position - r, force) + rotation @ wrenches[WRENCH * i + 3 : WRENCH * i + 6]
+        moment += ca.cross(position - middle, force) + rotation @ wrenches[WRENCH * i + 3 : WRENCH * i + 6]
     acceleration = G * total + ca.DM(GRAVITY)
-    rate = ca.vertcat(*spin_rate(dt, G, ca.vertcat(ca.DM.zeros(3), v), G * total, G * moment))
     moved = ca.vertcat(*advanced(dt, G, x, acceleration, G * moment)[:6])
-    following = ca.vertcat(moved, kappa + dt * rate, acceleration)
+    following = ca.vertcat(moved, kappa + dt * G * moment, acceleration)
     weights, height = p(6), p()
     rho = ca.vertcat(
         weights[0] * after[3:6],
         weights[1] * after[9:12],
         weights[2] * after[6:9],
-        weights[3] * rate,
+        weights[3] * G * moment,
         weights[4] * (acceleration - before),
         weights[5] * (after[2] - height),
     )
@@ -135,13 +135,12 @@ def _contact() -> Piece:
     wrench, slack, excess = ca.SX.sym("w", WRENCH), ca.SX.sym("s", 2), ca.SX.sym("e")
     mu, half, wanted, cop_margin, yaw_factor = p(), p(2), p(), p(2), p()
     least, least_cop, least_yaw, weights, load, price = p(), p(2), p(), p(6), p(), p()
-    fx, fy, fz = ca.vertsplit(wrench[:3])
+    fx, fy, fz, tx, ty, tz = ca.vertsplit(wrench)
     held = mu * (wanted * fz + (least - wanted) * slack[0] + excess) + 1e-7
     cone = held - (fx**2 + fy**2) / held  # smooth at rest, unlike the square root
-    wider_x, wider_y = ca.vertsplit((cop_margin - least_cop) * slack[1] + half * excess)
-    inside = [-ca.dot(ca.vertcat(*row), wrench) for row in pressure_rows(*ca.vertsplit(half - cop_margin))]
-    rows = [cone, inside[0] + wider_y, inside[1] + wider_y, inside[2] + wider_x, inside[3] + wider_x]
-    rows += [fz - slack[0], fz - slack[1]]
+    loaded = ca.vertsplit((half - cop_margin) * fz + (cop_margin - least_cop) * slack[1] + half * excess)
+    inside = [-ca.dot(ca.vertcat(*row), ca.vertcat(fx, fy, 1, tx, ty, tz)) for row in pressure_rows(*loaded)]
+    rows = [cone, *inside[2:], *inside[:2], fz - slack[0], fz - slack[1]]
     # Yaw: the wanted part of the range under the margins, and the whole physical range: a moment of the wrong sign can
     # be within a part of the range but not in the range itself.
     most = 2 * mu * (half[0] + half[1])
@@ -150,9 +149,10 @@ def _contact() -> Piece:
         (least_yaw, mu * least, half - least_cop, most * excess),
     ]
     for factor, friction, (hx, hy), more in ((a, b, ca.vertsplit(c), d) for a, b, c, d in ranges):
-        for signs in SIGNS:
-            row = ca.vertcat(*yaw_row(friction, hx, hy, *signs))
-            rows.append(more - factor * ca.dot(row[:5], wrench[:5]) - row[5] * wrench[5])
+        for a, b, side in SIGNS:
+            row = yaw_row(friction, hx, hy, -a, -b, side)
+            room = -row[2] * fz - (row[0] * fx + row[3] * tx) - (row[1] * fy + row[4] * ty)
+            rows.append(factor * room + more - row[5] * tz)
     v = ca.vertcat(wrench, slack, excess)
     tilt = ca.jacobian(wrench[:2], v) - ca.vertcat(fx, fy) / held @ ca.jacobian(held, v)
 
@@ -160,14 +160,16 @@ def _contact() -> Piece:
         return (20 * ca.fmax(-multiplier[0], 0) / held) * (tilt.T @ tilt)
 
     pressed = fz + 0.01  # an unloaded contact has no CoP: keeps the objective smooth there
-    *cop, twist = pressure(wrench, pressed)
-    off_centre, spin = weights[3] * ca.vertcat(*cop) / (2 * half), weights[2] * twist
+    cop = ca.vertcat(*pressure(wrench, pressed)[:2])
+    off_centre = weights[3] * cop / (2 * half)
+    leverage = cop[1] * fx - cop[0] * fy
+    spin = weights[2] * (tz + leverage)
     rho = ca.vertcat(
         weights[0] * wrench[:3],
         weights[1] * wrench[:2],
         spin,
         off_centre,
-        weights[4] * pressed * ca.vertcat(*cop) / (2 * half),
+        weights[4] * ca.vertcat(-ty, tx) / (2 * half),
         weights[5] * (fz - load),
         ca.sqrt(EVEN * price) * slack,
     )
@@ -175,7 +177,7 @@ def _contact() -> Piece:
     # The square of a ratio t / f bends three times as much along f as Gauss-Newton knows: where a contact is lightly
     # loaded, steps would swing ever farther around the solution.
     bend = ca.SX(CONTACT + 1, CONTACT + 1)
-    bend[2, 2] = 4 * (ca.sumsqr(off_centre) + ca.fmax(spin * weights[2] * (twist - wrench[5]), 0)) / pressed**2
+    bend[2, 2] = 4 * (ca.sumsqr(off_centre) + ca.fmax(spin * weights[2] * leverage, 0)) / pressed**2
     rows = 10 * ca.vertcat(*rows)
     return Piece("contact", v, p.vector, rho=rho, linear=linear, rows=rows, bend=bend, curvature=curvature)
 

@@ -26,7 +26,7 @@ def cross(a, b):
 @law
 def ballistic(dt, position, velocity, acceleration):
     """Position after a time under a constant acceleration."""
-    return position + dt * velocity + dt * dt / 2 * acceleration
+    return position + dt * velocity + dt**2 / 2 * acceleration
 
 
 @law
@@ -43,7 +43,7 @@ def advanced(dt, gravity, state, acceleration, moment):
     Returns:
         Nine entries.
     """
-    half, cube = dt * dt / 2, dt * dt * dt / 6
+    half, cube = dt**2 / 2, dt**3 / 6
     return (
         ballistic(dt, state[0], state[3], acceleration[0]),
         ballistic(dt, state[1], state[4], acceleration[1]),
@@ -63,7 +63,7 @@ def mean_com(dt, gravity, state):
     return (
         state[0] + dt / 2 * state[3],
         state[1] + dt / 2 * state[4],
-        state[2] + dt / 2 * state[5] - dt * dt / 6 * gravity,
+        state[2] + dt / 2 * state[5] - dt**2 / 6 * gravity,
     )
 
 

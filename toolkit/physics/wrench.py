@@ -75,7 +75,7 @@ def pressure(wrench, load):
         The centre of pressure, x and y, and the yaw moment about it.
     """
     x, y = -wrench[4] / load, wrench[3] / load
-    return x, y, wrench[5] + y * wrench[0] - x * wrench[1]
+    return x, y, wrench[5] - x * wrench[1] + y * wrench[0]
 
 
 def friction_rows(friction: float, sides: int = 24) -> np.ndarray:

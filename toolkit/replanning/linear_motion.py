@@ -8,7 +8,7 @@ import numpy as np
 
 from toolkit.centroidal.problem import STANDARD_GRAVITY
 from toolkit.geometry.limb import FEET
-from toolkit.physics.momentum import advanced, ballistic, fill_wrench_map
+from toolkit.physics.momentum import advanced, fill_wrench_map
 from toolkit.replanning.nominal import Nominal
 from toolkit.replanning.situation import HorizonContacts, Situation
 from toolkit.replanning.sweep import GIVEN
@@ -46,7 +46,7 @@ class Window:
         spin, made = nominal.spin[knots].copy(), nominal.wrench_spin[knots].copy()
         inside = time - nominal.times[first]
         times[0] = time
-        com[0] = ballistic(inside, com[0], velocity[0], nominal.acceleration[first])
+        com[0] += inside * (velocity[0] + 0.5 * inside * nominal.acceleration[first])
         velocity[0] += inside * nominal.acceleration[first]
         for each in (spin, made):
             each[0] += inside / (nominal.times[first + 1] - nominal.times[first]) * (each[1] - each[0])
@@ -177,7 +177,8 @@ class Dynamics:
         turn, wrench = contacts.rotation[step, limb], planned[step, limb]
         lever = contacts.position[step, limb] + contacts.shift[step, limb] - origin
         spread = np.zeros((len(step), 6, 6))
-        fill_wrench_map(G * np.moveaxis(turn, 0, 2), lever.T, np.moveaxis(spread, 0, 2))
+        fill_wrench_map(np.moveaxis(turn, 0, 2), lever.T, np.moveaxis(spread, 0, 2))
+        spread *= G
         pull = np.einsum("cij,cj->ci", spread, wrench)
         pulls = np.zeros((steps, 6))
         np.add.at(pulls, step, pull)
@@ -205,10 +206,10 @@ def _planned_rates(window: Window) -> np.ndarray:
     about = window.wrench_spin + np.cross(window.com - origin, window.velocity)
     rates = np.zeros((window.steps, 6))
     rates[:, :3] = np.diff(window.velocity, axis=0) / dt[:, None]
-    state = np.concatenate([window.com - origin, window.velocity, about], 1)
-    # The moment is what is missing to the angular momentum of the next knot without one.
-    without = np.stack(advanced(dt, G, state[:-1].T, rates[:, :3].T, np.zeros((3, 1))), 1)
-    rates[:, 3:] = (about[1:] - without[:, 6:]) / dt[:, None]
+    weight_moment = np.zeros((window.steps, 3))
+    mean = window.com[:-1] + dt[:, None] * (window.velocity[:-1] / 2 + dt[:, None] * rates[:, :3] / 6) - origin
+    weight_moment[:, 0], weight_moment[:, 1] = -G * mean[:, 1], G * mean[:, 0]
+    rates[:, 3:] = np.diff(about, axis=0) / dt[:, None] - weight_moment
     return rates
 
 
