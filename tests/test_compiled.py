@@ -16,14 +16,6 @@ from toolkit.compiled import compiled, digest
 
 ROOT = Path(__file__).resolve().parent.parent
 MOST_ARGUMENTS = 12
-TOO_MANY = {  # to be emptied as these kernels change
-    "toolkit/centroidal/bulk_check.py:_evaluate",
-    "toolkit/centroidal/fast.py:_solved",
-    "toolkit/centroidal/kernels/interior_point.py:direction",
-    "toolkit/centroidal/kernels/knots.py:reach",
-    "toolkit/centroidal/kernels/setup.py:pack",
-    "toolkit/replanning/kernel.py:_newton",
-}
 MODULES = {path.relative_to(ROOT).as_posix(): path for path in sorted((ROOT / "toolkit").rglob("*.py"))}
 
 
@@ -45,7 +37,7 @@ def test_no_compiled_function_has_many_arguments():
             if given.vararg or len(given.posonlyargs + given.args + given.kwonlyargs) > MOST_ARGUMENTS:
                 found.add(f"{name}:{node.name}")
     assert seen > 50
-    assert found == TOO_MANY
+    assert not found
 
 
 def test_only_one_module_imports_numba():
@@ -141,7 +133,7 @@ def test_digest_of_a_compiled_function_is_that_of_its_source():
     "kernel, callee",
     [
         ("toolkit.centroidal.fast:_solved", "toolkit.centroidal.kernels.elimination:cholesky"),
-        ("toolkit.replanning.kernel:_run", "toolkit.replanning.kernel:_multiply"),
+        ("toolkit.replanning.kernel:solve", "toolkit.replanning.sweep:_multiply"),
     ],
 )
 def test_digest_of_a_solver_follows_its_callees(kernel, callee, monkeypatch):
@@ -205,7 +197,7 @@ robot = load_robot(find_robots()[0])
 start = Stance(tuple(sole(robot, limb) for limb in FEET))
 step = ContactTransition(Limb.LEFT_FOOT, sole(robot, Limb.LEFT_FOOT, 0.1), Timing(0.4, 0.6))
 fast.solve(transition_problem(robot, start, initial_com(robot, start), np.zeros(3), step))
-kernels = (kernel._run, fast._solved)
+kernels = (kernel.solve, fast._solved)
 print(json.dumps({"results": [], "compiled": [sum(item.stats.cache_misses.values()) for item in kernels]}))
 """
 
@@ -252,7 +244,7 @@ def test_an_edit_below_a_solver_turns_the_next_run_around(copy):
     assert copy.run(SOLVERS)["compiled"] == [0, 0]
     for path, function in (
         ("centroidal/kernels/elimination", "cholesky(a, n)"),
-        ("replanning/kernel", "_multiply(a, b, out)"),
+        ("replanning/sweep", "_multiply(a, b, out)"),
     ):
         copy.edit(f"toolkit/{path}.py", f"def {function}:\n", f"def {function}:\n    a = a + 0.0\n")
     assert copy.run(SOLVERS)["compiled"] == [1, 1]

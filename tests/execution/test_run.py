@@ -101,7 +101,7 @@ def test_a_robot_without_its_motors_falls(walking):
     assert {"upright", "completed"} <= failed(execution)
     failure = execution.failure
     assert failure is not None and failure.reason == f"the robot fell: {execution.fall.reason}"
-    assert failure.time == execution.fall.time == execution.tick_times[-1]
+    assert failure.time == execution.fall.time == execution.samples.tick_times[-1]
     assert failure.transition == walking.schedule.phase_at(failure.time).transition
 
 
@@ -147,7 +147,7 @@ def test_the_controller_tracks_the_paths_of_the_plan(walking, flat):
     """Feet that are planned to swing higher do so in the run: the paths are not planned anew."""
     config = WholeBodyConfig(swing=SwingConfig(foot_lift=0.09))
     plan = whole_body(walking.whole, walking.whole.scene, config)
-    lift = [execute(each).limb_pose[:, Limb.LEFT_FOOT, 2].max() for each in (walking.whole, plan)]
+    lift = [execute(each).samples.limb_pose[:, Limb.LEFT_FOOT, 2].max() for each in (walking.whole, plan)]
     assert lift[1] > lift[0] + 0.02
 
 

@@ -28,7 +28,7 @@ def nominal(walking):
     reference = sample_reference(
         times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, plan.paths, plan.robot
     )
-    return Nominal.of(plan.motion, reference, plan.robot, CONFIG)
+    return Nominal.of(plan.motion, reference, plan.robot, CONFIG.horizon)
 
 
 @pytest.fixture(scope="module")
