@@ -162,14 +162,14 @@ def _contact(nlp: _Program, p: CentroidalProblem, t: int, i: int, f: ca.SX, z: c
     nlp.require(mu**2 * fz**2 - fx**2 - fy**2, 0)
     nlp.require(z, [-half_x, -half_y], [half_x, half_y])
     tau_x, tau_y = z[1] * fz, -z[0] * fz
-    tau_z = (tau + z[0] * fy - z[1] * fx) / p.margins.yaw
+    tau_z, turning = tau + z[0] * fy - z[1] * fx, p.margins.yaw * mu
     for sign in (-1, 1):
         for a in (-1, 1):
             for b in (-1, 1):
                 nlp.require(
-                    mu * (half_x + half_y) * fz
-                    - a * (half_y * fx + sign * mu * tau_x)
-                    - b * (half_x * fy + sign * mu * tau_y)
+                    turning * (half_x + half_y) * fz
+                    - a * (half_y * fx + sign * turning * tau_x)
+                    - b * (half_x * fy + sign * turning * tau_y)
                     - sign * tau_z,
                     0,
                 )

@@ -86,13 +86,15 @@ def test_what_is_undefined_is_infinitely_wrong(motions):
             assert agree(replace(motions[0], **{name: values})) == np.inf
 
 
-def test_the_independent_check_agrees_with_the_laws(robot, feet):
+@pytest.mark.parametrize("margins", [Margins(), Margins(friction=0.8, cop=(0.02, 0.01), yaw=0.6)])
+def test_the_independent_check_agrees_with_the_laws(robot, feet, margins):
     """A motion of random wrenches that is integrated by the law has no residual of its dynamics, and those residuals
     of its contacts that the rows of the cone say."""
     rng = np.random.default_rng(2)
     palm = Contact(Limb.LEFT_PALM, Pose(np.eye(3), np.array([0.0, 0.6, 1.3])), 0.5)
     transition = ContactTransition(Limb.LEFT_PALM, palm)
     problem = transition_problem(robot, feet, initial_com(robot, feet), rng.normal(size=3), transition)
+    problem = replace(problem, margins=margins)
     n, weight = problem.steps, robot.mass * STANDARD_GRAVITY
     wrench = rng.normal(size=(n, 4, 6)) * [0.3, 0.3, 0.3, 0.03, 0.03, 0.03] + [0, 0, 0.6, 0, 0, 0]
     state = np.concatenate([problem.com, problem.com_velocity, cross(problem.com, problem.com_velocity)])
@@ -106,8 +108,9 @@ def test_the_independent_check_agrees_with_the_laws(robot, feet):
             total += STANDARD_GRAVITY * to_world @ w
             *motion[1][t, i], motion[2][t, i] = pressure(w, w[2])
             motion[0][t, i], motion[2][t, i] = weight * problem.rotation[t, i] @ w[:3], weight * motion[2][t, i]
-            x, y = problem.half_size[i]
-            rows = [yaw_row(problem.friction[t, i], x, y, *signs) for signs in SIGNS]
+            x, y = problem.reduced_half_size[i]
+            turning = margins.yaw * margins.friction * problem.friction[t, i]
+            rows = [yaw_row(turning, x, y, *signs) for signs in SIGNS]
             worst["cop"] = max(worst["cop"], (np.array(pressure_rows(x, y)) @ w).max())
             worst["yaw"] = max(worst["yaw"], (np.array(rows) @ w).max())
         state = np.array(

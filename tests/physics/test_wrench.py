@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import linprog
 
-from toolkit.physics.wrench import foot_rows, friction_rows, sole_rows, turning_rows
+from toolkit.physics.wrench import foot_rows, friction_rows, sole_rows, turning_rows, yaw_row
 
 HALF, FRICTION = np.array([0.11, 0.065]), 0.5
 CORNERS = np.array([[a * HALF[0], b * HALF[1], 0.0] for a in (-1, 1) for b in (-1, 1)])
@@ -79,6 +79,26 @@ def test_less_yaw_friction_gives_a_smaller_cone():
     inside = (wrenches @ reduced.T <= 0.0).all(1)
     assert inside.sum() > 100
     assert (wrenches[inside] @ full.T <= 1e-12).all()
+
+
+def test_what_keeps_the_margins_of_a_plan_is_within_the_physical_limits():
+    """Plan inside controller inside simulation, whatever force the sole pushes with."""
+    rng = np.random.default_rng(7)
+    rings = [(0.66, 0.6, HALF - [0.055, 0.0325]), (0.83, 0.8, HALF - [0.0275, 0.01625]), (1.0, 1.0, HALF)]
+    cones = [sole_rows(part * FRICTION, half, yaw) for part, yaw, half in rings]
+    scale = np.r_[0.66 * FRICTION, 0.66 * FRICTION, 1.0, HALF[1] / 2, HALF[0] / 2, 0.4 * FRICTION * HALF.sum()]
+    wrenches = rng.uniform(-1.0, 1.0, (40000, 6)) * scale
+    wrenches[:, 2] = 1.0
+    inside = (wrenches @ cones[0].T <= 0.0).all(1)
+    assert inside.sum() > 1000
+    for wider in cones[1:]:
+        assert (wrenches[inside] @ wider.T <= 1e-12).all()
+    # A factor on the moment itself lets through what no corner forces exert: the range does not contain zero here.
+    push = np.r_[0.6 * FRICTION, 0.6 * FRICTION, 1.0, 0.95 * HALF[1], 0.95 * HALF[0]]
+    row = np.array(yaw_row(FRICTION, *HALF, 1.0, 1.0, 1.0))
+    most = -row[:5] @ push
+    assert most < 0.0
+    assert (sole_rows(FRICTION, HALF)[28:] @ np.append(push, 0.6 * most) > 0.0).any()
 
 
 def test_a_force_at_a_corner_keeps_its_own_yaw_moment_whatever_the_margin():

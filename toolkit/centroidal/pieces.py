@@ -141,18 +141,15 @@ def _contact() -> Piece:
     loaded = ca.vertsplit((half - cop_margin) * fz + (cop_margin - least_cop) * slack[1] + half * excess)
     inside = [-ca.dot(ca.vertcat(*row), ca.vertcat(fx, fy, 1, tx, ty, tz)) for row in pressure_rows(*loaded)]
     rows = [cone, *inside[2:], *inside[:2], fz - slack[0], fz - slack[1]]
-    # Yaw: the wanted part of the range under the margins, and the whole physical range: a moment of the wrong sign can
-    # be within a part of the range but not in the range itself.
+    # Yaw: what the wanted margins leave, and the least ones, which no slack takes back.
     most = 2 * mu * (half[0] + half[1])
     ranges = [
-        (yaw_factor, mu * wanted, half - cop_margin, most * (slack[0] + slack[1] + excess)),
-        (least_yaw, mu * least, half - least_cop, most * excess),
+        (yaw_factor * mu * wanted, half - cop_margin, most * (slack[0] + slack[1] + excess)),
+        (least_yaw * mu * least, half - least_cop, most * excess),
     ]
-    for factor, friction, (hx, hy), more in ((a, b, ca.vertsplit(c), d) for a, b, c, d in ranges):
-        for a, b, side in SIGNS:
-            row = yaw_row(friction, hx, hy, -a, -b, side)
-            room = -row[2] * fz - (row[0] * fx + row[3] * tx) - (row[1] * fy + row[4] * ty)
-            rows.append(factor * room + more - row[5] * tz)
+    for turning, extents, more in ranges:
+        for signs in SIGNS:
+            rows.append(more - ca.dot(ca.vertcat(*yaw_row(turning, *ca.vertsplit(extents), *signs)), wrench))
     v = ca.vertcat(wrench, slack, excess)
     tilt = ca.jacobian(wrench[:2], v) - ca.vertcat(fx, fy) / held @ ca.jacobian(held, v)
 

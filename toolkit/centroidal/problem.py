@@ -50,7 +50,7 @@ class Margins:
     Attributes:
         friction: factor on the friction coefficient.
         cop: (2,) m taken off each half extent of a sole (scaled to at most half of it for small patches).
-        yaw: factor on the yaw moment that friction can hold.
+        yaw: factor on the friction that may be used for the yaw moment.
     """
 
     friction: float = 1.0

@@ -222,14 +222,15 @@ def _beyond_cone(p, step, limb, force, cop, torque):
     x, y = p.reduced_half_size[limb, 0], p.reduced_half_size[limb, 1]
     tau_x, tau_y = cop[1] * fz, -cop[0] * fz  # moment at the patch centre
     tau_z = torque + cop[0] * fy - cop[1] * fx
-    room = mu * (x + y) * fz
-    low = abs(y * fx - mu * tau_x) + abs(x * fy - mu * tau_y) - room
-    high = room - abs(y * fx + mu * tau_x) - abs(x * fy + mu * tau_y)
+    turning = p.yaw_margin * mu
+    room = turning * (x + y) * fz
+    low = abs(y * fx - turning * tau_x) + abs(x * fy - turning * tau_y) - room
+    high = room - abs(y * fx + turning * tau_x) - abs(x * fy + turning * tau_y)
     return (
         math.hypot(fx, fy) - mu * fz,
         max(-fz, fz - p.max_normal_force[limb] / (p.mass * STANDARD_GRAVITY)),
         max(abs(tau_y) - x * fz, abs(tau_x) - y * fz),
-        max(p.yaw_margin * low - tau_z, tau_z - p.yaw_margin * high),
+        max(low - tau_z, tau_z - high),
     )
 
 

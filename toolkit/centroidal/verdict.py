@@ -43,8 +43,8 @@ def judged(motion: CentroidalMotion, robot: RobotModel, slack: np.ndarray) -> Ce
 def _wider(motion: CentroidalMotion) -> list[Margins]:
     """Margins that a motion may keep where it does not keep the wanted ones, the physical limits last.
 
-    Friction and CoP factors follow from the forces. The yaw range also depends on them and has no such simple answer:
-    ever wider margins are offered. A larger yaw factor alone is no looser where the other forces demand a yaw moment.
+    Friction and CoP factors follow from the forces. The yaw moment also depends on them and has no such simple answer:
+    ever wider margins are offered.
     """
     p, wanted = motion.problem, motion.problem.margins
     accepted = TOLERANCE / 2  # of a weight

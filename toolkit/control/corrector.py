@@ -22,7 +22,7 @@ class Cones:
 
     Attributes:
         friction: factor on the friction.
-        yaw: factor on the yaw moment.
+        yaw: factor on the friction that may be used for the yaw moment.
         half_size: (4, 2) m half extents of the patches within which the centre of pressure stays.
     """
 

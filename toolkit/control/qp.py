@@ -65,7 +65,7 @@ class ContactQP:
             limb: in contact.
             friction: coefficient, margins applied.
             half_size: (2,) m, margins applied.
-            yaw: factor on the yaw moment.
+            yaw: factor on the friction that may be used for the yaw moment.
         """
         key = (friction, yaw, *half_size)
         if self._cones.get(limb) == key:

@@ -81,8 +81,8 @@ def fill_row(row, out):
 
 
 @compiled(reordered=True)
-def contact_rows(mu, x, y, bound, yaw, rows):
-    """Fill the 13 rows of a contact: force bound, 4 of the CoP, 8 of the yaw moment."""
+def contact_rows(turning, x, y, bound, rows):
+    """Fill the 13 rows of a contact: force bound, 4 of the CoP, 8 of the yaw moment, of friction `turning`."""
     rows[0] = 0.0
     rows[0, 2] = -1.0 / bound
     pressing = pressure_rows(x, y)
@@ -91,9 +91,8 @@ def contact_rows(mu, x, y, bound, yaw, rows):
     fill_row(pressing[2], rows[3])
     fill_row(pressing[3], rows[4])
     for i in range(8):
-        row = yaw_row(mu, x, y, 1.0 if i & 1 else -1.0, 1.0 if i & 2 else -1.0, 1.0 if i & 4 else -1.0)
+        row = yaw_row(turning, x, y, 1.0 if i & 1 else -1.0, 1.0 if i & 2 else -1.0, 1.0 if i & 4 else -1.0)
         fill_row(row, rows[5 + i])
-        rows[5 + i, 5] /= yaw
 
 
 @compiled(reordered=True)
@@ -129,7 +128,7 @@ def pack(p):
             mu[j] = max(p.friction[t, i] * p.friction_margin, SMALLEST)
             bound[j] = min(p.max_normal_force[i] / weight, UNBOUNDED_FORCE)
             x, y = max(p.reduced_half_size[i, 0], SMALLEST), max(p.reduced_half_size[i, 1], SMALLEST)
-            contact_rows(mu[j], x, y, bound[j], max(p.yaw_margin, SMALLEST), rows[j])
+            contact_rows(max(p.yaw_margin * mu[j], SMALLEST), x, y, bound[j], rows[j])
             offset[j, 0] = 1.0
             for a in range(2):
                 if p.half_size[i, a] > 0.0:
