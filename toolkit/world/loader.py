@@ -52,7 +52,7 @@ def load_world(path: Path | str, *, mjcf: str | None = None, config: SurfaceConf
         )
     _check_ground(path, start, surfaces, palms)
     _check_walls(path, palms, surfaces, config)
-    return World(path.stem, path, model, surfaces, start, goal, timing, square=square, mjcf=mjcf, start_palms=palms)
+    return World(path.stem, path, model, surfaces, start, goal, timing, square, source.spec, palms)
 
 
 def _site(path: Path, model: mujoco.MjModel, name: str, example: str) -> int:
