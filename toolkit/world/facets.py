@@ -62,7 +62,7 @@ def find_facets(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_a
     Returns:
         Facets, ordered by their first triangle's area, largest first.
     """
-    return [_facet(mesh, group) for group in flat_groups(mesh, angle=angle, distance=distance, least_area=least_area)]
+    return [facet_of(mesh, group) for group in flat_groups(mesh, angle=angle, distance=distance, least_area=least_area)]
 
 
 def flat_groups(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_area: float = 0.0) -> list[np.ndarray]:
@@ -125,8 +125,8 @@ def _grow(seeds, free, first, neighbours, normals, corners, cosine, distance, me
     return count
 
 
-def _facet(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
-    """Facet of grouped triangles (k,)."""
+def facet_of(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
+    """The facet that a group of triangles (k,) of a mesh makes."""
     corners, area = mesh.triangles[group], mesh.area_faces[group]
     weight = area / area.sum()
     normal = weight @ mesh.face_normals[group]

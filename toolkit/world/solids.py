@@ -53,7 +53,9 @@ class Solids:
             (k,) int, ascending, which plane; (k,) shapely polygons in that plane's xy, one per solid that fills an area.
         """
         turn, origin = np.array([frame.rotation for frame in frames]), np.array([frame.position for frame in frames])
-        corners = [[bounds[:, x], bounds[:, y], np.full(len(bounds), z)] for x in (0, 2) for y in (1, 3) for z in (low, high)]
+        corners = [
+            [bounds[:, x], bounds[:, y], np.full(len(bounds), z)] for x in (0, 2) for y in (1, 3) for z in (low, high)
+        ]
         room = np.einsum("nij,cjn->nci", turn, np.array(corners)) + origin[:, None]
         least, most = room.min(axis=1), room.max(axis=1)
         pairs = self._boxes.query(shapely.box(least[:, 0], least[:, 1], most[:, 0], most[:, 1]))
@@ -108,7 +110,13 @@ def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    points, edges, triangles, counts, total = [np.zeros((0, 3))], [np.zeros((0, 2), int)], [np.zeros((0, 3), int)], [], 0
+    points, edges, triangles, counts, total = (
+        [np.zeros((0, 3))],
+        [np.zeros((0, 2), int)],
+        [np.zeros((0, 3), int)],
+        [],
+        0,
+    )
     for index in np.flatnonzero((model.geom_contype | model.geom_conaffinity) != 0).tolist():
         pose = Pose(data.geom_xmat[index].reshape(3, 3), data.geom_xpos[index])
         for corners, faces, sides in _local_solids(model, index, pose, square):
