@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -49,8 +50,8 @@ def read_spec(path: Path, text: str | None = None) -> mujoco.MjSpec:
         spec = mujoco.MjSpec.from_file(str(path)) if text is None else mujoco.MjSpec.from_string(text)
     if any("NaN" in warning for warning in warnings):
         text = path.read_text(encoding="utf-8") if text is None else text
-        lines = [f"line {n} has a NaN: {line.strip()[:80]}" for n, line in enumerate(text.splitlines(), 1)]
-        found = [line for line in lines if _NAN.search(line)] or ["a number is NaN"]
+        lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), 1) if _NAN.search(line)]
+        found = [f"line {n} has a NaN: {line[:80]}" for n, line in lines] or ["a number is NaN"]
         raise InputError(f"{found[0]}; give plain numbers")
     for kind, items, sides in (
         ("height field", spec.hfields, ("nrow", "ncol")),
@@ -100,6 +101,23 @@ def _check(model: mujoco.MjModel, name: str, good: np.ndarray, what: str) -> Non
     named = getattr(model, f"n{kind}", None) == len(good)
     label = f"{kind} '{getattr(model, kind)(row).name or f'{kind}#{row}'}'" if named else f"a {kind}"
     raise InputError(f"{field} of {label} {what if np.isfinite(values).all() else 'is not finite'}; give plain numbers")
+
+
+def fields_of(struct: Any) -> Iterator[tuple[str, Any]]:
+    """Names and values of the public fields of one of MuJoCo's structs."""
+    for name in dir(struct):
+        value = getattr(struct, name)
+        if not name.startswith("_") and not callable(value):
+            yield name, value
+
+
+def copy_fields(source: Any, target: Any) -> None:
+    """Copy the public fields of one of MuJoCo's structs to another, nested structs included."""
+    for name, value in fields_of(source):
+        if isinstance(value, int | float | np.ndarray):
+            setattr(target, name, value)
+        else:
+            copy_fields(value, getattr(target, name))
 
 
 @contextmanager

@@ -9,8 +9,9 @@ import pytest
 
 from tests.world.conftest import mjcf_of
 from toolkit.errors import WorldError
+from toolkit.mjcf import fields_of
 from toolkit.world.loader import load_world
-from toolkit.world.options import REPLACED, REPLACED_FLAGS, check_options, fields_of, flag_name, flags_of
+from toolkit.world.options import REPLACED, REPLACED_FLAGS, check_options, flag_name, flags_of
 
 README = (Path(__file__).resolve().parents[2] / "worlds" / "README.md").read_text()
 FLOOR = '<geom name="floor" type="plane" size="0 0 1"/>'

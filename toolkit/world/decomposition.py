@@ -144,7 +144,7 @@ def _frusta(mesh: trimesh.Trimesh, fronts: list[tuple[np.ndarray, np.ndarray]]) 
 
 
 def _thickness(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Distance (n,) from points on a mesh to the next triangle behind them; inf where there is none near enough to tell.
+    """Distance (n,) from points on a mesh to the next triangle behind them; inf where none is near.
 
     Rays against triangles (Moeller and Trumbore 1997), those whose boxes meet.
     """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import mujoco
 import numpy as np
 
 from toolkit.errors import WorldError
+from toolkit.mjcf import copy_fields, fields_of
 
 REPLACED = frozenset(
     """
@@ -64,14 +64,6 @@ def check_options(path: Path, option: mujoco.MjOption) -> None:
             )
 
 
-def fields_of(struct: Any) -> Iterator[tuple[str, Any]]:
-    """Names and values of the public fields of one of MuJoCo's structs."""
-    for name in dir(struct):
-        value = getattr(struct, name)
-        if not name.startswith("_") and not callable(value):
-            yield name, value
-
-
 def flags_of(name: str) -> list[Any]:
     """Members of the bits of `disableflags` or `enableflags`."""
     kind = mujoco.mjtDisableBit if name == "disableflags" else mujoco.mjtEnableBit
@@ -81,12 +73,3 @@ def flags_of(name: str) -> list[Any]:
 def flag_name(flag: Any) -> str:
     """A flag as the MJCF has it."""
     return flag.name.partition("_")[2].lower()
-
-
-def copy_fields(source: Any, target: Any) -> None:
-    """Copy the public fields of one of MuJoCo's structs to another, nested structs included."""
-    for name, value in fields_of(source):
-        if isinstance(value, int | float | np.ndarray):
-            setattr(target, name, value)
-        else:
-            copy_fields(value, getattr(target, name))

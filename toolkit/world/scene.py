@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from toolkit.errors import InputError, RobotError
-from toolkit.mjcf import SIZES, compile_spec, one_line
+from toolkit.mjcf import SIZES, compile_spec, copy_fields, one_line
 from toolkit.robot.model import RobotModel
-from toolkit.world.options import copy_fields, set_options
+from toolkit.world.options import set_options
 from toolkit.world.world import PALM_SITES, World
 
 WORLD_PREFIX = "world/"  # of everything in the scene that comes from the world

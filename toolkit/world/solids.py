@@ -50,7 +50,7 @@ class Solids:
             high: m; upper height.
 
         Returns:
-            (k,) int, ascending, which plane; (k,) shapely polygons in that plane's xy, one per solid that fills an area.
+            (k,) int, ascending, planes; (k,) shapely polygons in their xy, one per solid that fills an area.
         """
         turn, origin = np.array([frame.rotation for frame in frames]), np.array([frame.position for frame in frames])
         corners = [
