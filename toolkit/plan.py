@@ -52,7 +52,8 @@ def main(argv: list[str] | None = None) -> int:
 
     began = time.perf_counter()
     display = StageConsole()
-    world = load_world(args.world)
+    display.started("surfaces")
+    world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
     folder = RunFolder(args.out, world.name, robot.name)

@@ -13,6 +13,7 @@ from tests.robot.samples import LEG, TOML, URDF_TOML, biped_mjcf, biped_urdf, wr
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.loader import default_robot, find_robots, load_robot, robots_folder
+from toolkit.search.moves.occupancy import BodyBox
 
 KNEE = '<joint name="left_knee" axis="0 1 0" range="0.0 2.4" actuatorfrcrange="-250 250" armature="0.01"/>'
 
@@ -365,6 +366,15 @@ def test_soles_below_any_shape_of_the_foot(tmp_path: Path) -> None:
         load_robot(str(folder))
     padded = TOML.replace("-0.08]", "-0.1]\npad = 0.02")
     assert load_robot(str(write_robot(folder, toml=padded))).legs
+
+
+def test_robot_without_shapes_above_its_knees(tmp_path: Path) -> None:
+    inertial = '<inertial pos="0 0 0" mass="5" diaginertia="0.1 0.1 0.1"/>'
+    model = re.sub(r'<geom [^>]*mass="20"/>', "", biped_mjcf())
+    model = re.sub(r'<geom [^>]*mass="(8|3|2|0.2)"[^>]*/>', inertial, model)
+    robot = load_robot(str(write_robot(tmp_path / "biped", model)))
+    with pytest.raises(RobotError, match="no shape above the knees; add geoms to the torso"):
+        BodyBox.of(robot)
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
