@@ -80,11 +80,15 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """
     with _caught():
         model = spec.compile()
-    arrays = {name: getattr(model, name) for name in dir(model) if "_" in name.strip("_")}
+    names = sorted((name for name in dir(model) if "_" in name.strip("_")), key=lambda name: not _named(model, name))
+    arrays = {name: getattr(model, name) for name in names}
     arrays = {name: a for name, a in arrays.items() if isinstance(a, np.ndarray) and a.dtype.kind == "f" and a.size}
     for name, values in arrays.items():
         if name.endswith(("_pos", "_size", "mesh_vert")):
             _check(model, name, np.abs(values) <= LARGEST, f"is more than {LARGEST:g} m")
+        if name.endswith("quat") and not name.startswith("key_"):
+            good = np.abs(np.linalg.norm(values, axis=-1) - 1.0) < 1e-6
+            _check(model, name, good, "is no rotation")
     for name, values in arrays.items():
         if not name.startswith("numeric_"):
             _check(model, name, np.isfinite(values), "is not finite")
@@ -98,9 +102,14 @@ def _check(model: mujoco.MjModel, name: str, good: np.ndarray, what: str) -> Non
     row = int(np.argmin(good.reshape(len(good), -1).all(axis=1)))
     values = getattr(model, name)[row]
     kind, _, field = name.partition("_")
-    named = getattr(model, f"n{kind}", None) == len(good)
-    label = f"{kind} '{getattr(model, kind)(row).name or f'{kind}#{row}'}'" if named else f"a {kind}"
+    label = f"{kind} '{getattr(model, kind)(row).name or f'{kind}#{row}'}'" if _named(model, name) else f"a {kind}"
     raise InputError(f"{field} of {label} {what if np.isfinite(values).all() else 'is not finite'}; give plain numbers")
+
+
+def _named(model: mujoco.MjModel, name: str) -> bool:
+    """Whether an array of the model has a row for each thing of a kind that has names."""
+    kind, values = name.partition("_")[0], getattr(model, name)
+    return hasattr(model, kind) and isinstance(values, np.ndarray) and getattr(model, f"n{kind}", -1) == len(values)
 
 
 def fields_of(struct: Any) -> Iterator[tuple[str, Any]]:

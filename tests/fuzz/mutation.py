@@ -84,6 +84,9 @@ def damaged_number(text: str, rng: np.random.Generator) -> str:
 def damaged_xml(text: str, rng: np.random.Generator) -> bytes:
     """A model file with one to four kinds of damage."""
     root = ElementTree.fromstring(text)
+    damages = ["number"] * 6 + ["drop", "twice", "nest", "tag", "key", "name", "lose", "swap"] + ["add"] * 5
+    if rng.random() < 0.5:
+        damages = ["add"]  # worlds that are odd rather than broken
     for _ in range(rng.integers(1, 5)):
         parents = {child: parent for parent in root.iter() for child in parent}
         every = list(parents)
@@ -93,9 +96,7 @@ def damaged_xml(text: str, rng: np.random.Generator) -> bytes:
         parent, other = parents[item], every[int(rng.integers(len(every)))]
         keys = sorted(item.attrib)
         key = keys[int(rng.integers(len(keys)))] if keys else "pos"
-        match rng.choice(
-            ["number"] * 6 + ["drop", "twice", "nest", "tag", "key", "name", "lose", "swap"] + ["add"] * 5
-        ):
+        match rng.choice(damages):
             case "number":
                 item.set(key, damaged_number(item.get(key, "0 0 0"), rng))
             case "drop":

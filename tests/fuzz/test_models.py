@@ -73,7 +73,7 @@ def check_robot(seed: int, folder: Path) -> bool:
 def check_line(error: Exception, path: Path) -> None:
     """One printable line that names the file, for exit code 2."""
     text = str(error)
-    assert error.exit_code == 2 and "\n" not in text and str(path) in text and len(text) < 2000, repr(text)
+    assert error.exit_code == 2 and "\n" not in text and path.name in text and len(text) < 2000, repr(text)
 
 
 def run_case(check, seed: int, folder: Path, capfd) -> bool:

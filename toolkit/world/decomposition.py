@@ -60,9 +60,8 @@ def decompose_mesh(vertices: np.ndarray, triangles: np.ndarray) -> Decomposition
     if len(components) == 1 and convex[0]:
         return None
     groups = [flat_groups(component, angle=FACET_ANGLE, distance=FACET_DISTANCE) for component in components]
-    _check_count(
-        sum(1 if whole else _least_parts(*item) for *item, whole in zip(components, groups, convex, strict=True))
-    )
+    least = [_least_parts(component, flat) for component, flat in zip(components, groups, strict=True)]
+    _check_count(int(np.where(convex, 1, least).sum()))
     facets, parts = [], []
     for component, flat, whole in zip(components, groups, convex, strict=True):
         found = [facet_of(component, group) for group in flat]

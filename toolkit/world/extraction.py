@@ -260,7 +260,7 @@ def _hold_contacts(faces: list[Face], config: SurfaceConfig) -> np.ndarray:
     area = np.where(serves, [config.foot_area, config.palm_area], np.inf).min(axis=1)
     width = np.where(serves, [config.foot_width, config.palm_width], np.inf).min(axis=1)
     regions = np.array([face.polygon for face in faces], object)
-    result = shapely.area(regions) >= area
+    result: np.ndarray = np.greater_equal(shapely.area(regions), area)
     # A little less than the width, and mitred: a rectangle of exactly that width must not be lost to rounding.
     inner = shapely.buffer(regions[result], 1e-6 - width[result] / 2, join_style="mitre")
     result[result] = ~shapely.is_empty(inner)

@@ -142,7 +142,7 @@ def facet_of(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
 def _union(triangles: np.ndarray) -> shapely.Geometry:
     """Union of triangles (k, 3, 2) that share edges and do not overlap; many are merged along their edges."""
     shapes = shapely.polygons(triangles)
-    if len(shapes) > _MANY:
+    if len(triangles) > _MANY:
         merged = shapely.coverage_union_all(shapes)
         if abs(merged.area - shapely.area(shapes).sum()) < 1e-9 * merged.area:
             return merged

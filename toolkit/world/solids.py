@@ -79,7 +79,7 @@ class Solids:
         along = ends[:, 1, :2] - ends[:, 0, :2]
         cut = ends[:, :1, :2] + np.stack([enter, leave], axis=1)[:, :, None] * along[:, None]
         kept, rank = np.unique(pair, return_inverse=True)
-        hulls = shapely.convex_hull(shapely.linestrings(cut.reshape(-1, 2), indices=np.repeat(rank, 2)))
+        hulls = np.asarray(shapely.convex_hull(shapely.linestrings(cut.reshape(-1, 2), indices=np.repeat(rank, 2))))
         filled = (shapely.get_type_id(hulls) == 3) & (shapely.area(hulls) > 1e-10)
         return plane[kept[filled]], hulls[filled]
 

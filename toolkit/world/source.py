@@ -20,6 +20,7 @@ PART_GROUP = 3  # convex parts of a mesh that is drawn as a whole; hidden by def
 RAY_GROUPS = np.array([1, 1, 0, 1, 1, 1], np.uint8)  # `geomgroup` of mj_ray that sees exactly what collides
 
 _ALL_BITS = 0x7FFFFFFF
+_LEAST = 1e-5  # m; of half a geom: what is thinner has no sides to compute with
 
 
 @dataclass(frozen=True)
@@ -146,6 +147,9 @@ def _check_geoms(path: Path, model: mujoco.MjModel, colliding: np.ndarray, label
                 f"{path}: geom '{label}' has friction {friction:g}; give a sliding friction above zero "
                 "(the first number of `friction`)"
             )
+        size = model.geom_size[index]
+        if 0.0 < size[size > 0.0].min(initial=np.inf) < _LEAST:
+            raise WorldError(f"{path}: geom '{label}' is thinner than {_LEAST:g} m; give it a size, or remove it")
         if model.geom_type[index] == mujoco.mjtGeom.mjGEOM_SDF:
             raise WorldError(f"{path}: geom '{label}' is an SDF, which is not supported; use a mesh")
 

@@ -56,7 +56,9 @@ class BodyBox:
                 continue
             low, high = np.minimum(low, middle - extent), np.maximum(high, middle + extent)
         if not np.isfinite(high).all():
-            raise RobotError(f"{robot.folder}: no shape above the knees; add geoms to the torso, the head or the thighs")
+            raise RobotError(
+                f"{robot.folder}: no shape above the knees; add geoms to the torso, the head or the thighs"
+            )
         width = max(-low[1], high[1])
         for limb, arm in robot.arms.items():
             width = max(width, abs(arm.shoulder_in_com[1]) + 1.5 * float(robot.half_sizes[limb].min()))
