@@ -75,7 +75,7 @@ def extract_surfaces(
     """
     least = min(config.foot_area, config.palm_area) / 3  # flush faces of several geoms may be large enough together
     faces = faces_of(source, square=square, least_area=least)
-    faces = [face for face, served in zip(faces, _serves(faces, config).any(axis=1), strict=True) if served]
+    faces = [face for face, served in zip(faces, _serves(faces, config).tolist(), strict=True) if any(served)]
     faces = _merged(faces, config)
     faces = [face for face, holds in zip(faces, _hold_contacts(faces, config), strict=True) if holds]
     regions: list[Face] = []
