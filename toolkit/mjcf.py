@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -46,13 +47,13 @@ def read_spec(path: Path, text: str | None = None) -> mujoco.MjSpec:
         str(path).encode()
     except UnicodeEncodeError:
         raise InputError("the name of the file or of its folder is not UTF-8; rename it") from None
-    with _caught() as warnings:
+    with _caught() as found:
         spec = mujoco.MjSpec.from_file(str(path)) if text is None else mujoco.MjSpec.from_string(text)
-    if any("NaN" in warning for warning in warnings):
+    if any("NaN" in warning for warning in found):
         text = path.read_text(encoding="utf-8") if text is None else text
         lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), 1) if _NAN.search(line)]
-        found = [f"line {n} has a NaN: {line[:80]}" for n, line in lines] or ["a number is NaN"]
-        raise InputError(f"{found[0]}; give plain numbers")
+        where = [f"line {n} has a NaN: {line[:80]}" for n, line in lines] or ["a number is NaN"]
+        raise InputError(f"{where[0]}; give plain numbers")
     for kind, items, sides in (
         ("height field", spec.hfields, ("nrow", "ncol")),
         ("texture", spec.textures, ("width", "height")),
@@ -78,8 +79,10 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         ValueError: MuJoCo cannot compile it.
         InputError: in one line without the path, a number cannot be used.
     """
-    with _caught():
+    with _caught() as found:
         model = spec.compile()
+    if found:
+        raise InputError(f"MuJoCo warns: {one_line(found[0])}")
     names = sorted((name for name in dir(model) if "_" in name.strip("_")), key=lambda name: not _named(model, name))
     arrays = {name: getattr(model, name) for name in names}
     arrays = {name: a for name, a in arrays.items() if isinstance(a, np.ndarray) and a.dtype.kind == "f" and a.size}
@@ -136,7 +139,10 @@ def _caught() -> Iterator[list[str]]:
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(found.append)
     try:
-        yield found
+        with warnings.catch_warnings(record=True) as others:
+            warnings.simplefilter("always")
+            yield found
+            found += [str(other.message) for other in others]
     except (mujoco.FatalError, MemoryError) as error:
         raise ValueError(one_line(error)) from error
     finally:

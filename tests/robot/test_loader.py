@@ -276,6 +276,8 @@ BAD_TOML = {
 }  # fmt: skip
 
 BAD_MODEL = {
+    "negative armature": ('armature="0.01"', 'armature="-5"', "MuJoCo warns: Inertia matrix is too close to singular"),
+    "hardly any torque": ('"-250 250"', '"-250 1e-300"', "MuJoCo cannot compile it: invalid force range"),
     "NaN in a mass": ('mass="8"', 'mass="nan"', "has a NaN: "),
     "NaN in a joint": ('axis="0 1 0"', 'axis="0 nan 0"', "has a NaN: "),
     "huge": ('pos="0 0 0.8"', 'pos="0 0 1e300"', "is more than 10000 m; give plain numbers"),

@@ -63,18 +63,20 @@ def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
         raise RobotError(f"{source.path}: {error}") from None
     _strip(source)
     _check_names(source)
-    bare = _compiled(source)
+    bare = _compiled(source, spec)
     velocity = _set_joints(description, source, bare)
     bodies = {limb: _add_site(description, item, spec, bare) for limb, item in description.limbs.items()}
-    _compiled(source)
-    mjcf = spec.to_xml()
-    assets = dict(spec.assets)
-    return Assembly(mjcf, assets, mujoco.MjModel.from_xml_string(mjcf, assets), velocity, bodies)
+    _compiled(source, spec)
+    mjcf, assets = spec.to_xml(), dict(spec.assets)
+    return Assembly(mjcf, assets, _compiled(source, mjcf), velocity, bodies)
 
 
-def _compiled(source: ModelSource) -> mujoco.MjModel:
+def _compiled(source: ModelSource, what: mujoco.MjSpec | str) -> mujoco.MjModel:
+    """A spec, or MJCF text with the files of the source, compiled."""
     try:
-        return compile_spec(source.spec)
+        if isinstance(what, str):
+            what = mujoco.MjSpec.from_string(what, assets=dict(source.spec.assets))
+        return compile_spec(what)
     except InputError as error:
         raise RobotError(f"{source.path}: {error}") from None
     except ValueError as error:
