@@ -9,6 +9,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS = [
     "errors",
     "compiled",
+    "mjcf",
     "geometry",
     "robot",
     "world",

@@ -51,7 +51,8 @@ def main(argv: list[str] | None = None) -> int:
 
     began, options = time.perf_counter(), cli.PlanningOptions.of(args)
     display = StageConsole()
-    world = load_world(args.world)
+    display.started("surfaces")
+    world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
     folder = RunFolder(args.out, world.name, robot.name)

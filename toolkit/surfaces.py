@@ -37,13 +37,17 @@ def main(argv: list[str] | None = None) -> int:
     """
     args = arguments().parse_args(argv)
     # The viewer's library takes a second to import: mistakes in the world are reported before.
+    from rich.progress import Progress
+
+    from toolkit.report.console import make_console
     from toolkit.world.loader import load_world
 
-    world = load_world(args.world)
-    from toolkit.report.console import make_console
+    console = make_console()
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("surfaces", total=1.0)
+        world = load_world(args.world, progress=lambda share: bar.update(task, completed=share))
     from toolkit.report.surfaces import surface_table, write_surface_recording
 
-    console = make_console()
     console.print(surface_table(world))
     if args.out is None:
         return 0

@@ -58,7 +58,8 @@ def main(argv: list[str] | None = None) -> int:
     began = time.perf_counter()
     display = StageConsole()
     options, execution = cli.PlanningOptions.of(args), cli.execution_config(args)
-    world = load_world(args.world)
+    display.started("surfaces")
+    world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
     folder = RunFolder(args.out, world.name, robot.name)

@@ -13,6 +13,7 @@ from tests.robot.samples import LEG, TOML, URDF_TOML, biped_mjcf, biped_urdf, wr
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.loader import default_robot, find_robots, load_robot, robots_folder
+from toolkit.search.moves.occupancy import BodyBox
 
 KNEE = '<joint name="left_knee" axis="0 1 0" range="0.0 2.4" actuatorfrcrange="-250 250" armature="0.01"/>'
 
@@ -260,6 +261,14 @@ BAD_TOML = {
         "[limbs.left_foot]", '[model.locked_joints]\n"*_ankle_roll" = 0.0\n[limbs.left_foot]',
         "left_foot: the leg must be hip yaw, roll and pitch in any order",
     ),
+    "NaN in a table": ("[limits.velocity]", "[declared]\nmass = [1.0, nan]\n[limits.velocity]",
+        "'declared.mass.1' = nan must be a finite number up to 1e+09",
+    ),
+    "infinite home": ('"*_knee" = 0.7', '"*_knee" = inf', "'home.*_knee' = inf must be a finite number"),
+    "400 digits": ('"*_knee" = 0.7', f'"*_knee" = {"9" * 400}', "must be a finite number up to 1e+09"),
+    "5000 digits": ('"*_knee" = 0.7', f'"*_knee" = {"9" * 5000}', "not valid TOML"),
+    "deep nesting": ("[model]", f"[declared]\na = {'[' * 20000}{']' * 20000}\n[model]", "not valid TOML"),
+    "NUL in a file name": ('file = "{file}"', 'file = "a\\u0000b"', "does not exist in"),
     "locked pattern": (
         "[limbs.left_foot]", '[model.locked_joints]\n"gripper" = 0.0\n[limbs.left_foot]',
         "[model.locked_joints] 'gripper' matches no joint",
@@ -267,6 +276,15 @@ BAD_TOML = {
 }  # fmt: skip
 
 BAD_MODEL = {
+    "negative armature": ('armature="0.01"', 'armature="-5"', "MuJoCo warns: Inertia matrix is too close to singular"),
+    "hardly any torque": ('"-250 250"', '"-250 1e-300"', "MuJoCo cannot compile it: invalid force range"),
+    "NaN in a mass": ('mass="8"', 'mass="nan"', "has a NaN: "),
+    "NaN in a joint": ('axis="0 1 0"', 'axis="0 nan 0"', "has a NaN: "),
+    "huge": ('pos="0 0 0.8"', 'pos="0 0 1e300"', "is more than 10000 m; give plain numbers"),
+    "no shapes that collide": (
+        "<worldbody>", '<default><geom contype="0" conaffinity="0"/></default><worldbody>',
+        "the patch of [limbs.left_foot] is on a body without any collision shape",
+    ),
     "no XML": ("<mujoco", "mujoco", "not valid XML"),
     "not a model": (biped_mjcf(), "<sdf/>", "root element <sdf>; expected <mujoco> (MJCF) or <robot> (URDF)"),
     "unknown element": ("<worldbody>", "<worldbody><wheel/>", "MuJoCo cannot load it"),
@@ -323,6 +341,57 @@ def test_bad_model_file(tmp_path: Path, case: str) -> None:
         load_robot(str(folder))
     text = str(caught.value)
     assert "\n" not in text and text.startswith(str(folder.resolve()))
+
+
+PALM = """
+[limbs.left_palm]
+body = "pelvis"
+position = [{}, 0.0, 0.25]
+patch = [0.05, 0.05]
+[home]"""
+
+
+@pytest.mark.parametrize(("x", "gap"), [(5.0, "4875"), (0.14, "15")])
+def test_limb_away_from_the_shapes_of_its_body(tmp_path: Path, x: float, gap: str) -> None:
+    folder = write_robot(tmp_path / "biped", toml=TOML.replace("[home]", PALM.format(x)))
+    with pytest.raises(
+        RobotError, match=rf"\[limbs.left_palm\] is {gap} mm from the nearest collision shape of 'pelvis'"
+    ):
+        load_robot(str(folder))
+
+
+def test_soles_below_any_shape_of_the_foot(tmp_path: Path) -> None:
+    folder = write_robot(tmp_path / "biped", toml=TOML.replace("-0.08]", "-0.1]"))
+    with pytest.raises(
+        RobotError, match=r"\[limbs.left_foot\] is 20 mm from the nearest collision shape of 'left_foot_l"
+    ):
+        load_robot(str(folder))
+    padded = TOML.replace("-0.08]", "-0.1]\npad = 0.02")
+    assert load_robot(str(write_robot(folder, toml=padded))).legs
+
+
+def test_robot_without_shapes_above_its_knees(tmp_path: Path) -> None:
+    inertial = '<inertial pos="0 0 0" mass="5" diaginertia="0.1 0.1 0.1"/>'
+    model = re.sub(r'<geom [^>]*mass="20"/>', "", biped_mjcf())
+    model = re.sub(r'<geom [^>]*mass="(8|3|2|0.2)"[^>]*/>', inertial, model)
+    robot = load_robot(str(write_robot(tmp_path / "biped", model)))
+    with pytest.raises(RobotError, match="no shape above the knees; add geoms to the torso"):
+        BodyBox.of(robot)
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    folder = write_robot(tmp_path / "biped")
+    (tmp_path / "default").write_bytes(b"\xff")
+    with pytest.raises(RobotError, match="default: cannot be read .*; name a robot with --robot"):
+        load_robot(None, tmp_path)
+    with pytest.raises(RobotError, match="is not in"):
+        load_robot("a" * 300, tmp_path)
+    (folder / "robot.xml").write_bytes(b'<mujoco model="\xff"/>')
+    with pytest.raises(RobotError, match="robot.xml: not valid XML"):
+        load_robot("biped", tmp_path)
+    (folder / "robot.toml").write_bytes(b"\xff")
+    with pytest.raises(RobotError, match="robot.toml: not valid TOML: 'utf-8' codec can't decode"):
+        load_robot("biped", tmp_path)
 
 
 def test_mimic_joints_must_be_locked(tmp_path: Path) -> None:

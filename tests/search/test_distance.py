@@ -98,7 +98,7 @@ def test_occupancy_agrees_with_collision(robot):
     world = make_world(FLOOR, *geoms)
     body = BodyBox(0.15, 0.25, 0.5, 1.5)
     grid = Occupancy.of(world.mujoco_model, np.array([-2, -2, 0.3]), np.array([2, 2, 2.2]), cell=0.04)
-    spec = mujoco.MjSpec.from_string(world.mjcf)
+    spec = world.scenery.copy()
     sizes = {}
     for name, grow in (("large", 0.09), ("small", -0.06)):
         holder = spec.worldbody.add_body(name=name, mocap=True)

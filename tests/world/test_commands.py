@@ -95,3 +95,10 @@ def test_surfaces_into_a_place_that_cannot_be_written(tmp_path):
     with pytest.raises(InputError, match="taken.*cannot be written"):
         surfaces.main([str(world), "--out", str(tmp_path / "taken" / "deeper")])
     assert sorted(os.listdir(tmp_path)) == ["gap.xml", "taken"]
+
+
+def test_a_name_with_brackets_is_shown_as_it_is(tmp_path, capsys):
+    path = tmp_path / "[red]x.xml"
+    path.write_text(KINDS["stairs"](None))
+    assert surfaces.main([str(path)]) == 0
+    assert "[red]x: 13 surfaces" in capsys.readouterr().out

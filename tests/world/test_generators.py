@@ -29,7 +29,7 @@ def test_same_seed_same_text(kind):
 def test_loads_without_a_robot(kind, seed, tmp_path):
     world = made(kind, seed, tmp_path)
     assert world.surfaces
-    mujoco.MjModel.from_xml_string(world.mjcf)
+    mujoco.MjModel.from_xml_string(world.scenery.to_xml())
 
 
 def tilts(world, prefix):

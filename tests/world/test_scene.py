@@ -6,10 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from toolkit.errors import RobotError, WorldError
+from tests.world.conftest import mjcf_of
+from toolkit.errors import RobotError
 from toolkit.world.loader import load_world
 from toolkit.world.scene import compose_scene
 
+OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 FLOORS = """
 <geom name="floor" type="plane" size="0 0 1" friction="0.45" material="checker"/>
 <geom name="left_sole" type="box" size="0.2 0.2 0.05" pos="3 0 0.05" friction="0.8" solref="0.1 1" margin="0.01"/>
@@ -18,7 +20,10 @@ ASSETS = """
 <texture name="sky" type="skybox" builtin="gradient" width="8" height="8"/>
 <texture name="checker" type="2d" builtin="checker" width="8" height="8"/><material name="checker" texture="checker"/>
 """
-MORE = '<option timestep="0.01" gravity="0 0 -1"><flag contact="disable"/></option><size memory="1M"/>'
+MORE = (
+    '<option timestep="0.01" integrator="RK4" cone="pyramidal" iterations="1"><flag warmstart="disable"/></option>'
+    '<size memory="1M"/>'
+)
 
 
 @pytest.fixture
@@ -80,15 +85,45 @@ def test_robot_does_not_collide_with_itself_differently(scene, stool):
     assert together.ncon == alone.ncon
 
 
-def test_world_changed_since_it_was_loaded(stool, tmp_path):
-    from tests.world.conftest import mjcf_of
+def test_a_world_is_read_once(stool, tmp_path):
+    """What happens to its files after it was loaded does not matter, whatever it is."""
+    files = {
+        "more.xml": '<mujoco><worldbody><geom name="more" size="0.3" pos="0 3 0"/></worldbody></mujoco>',
+        "block.obj": OBJ,
+        "heights.bin": np.array([2, 2], np.int32).tobytes() + np.array([0, 1, 1, 0.5], np.float32).tobytes(),
+        "world.xml": mjcf_of(
+            '<geom type="plane" size="0 0 1"/><body pos="2 0 0"><geom type="mesh" mesh="m" euler="0 0 30"/></body>'
+            '<geom type="hfield" hfield="h" pos="0 -3 0"/>',
+            '<mesh name="m" file="block.obj"/><hfield name="h" file="heights.bin" size="1 1 0.2 0.1"/>',
+            more='<include file="more.xml"/>',
+        ),
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    world = load_world(tmp_path / "world.xml")
+    before = compose_scene(stool, world)
+    for name in files:
+        (tmp_path / name).unlink()
+    after = compose_scene(stool, world)
+    for name in ("geom_size", "geom_pos", "geom_quat", "body_pos", "body_quat", "mesh_vert", "hfield_data"):
+        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
 
-    path = tmp_path / "world.xml"
-    path.write_text(mjcf_of('<geom type="plane" size="0 0 1"/>'))
-    world = load_world(path)
-    path.write_text(mjcf_of('<geom type="box" size="1 1 1" pos="0 0 -1"/>'))
-    with pytest.raises(WorldError, match="world.xml: the file changed since it was loaded"):
-        compose_scene(stool, world)
+
+def test_files_of_one_name(stool, tmp_path):
+    """A robot's mesh and a world's may have the same file name."""
+    own = stool.mjcf.replace("<worldbody>", '<asset><mesh name="shell" file="a.obj"/></asset><worldbody>')
+    own = own.replace('type="sphere" size="0.3"', 'type="mesh" mesh="shell"')
+    robot = replace(stool, mjcf=own, assets={"a.obj": OBJ.encode()})
+    (tmp_path / "a.obj").write_text(OBJ.replace("v 1", "v 2").replace("v 0 1", "v 0 2").replace("v 0 0 1", "v 0 0 2"))
+    (tmp_path / "world.xml").write_text(
+        mjcf_of(
+            '<geom type="plane" size="0 0 1"/><geom name="big" type="mesh" mesh="a" pos="4 0 0"/>',
+            '<mesh name="a" file="a.obj"/>',
+        )
+    )
+    scene = compose_scene(robot, load_world(tmp_path / "world.xml"))
+    sizes = [np.ptp(scene.mesh_vert[scene.mesh(name).vertadr[0] :][:4], axis=0).max() for name in ("shell", "world/a")]
+    assert sizes[1] == pytest.approx(2 * sizes[0], rel=0.1)
 
 
 def test_robot_that_brings_its_own_floor_is_refused(stool, make_world):
@@ -98,8 +133,7 @@ def test_robot_that_brings_its_own_floor_is_refused(stool, make_world):
 
 
 def test_robot_with_meshes_in_a_world_without(stool, make_world):
-    obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
     own = stool.mjcf.replace("<worldbody>", '<asset><mesh file="shell.obj"/></asset><worldbody>')
-    robot = replace(stool, mjcf=own, assets={"shell.obj": obj.encode()})
+    robot = replace(stool, mjcf=own, assets={"shell.obj": OBJ.encode()})
     # Warnings are errors here: MuJoCo warns where only one side of an attachment has files.
     assert compose_scene(robot, make_world(FLOORS, assets=ASSETS, more=MORE)).nmesh == 1

@@ -8,6 +8,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from rich import box
+from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
@@ -20,7 +21,7 @@ def surface_table(world: World) -> Table:
     """A row per surface: index, geom, position, area, angle from up, friction, convex pieces, what it serves."""
     feet = sum(surface.serves_foot for surface in world.surfaces)
     palms = sum(surface.serves_palm for surface in world.surfaces)
-    title = f"{world.name}: {len(world.surfaces)} surfaces, {feet} for feet, {palms} for palms"
+    title = f"{escape(world.name)}: {len(world.surfaces)} surfaces, {feet} for feet, {palms} for palms"
     table = Table(box=box.SIMPLE, pad_edge=False, title=title, title_justify="left")
     for name in ("index", "geom", "x, y, z, m", "area, m²", "from up, deg", "friction", "pieces", "serves"):
         table.add_column(name, justify="left" if name in ("geom", "serves") else "right")

@@ -9,12 +9,13 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 import numpy as np
 
-from toolkit.errors import RobotError
+from toolkit.errors import InputError, RobotError
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
+from toolkit.mjcf import compile_spec, copy_fields, one_line
 from toolkit.robot.description import LimbDescription, RobotDescription, match_joints, suggestion
 from toolkit.robot.locking import lock_joints
-from toolkit.robot.source import ModelSource, collect_assets
+from toolkit.robot.source import ModelSource
 
 ROOT_JOINT = "root_joint"
 
@@ -62,21 +63,24 @@ def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
         raise RobotError(f"{source.path}: {error}") from None
     _strip(source)
     _check_names(source)
-    try:
-        bare = spec.compile()
-    except ValueError as error:
-        raise RobotError(f"{source.path}: MuJoCo cannot compile it: {' '.join(str(error).split())}") from None
+    bare = _compiled(source, spec)
     velocity = _set_joints(description, source, bare)
     bodies = {limb: _add_site(description, item, spec, bare) for limb, item in description.limbs.items()}
-    assets = collect_assets(spec)
+    _compiled(source, spec)
+    mjcf, assets = spec.to_xml(), dict(spec.assets)
+    return Assembly(mjcf, assets, _compiled(source, mjcf), velocity, bodies)
+
+
+def _compiled(source: ModelSource, what: mujoco.MjSpec | str) -> mujoco.MjModel:
+    """A spec, or MJCF text with the files of the source, compiled."""
     try:
-        spec.assets = assets
-        spec.compile()
-        mjcf = spec.to_xml()
-        model = mujoco.MjModel.from_xml_string(mjcf, assets)
+        if isinstance(what, str):
+            what = mujoco.MjSpec.from_string(what, assets=dict(source.spec.assets))
+        return compile_spec(what)
+    except InputError as error:
+        raise RobotError(f"{source.path}: {error}") from None
     except ValueError as error:
-        raise RobotError(f"{source.path}: MuJoCo cannot compile it: {' '.join(str(error).split())}") from None
-    return Assembly(mjcf, assets, model, velocity, bodies)
+        raise RobotError(f"{source.path}: MuJoCo cannot compile it: {one_line(error)}") from None
 
 
 def exclude_pairs(assembly: Assembly, pairs: Sequence[tuple[str, str]]) -> Assembly:
@@ -149,7 +153,7 @@ def _strip(source: ModelSource) -> None:
         body.gravcomp = 0.0
     for geom in spec.geoms:
         geom.priority = 0  # the world's friction counts
-    spec.option.gravity, spec.option.disableflags = [0.0, 0.0, -9.81], 0
+    copy_fields(mujoco.MjSpec().option, spec.option)
 
 
 def _check_names(source: ModelSource) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
+from toolkit.mjcf import one_line
 
 FILE_NAME = "robot.toml"
 
@@ -22,6 +23,7 @@ _TOP = ("description", "licence", "source", "model", "limbs", "home", "gains", "
 _MODEL = ("file", "package", "base", "locked_joints")
 _LIMB = ("body", "site", "position", "quaternion_wxyz", "patch", "max_force", "pad")
 _LIMITS = ("position", "velocity", "torque")
+_MOST = 1e9  # of any number
 
 
 @dataclass(frozen=True)
@@ -111,10 +113,11 @@ def read_description(path: Path) -> RobotDescription:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise RobotError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise RobotError(f"{path}: not valid TOML: {error}") from None
+    except (ValueError, RecursionError) as error:
+        raise RobotError(f"{path}: not valid TOML: {one_line(error)}") from None
     reader = _Reader(path)
     reader.keys(data, _TOP, "")
+    reader.numbers_within(data, "")
     model = reader.table(data, "model", _MODEL)
     limits = reader.table(data, "limits", _LIMITS)
     return RobotDescription(
@@ -202,6 +205,14 @@ class _Reader:
             if key not in allowed:
                 raise RobotError(f"{self.path}: unknown key '{where}{key}'; {suggestion(key, allowed)}")
 
+    def numbers_within(self, item: Any, where: str) -> None:
+        """Raise for a number, however deep, that is not finite or too large to compute with."""
+        if isinstance(item, dict | list):
+            for key, value in item.items() if isinstance(item, dict) else enumerate(item):
+                self.numbers_within(value, f"{where}.{key}".lstrip("."))
+        elif isinstance(item, int | float) and not abs(item) <= _MOST:
+            raise RobotError(f"{self.path}: '{where}' = {str(item)[:20]} must be a finite number up to {_MOST:g}")
+
     def table(self, data: dict, key: str, allowed: Iterable[str] | None, where: str = "") -> dict:
         table = data.get(key, {})
         if not isinstance(table, dict):
@@ -241,7 +252,7 @@ class _Reader:
         if value is None:
             raise RobotError(f"{self.path}: '{where}' is missing; it is {kind}")
         good = isinstance(values, list) and len(values) == count
-        good = good and all(isinstance(v, int | float) and not isinstance(v, bool) and np.isfinite(v) for v in values)
+        good = good and all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
         if not good or min(values) < lowest:
             bound = f" of at least {lowest:g}" if np.isfinite(lowest) else ""
             raise RobotError(f"{self.path}: '{where}' = {value!r} must be {kind}{bound}")

@@ -8,11 +8,13 @@ import numpy as np
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import Pose, yaw_of
+from toolkit.robot.assemble import Assembly
 from toolkit.robot.description import RobotDescription, match_joints
 
 MAX_SOLE_TILT = 0.02  # rad
 MAX_SOLE_STEP = 0.005  # m
 MAX_NEIGHBOUR_JOINTS = 5  # on the path between bodies whose shapes may overlap by construction
+MAX_GAP = 0.005  # m; from a contact patch to the shapes of its limb
 MAX_SINK = 0.003  # m; how far another part of the robot may reach below the soles
 
 
@@ -61,6 +63,46 @@ def home_posture(description: RobotDescription, model: mujoco.MjModel) -> np.nda
     _check_balance(description, base @ data.subtree_com[1], [base @ sole for sole in soles])
     _check_lowest(description, model, data)
     return data.qpos.copy()
+
+
+def check_patches(description: RobotDescription, assembly: Assembly) -> None:
+    """Every contact patch lies on a shape of its limb: what is planned with is what touches.
+
+    Args:
+        description: the robot.toml.
+        assembly: the robot alone, with its contact sites.
+
+    Raises:
+        RobotError: no shape that collides, of the body or of one that is fixed to it, comes near the patch.
+    """
+    spec = mujoco.MjSpec.from_string(assembly.mjcf, assets=assembly.assets)
+    for limb, item in description.limbs.items():
+        site = spec.site(limb.label)
+        spec.body(assembly.bodies[limb]).add_geom(
+            name=f"{limb.label}_patch",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=site.pos,
+            quat=site.quat,
+            size=[*(item.patch / 2), 1e-4],
+            mass=0.0,
+            contype=0,
+            conaffinity=0,
+        )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    colliding = (model.geom_contype | model.geom_conaffinity) != 0
+    for limb in description.limbs:
+        patch, body = model.geom(f"{limb.label}_patch").id, assembly.bodies[limb]
+        rigid = model.body_weldid[model.geom_bodyid] == model.body_weldid[model.body(body).id]
+        shapes = np.flatnonzero(colliding & rigid).tolist()
+        gap = min((mujoco.mj_geomDistance(model, data, patch, shape, 1e3, None) for shape in shapes), default=np.inf)
+        if gap > MAX_GAP:
+            far = f"{1e3 * gap:.0f} mm from the nearest" if shapes else "on a body without any"
+            raise RobotError(
+                f"{description.path}: the patch of [limbs.{limb.label}] is {far} collision shape of '{body}' (at most "
+                f"{1e3 * MAX_GAP:.0f} mm); move it onto the shape that touches, or give it a `pad`"
+            )
 
 
 def touching_neighbours(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from pathlib import Path
 
 import mujoco
@@ -15,7 +16,7 @@ from toolkit.robot.agreement import check_agreement
 from toolkit.robot.assemble import Assembly, assemble, exclude_pairs
 from toolkit.robot.description import FILE_NAME, RobotDescription, match_joints, read_description, suggestion
 from toolkit.robot.geometry import derive_limbs
-from toolkit.robot.home import home_posture, touching_neighbours
+from toolkit.robot.home import check_patches, home_posture, touching_neighbours
 from toolkit.robot.model import LimbModel, RobotModel
 from toolkit.robot.source import find_model_file, read_model
 from toolkit.robot.urdf import urdf_from_model
@@ -27,8 +28,7 @@ def robots_folder(robots_dir: Path | None = None) -> Path:
     """The folder with one folder per robot: given, else `robots/` here, else the one beside the toolkit."""
     if robots_dir is not None:
         return Path(robots_dir)
-    here = Path.cwd() / "robots"
-    return here if here.is_dir() else Path(__file__).resolve().parents[2] / "robots"
+    return Path.cwd() / "robots" if os.path.isdir("robots") else Path(__file__).resolve().parents[2] / "robots"
 
 
 def find_robots(robots_dir: Path | None = None) -> tuple[str, ...]:
@@ -58,9 +58,9 @@ def robot_folder(name: str, robots_dir: Path | None = None) -> Path:
     """
     folder = robots_folder(robots_dir)
     for path in (folder / name, Path(name)):
-        if name and (path / FILE_NAME).is_file():
+        if name and os.path.isfile(path / FILE_NAME):
             return path.resolve()
-    if name and Path(name).is_dir():
+    if name and os.path.isdir(name):
         raise RobotError(f"{name}: no {FILE_NAME} in this folder")
     raise RobotError(f"robot '{name}' is not in {folder}; {suggestion(name, find_robots(robots_dir))}")
 
@@ -72,8 +72,11 @@ def default_robot(robots_dir: Path | None = None) -> str:
         RobotError: there are none or several, and no such file.
     """
     folder = robots_folder(robots_dir)
-    if (folder / "default").is_file():
-        return (folder / "default").read_text().strip()
+    if os.path.isfile(folder / "default"):
+        try:
+            return (folder / "default").read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError) as error:
+            raise RobotError(f"{folder / 'default'}: cannot be read ({error}); name a robot with --robot") from None
     names = find_robots(robots_dir)
     if len(names) != 1:
         found = ", ".join(names) or "none"
@@ -99,6 +102,7 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
     assembly = assemble(description, read_model(find_model_file(description)))
     where = description.path
     home = home_posture(description, assembly.mujoco_model)
+    check_patches(description, assembly)
     assembly = exclude_pairs(assembly, touching_neighbours(description, assembly.mujoco_model, home))
     model = assembly.mujoco_model
     joint_names = tuple(model.joint(j).name for j in range(1, model.njnt))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 
-from toolkit.errors import RobotError
+from toolkit.errors import InputError, RobotError
+from toolkit.mjcf import one_line, read_spec
 from toolkit.robot.description import RobotDescription, suggestion
 
 _MESH_ENDINGS = {".stl", ".obj", ".msh"}
@@ -21,7 +23,7 @@ class ModelSource:
 
     Attributes:
         path: the model file.
-        spec: its content, with absolute mesh and texture paths.
+        spec: its content, files included.
         velocity: joint -> rad/s, as far as the file says (URDF only: MuJoCo drops them).
     """
 
@@ -45,7 +47,7 @@ def find_model_file(description: RobotDescription) -> Path:
     where = description.path
     if description.package is None:
         path = description.path.parent / description.file
-        if not path.is_file():
+        if not os.path.isfile(path):
             raise RobotError(f"{where}: model.file '{description.file}' does not exist in {path.parent}")
         return path
     try:
@@ -78,56 +80,28 @@ def read_model(path: Path) -> ModelSource:
     """
     try:
         root = ElementTree.parse(path).getroot()
-    except (ElementTree.ParseError, OSError, UnicodeDecodeError) as error:
+    except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
         raise RobotError(f"{path}: not valid XML: {error}") from None
     if root.tag not in ("mujoco", "robot"):
         raise RobotError(f"{path}: root element <{root.tag}>; expected <mujoco> (MJCF) or <robot> (URDF)")
     velocity: dict[str, float] = {}
     try:
         if root.tag == "mujoco":
-            spec = mujoco.MjSpec.from_file(str(path))
+            spec = read_spec(path)
         else:
             velocity = _velocity_limits(path, root)
             _prepare_urdf(path, root)
-            spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+            spec = read_spec(path, ElementTree.tostring(root, encoding="unicode"))
             spec.compiler.fusestatic = False
             for geom in spec.geoms:
                 geom.density = 0.0  # a link without <inertial> has no mass, whatever its shapes
-        _absolute_files(spec, path.parent)
-    except ValueError as error:
-        raise RobotError(f"{path}: MuJoCo cannot load it: {' '.join(str(error).split())}") from None
+    except RobotError:
+        raise
+    except InputError as error:
+        raise RobotError(f"{path}: {error}") from None
+    except (ValueError, OSError) as error:
+        raise RobotError(f"{path}: MuJoCo cannot load it: {one_line(error)}") from None
     return ModelSource(path, spec, velocity)
-
-
-def collect_assets(spec: mujoco.MjSpec) -> dict[str, bytes]:
-    """Make a spec independent of its folder: short unique file names, and the bytes behind them.
-
-    Args:
-        spec: with absolute file paths; its mesh and texture paths are changed.
-
-    Returns:
-        File name -> content.
-    """
-    assets: dict[str, bytes] = {}
-    names: dict[str, str] = {}
-    for item in [*spec.meshes, *spec.textures]:
-        if item.file:
-            if item.file not in names:
-                path = Path(item.file)
-                names[item.file] = path.name if path.name not in assets else f"{len(names)}_{path.name}"
-                assets[names[item.file]] = path.read_bytes()
-            item.file = names[item.file]
-    return assets
-
-
-def _absolute_files(spec: mujoco.MjSpec, folder: Path) -> None:
-    for items, directory in ((spec.meshes, spec.compiler.meshdir), (spec.textures, spec.compiler.texturedir)):
-        for item in items:
-            if item.file:
-                name = Path(item.file).name if spec.strippath else item.file
-                item.file = str((folder / directory / name).resolve())
-    spec.compiler.meshdir = spec.compiler.texturedir = ""
-    spec.strippath = False
 
 
 def _velocity_limits(path: Path, root: ElementTree.Element) -> dict[str, float]:
@@ -179,4 +153,4 @@ def _resolve(path: Path, name: str) -> Path | None:
         candidates += [parent / rest for parent in path.parents if parent.name == package]
     else:
         candidates = [path.parent / name.removeprefix("file://")]
-    return next((file.resolve() for file in candidates if file.is_file()), None)
+    return next((file.resolve() for file in candidates if os.path.isfile(file)), None)

@@ -10,7 +10,7 @@ import trimesh
 from shapely.geometry import Polygon
 
 from toolkit.world.convex import convex_partition
-from toolkit.world.facets import Facet, find_facets
+from toolkit.world.facets import Facet, facet_of, flat_groups
 
 FACET_ANGLE = np.radians(3.0)  # triangles of one facet: normals within this of the first triangle's
 FACET_DISTANCE = 1.5e-3  # m; and corners within this of its plane
@@ -59,9 +59,12 @@ def decompose_mesh(vertices: np.ndarray, triangles: np.ndarray) -> Decomposition
     convex = [_is_convex(component) for component in components]
     if len(components) == 1 and convex[0]:
         return None
+    groups = [flat_groups(component, angle=FACET_ANGLE, distance=FACET_DISTANCE) for component in components]
+    least = [_least_parts(component, flat) for component, flat in zip(components, groups, strict=True)]
+    _check_count(int(np.where(convex, 1, least).sum()))
     facets, parts = [], []
-    for component, whole in zip(components, convex, strict=True):
-        found = find_facets(component, angle=FACET_ANGLE, distance=FACET_DISTANCE)
+    for component, flat, whole in zip(components, groups, convex, strict=True):
+        found = [facet_of(component, group) for group in flat]
         facets += found
         if whole:
             parts.append(np.asarray(component.vertices))
@@ -71,6 +74,15 @@ def decompose_mesh(vertices: np.ndarray, triangles: np.ndarray) -> Decomposition
             parts += _frusta(component, fronts)
     _check_count(len(parts))
     return Decomposition(facets, parts)
+
+
+def _least_parts(mesh: trimesh.Trimesh, groups: list[np.ndarray]) -> int:
+    """How many groups of triangles have one that is wide enough to become a part."""
+    edges = np.linalg.norm(mesh.triangles - np.roll(mesh.triangles, 1, axis=1), axis=2)
+    wide = 2 * mesh.area_faces > np.maximum(_LEAST_WIDTH * edges.sum(axis=1), 2e-8)
+    return len(
+        np.unique(np.repeat(np.arange(len(groups)), [len(group) for group in groups])[wide[np.concatenate(groups)]])
+    )
 
 
 def _check_count(parts: int) -> None:
@@ -83,11 +95,13 @@ def _check_count(parts: int) -> None:
 def _components(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
     """Connected components, each wound outwards (closed) or upwards (open)."""
     labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
+    order = np.argsort(labels, kind="stable")
+    members = np.split(order, np.flatnonzero(np.diff(labels[order])) + 1)
+    members = [group for group in members if mesh.area_faces[group].sum() >= 1e-10]
+    _check_count(len(members))
     components = []
-    for label in range(labels.max() + 1 if len(labels) else 0):
-        component = mesh.submesh([np.flatnonzero(labels == label)], append=True, repair=False)
-        if component.area < 1e-10:
-            continue
+    for group in members:
+        component = mesh.submesh([group], append=True, repair=False)
         closed = component.is_watertight and component.is_winding_consistent
         upside_down = component.volume < 0 if closed else component.area_faces @ component.face_normals[:, 2] < 0
         if upside_down:
@@ -129,24 +143,26 @@ def _frusta(mesh: trimesh.Trimesh, fronts: list[tuple[np.ndarray, np.ndarray]]) 
 
 
 def _thickness(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Distance (n,) from points on a mesh to the next triangle behind them; inf where there is none.
+    """Distance (n,) from points on a mesh to the next triangle behind them; inf where none is near.
 
-    Every ray against every triangle (Moeller and Trumbore 1997), in blocks.
+    Rays against triangles (Moeller and Trumbore 1997), those whose boxes meet.
     """
-    corner = mesh.triangles[:, 0]
-    first, second = mesh.triangles[:, 1] - corner, mesh.triangles[:, 2] - corner
+    ends = points - 2.1 * _DEPTH * normals
+    low, high = (pick(mesh.triangles, axis=1)[:, :2] for pick in (np.min, np.max))
+    tree = shapely.STRtree(shapely.box(*low.T, *high.T))
+    rays, near = tree.query(shapely.box(*np.minimum(points, ends)[:, :2].T, *np.maximum(points, ends)[:, :2].T))
     result = np.full(len(points), np.inf)
-    block = max(1, 2_000_000 // max(1, len(corner)))
-    for begin in range(0, len(points), block):
-        point, ray = points[begin : begin + block, None], -normals[begin : begin + block, None]
+    for block in np.array_split(np.arange(len(rays)), len(rays) // 1_000_000 + 1):
+        point, ray, triangles = points[rays[block]], -normals[rays[block]], mesh.triangles[near[block]]
+        first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
         p = np.cross(ray, second)
         determinant = (first * p).sum(-1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            offset = point - corner
+            offset = point - triangles[:, 0]
             u = (offset * p).sum(-1) / determinant
             q = np.cross(offset, first)
             v = (ray * q).sum(-1) / determinant
             distance = (second * q).sum(-1) / determinant
             hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 1e-4)
-        result[begin : begin + block] = np.where(hit, distance, np.inf).min(axis=1)
+        np.minimum.at(result, rays[block][hit], distance[hit])
     return result

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
+from scipy.sparse import coo_array
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
@@ -16,6 +17,10 @@ from toolkit.world.faces import Face, faces_of
 from toolkit.world.solids import Solids
 from toolkit.world.source import Source
 from toolkit.world.surface import Surface
+
+_BATCH = 64  # faces that are looked at together
+_LARGEST = 12  # shadows that are tried one after the other
+_MANY = 50  # faces that are joined at once; fewer one after the other
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,11 @@ class SurfaceConfig:
 
 
 def extract_surfaces(
-    source: Source, solids: Solids, square: tuple[float, ...], config: SurfaceConfig
+    source: Source,
+    solids: Solids,
+    square: tuple[float, ...],
+    config: SurfaceConfig,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[Surface, ...]:
     """Contact surfaces of a world.
 
@@ -59,43 +68,50 @@ def extract_surfaces(
         solids: its colliding geometry (`solids_of`).
         square: (xmin, ymin, xmax, ymax), m; infinite planes are cut to it.
         config: what counts as a surface.
+        progress: told how much is done, in [0, 1].
 
     Returns:
         Surfaces that serve feet or palms, in the order of the geoms.
     """
     least = min(config.foot_area, config.palm_area) / 3  # flush faces of several geoms may be large enough together
     faces = faces_of(source, square=square, least_area=least)
-    faces = [face for face in faces if any(_serves(face.frame.normal, config))]
+    faces = [face for face, served in zip(faces, _serves(faces, config).tolist(), strict=True) if any(served)]
+    faces = _merged(faces, config)
+    faces = [face for face, holds in zip(faces, _hold_contacts(faces, config), strict=True) if holds]
+    regions: list[Face] = []
+    for begin in range(0, len(faces), _BATCH):
+        progress(begin / len(faces))
+        regions += _open_regions(faces[begin : begin + _BATCH], solids, config)
+    regions = [face for face, holds in zip(regions, _hold_contacts(regions, config), strict=True) if holds]
     surfaces: list[Surface] = []
-    for face in _merged(faces, config):
-        foot, palm = _serves(face.frame.normal, config)
-        for region in _open_regions(face, solids, config):
-            centre = np.asarray(region.centroid.coords[0])
-            moved = shapely.transform(region, lambda points, by=centre: points - by)
-            pose = face.frame @ Pose(np.eye(3), np.array([*centre, 0.0]))
-            rings = (moved.exterior, *moved.interiors)
-            surfaces.append(
-                Surface(
-                    index=len(surfaces),
-                    geom=face.geom,
-                    pose=pose,
-                    boundary=tuple(np.asarray(ring.coords)[:-1] for ring in rings),
-                    pieces=tuple(convex_partition(moved)),
-                    friction=face.friction,
-                    serves_foot=foot,
-                    serves_palm=palm,
-                )
+    for face, (foot, palm) in zip(regions, _serves(regions, config).tolist(), strict=True):
+        region = orient(shapely.remove_repeated_points(face.polygon, 1e-6))
+        centre = np.asarray(region.centroid.coords[0])
+        moved = shapely.transform(region, lambda points, by=centre: points - by)
+        pose = face.frame @ Pose(np.eye(3), np.array([*centre, 0.0]))
+        rings = (moved.exterior, *moved.interiors)
+        surfaces.append(
+            Surface(
+                index=len(surfaces),
+                geom=face.geom,
+                pose=pose,
+                boundary=tuple(np.asarray(ring.coords)[:-1] for ring in rings),
+                pieces=tuple(convex_partition(moved)),
+                friction=face.friction,
+                serves_foot=foot,
+                serves_palm=palm,
             )
+        )
     return tuple(surfaces)
 
 
-def _serves(normal: np.ndarray, config: SurfaceConfig) -> tuple[bool, bool]:
-    """Whether a surface with this normal serves feet, palms."""
-    angle = np.arccos(np.clip(normal[2], -1.0, 1.0))
+def _serves(faces: list[Face], config: SurfaceConfig) -> np.ndarray:
+    """(n, 2) bool; whether faces serve feet, palms, by the angle of their normals."""
+    normals = np.array([face.frame.normal for face in faces]).reshape(-1, 3)
+    angle = np.arccos(np.clip(normals[:, 2], -1.0, 1.0))
     slack = 1e-6  # a wall of exactly the limit counts
-    foot = angle <= config.foot_angle + slack
-    palm = config.palm_angle_min - slack <= angle <= config.palm_angle_max + slack
-    return bool(foot), bool(palm)
+    palm = (angle >= config.palm_angle_min - slack) & (angle <= config.palm_angle_max + slack)
+    return np.column_stack([angle <= config.foot_angle + slack, palm])
 
 
 def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
@@ -107,40 +123,66 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
     if len({face.geom for face in faces}) < 2:
         return faces
     normals = np.array([face.frame.normal for face in faces])
-    friction = np.array([face.friction for face in faces])
     origins = np.array([face.frame.position for face in faces])
     geoms = np.unique([face.geom for face in faces], return_inverse=True)[1]
     outlines = [face.frame @ _with_zeros(shapely.get_coordinates(face.polygon)) for face in faces]
-    low = np.array([points.min(axis=0) for points in outlines]) - config.flush
-    high = np.array([points.max(axis=0) for points in outlines]) + config.flush
+    first, second = _near_pairs(faces, normals, outlines, config)
+    size = (len(faces), len(faces))
+    graph = coo_array((np.ones(len(first), bool), (first, second)), shape=size).tocsr()
     used = np.zeros(len(faces), bool)
     result: dict[int, Face] = {}
     for seed in np.argsort([-face.polygon.area for face in faces], kind="stable").tolist():
         if used[seed]:
             continue
         used[seed] = True
-        alike = ~used & (friction == friction[seed]) & (normals @ normals[seed] > np.cos(config.flush_angle))
-        alike &= np.abs((origins - origins[seed]) @ normals[seed]) < 2 * config.flush
-        frame, shape, names = faces[seed].frame, faces[seed].polygon, [faces[seed].geom]
-        members, grown = [seed], True
-        while grown:
-            grown = False
-            touching = alike & ~used & (geoms != geoms[seed] if len(members) == 1 else True)
-            touching &= (low <= high[members].max(axis=0)).all(axis=1) & (high >= low[members].min(axis=0)).all(axis=1)
-            for other in np.flatnonzero(touching).tolist():
-                local = frame.inverse() @ outlines[other]
-                if np.abs(local[:, 2]).max() > config.flush:
-                    continue
-                moved = _in_frame(faces[other], frame)
-                if shape.distance(moved) > config.flush:
-                    continue
-                shape = _sealed([shape, moved], config.flush)
-                used[other] = grown = True
-                members.append(other)
-                names.append(faces[other].geom)
-        first = min(members)
-        result[first] = Face("+".join(dict.fromkeys(names)), faces[seed].friction, frame, shape)
+        frame, shapes = faces[seed].frame, {seed: faces[seed].polygon}
+
+        def joins(here: int, other: int, seed: int = seed, frame: Pose = frame, shapes: dict = shapes) -> bool:
+            """Whether a face lies in the seed's plane and touches one of its group."""
+            if normals[other] @ normals[seed] <= np.cos(config.flush_angle):
+                return False
+            if other not in shapes:
+                if abs((origins[other] - origins[seed]) @ normals[seed]) >= 2 * config.flush:
+                    return False
+                if np.abs((frame.inverse() @ outlines[other])[:, 2]).max() > config.flush:
+                    return False
+                shapes[other] = _in_frame(faces[other], frame)
+            return shapely.dwithin(shapes[here], shapes[other], config.flush)
+
+        def neighbours(here: int) -> list[int]:
+            around = graph.indices[graph.indptr[here] : graph.indptr[here + 1]]
+            return [int(other) for other in np.sort(around) if not used[other]]
+
+        members, waiting = [seed], [seed]
+        while waiting:
+            here = waiting.pop(0)
+            for other in neighbours(here):
+                if (geoms[other] != geoms[seed] or len(members) > 1) and joins(here, other):
+                    used[other] = True
+                    members.append(other)
+                    waiting.append(other)
+        polygon, others = shapes[seed], [shapes[member] for member in members[1:]]
+        for batch in [[other] for other in others] if len(others) < _MANY else [others]:
+            polygon = _sealed([polygon, *batch], config.flush)
+        names = dict.fromkeys(faces[member].geom for member in members)
+        result[min(members)] = Face("+".join(names), faces[seed].friction, frame, polygon)
     return [result[first] for first in sorted(result)]
+
+
+def _near_pairs(
+    faces: list[Face], normals: np.ndarray, outlines: list[np.ndarray], config: SurfaceConfig
+) -> np.ndarray:
+    """(2, k) pairs of faces, both ways round, of equal friction whose boxes touch and that may lie in one plane."""
+    low = np.array([points.min(axis=0) for points in outlines]) - config.flush
+    high = np.array([points.max(axis=0) for points in outlines]) + config.flush
+    friction = np.array([face.friction for face in faces])
+    boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    pairs = shapely.STRtree(boxes).query(boxes)
+    first, second = pairs
+    near = (first != second) & (friction[first] == friction[second])
+    near &= (low[first, 2] <= high[second, 2]) & (low[second, 2] <= high[first, 2])
+    near &= (normals[first] * normals[second]).sum(axis=1) > np.cos(2 * config.flush_angle)
+    return pairs[:, near]
 
 
 def _with_zeros(points: np.ndarray) -> np.ndarray:
@@ -163,32 +205,63 @@ def _sealed(shapes: list[Polygon], gap: float) -> Polygon:
     return closed if isinstance(closed, Polygon) else max(shapely.get_parts(closed), key=lambda part: part.area)
 
 
-def _open_regions(face: Face, solids: Solids, config: SurfaceConfig) -> Iterator[Polygon]:
-    """Connected regions of a face that nothing covers, large enough for a contact; holes are kept."""
-    if not _holds_contact(face.polygon, face.frame.normal, config):
-        return
-    region = face.polygon.simplify(1e-6)
-    shadow = solids.shadow(face.frame, region.bounds, config.flush, config.clearance)
-    if len(shadow):
-        shapely.prepare(region)
-        shadow = shadow[shapely.intersects(region, shadow)]
-        shadow = shadow[shapely.area(shapely.intersection(region, shadow)) > 1e-7]
-    if len(shadow):
+def _open_regions(faces: list[Face], solids: Solids, config: SurfaceConfig) -> list[Face]:
+    """Connected regions of faces that nothing covers; holes are kept."""
+    regions = shapely.simplify([face.polygon for face in faces], 1e-6)
+    shapely.prepare(regions)
+    frames = [face.frame for face in faces]
+    owner, shadows = solids.shadows(frames, shapely.bounds(regions), config.flush, config.clearance)
+    covers = shapely.intersects(regions[owner], shadows)
+    owner, shadows = owner[covers], shadows[covers]
+    rest, large = _without_largest(regions, owner, shadows, least := min(config.foot_area, config.palm_area) / 2)
+    lost = shapely.area(rest) < least
+    regions[lost] = Polygon()
+    shapely.prepare(rest)
+    covers = ~lost[owner] & (large | shapely.dwithin(rest[owner], shadows, 10 * config.simplify))
+    covers[covers] = shapely.area(shapely.intersection(regions[owner[covers]], shadows[covers])) > 1e-7
+    owner, shadows = owner[covers], shadows[covers]
+    covered = np.unique(owner)
+    if len(covered):
         # Widened by what the outline may move when it is simplified: the result stays free.
-        cover = shapely.union_all(shadow).buffer(config.simplify, join_style="mitre")
-        region = shapely.difference(region, cover).simplify(config.simplify)
-    for part in shapely.get_parts(shapely.make_valid(region)):
-        for piece in shapely.get_parts(part):
-            if isinstance(piece, Polygon) and _holds_contact(piece, face.frame.normal, config):
-                yield orient(shapely.remove_repeated_points(piece, 1e-6))
+        unions = [shapely.union_all(group) for group in np.split(shadows, np.searchsorted(owner, covered[1:]))]
+        covers = shapely.buffer(unions, config.simplify, join_style="mitre", quad_segs=16)
+        regions[covered] = shapely.simplify(shapely.difference(regions[covered], covers), config.simplify)
+    parts, whole = shapely.get_parts(shapely.make_valid(regions), return_index=True)
+    pieces, part = shapely.get_parts(parts, return_index=True)
+    return [
+        replace(faces[index], polygon=piece)
+        for index, piece in zip(whole[part].tolist(), pieces, strict=True)
+        if isinstance(piece, Polygon)
+    ]
 
 
-def _holds_contact(region: Polygon, normal: np.ndarray, config: SurfaceConfig) -> bool:
-    """Whether a region is large and wide enough for what it serves."""
-    foot, palm = _serves(normal, config)
-    area = min(config.foot_area if foot else np.inf, config.palm_area if palm else np.inf)
-    width = min(config.foot_width if foot else np.inf, config.palm_width if palm else np.inf)
-    if region.area < area:
-        return False
+def _without_largest(
+    regions: np.ndarray, owner: np.ndarray, shadows: np.ndarray, least: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """What the largest shadows of each region leave of it, and (k,) bool which these are.
+
+    It tells most buried faces, and which of many shadows matter, without a union of all. A region of which less than
+    `least` m^2 is left is not looked at further.
+    """
+    rest = regions.copy()
+    order = np.lexsort((-shapely.area(shadows), owner))
+    rank = np.empty(len(owner), int)
+    rank[order] = np.arange(len(owner)) - np.searchsorted(owner, owner)
+    for turn in range(_LARGEST):
+        chosen = np.flatnonzero(rank == turn)
+        chosen = chosen[shapely.area(rest[owner[chosen]]) >= least]
+        rest[owner[chosen]] = shapely.difference(rest[owner[chosen]], shadows[chosen])
+    return rest, rank < _LARGEST
+
+
+def _hold_contacts(faces: list[Face], config: SurfaceConfig) -> np.ndarray:
+    """(n,) bool; whether faces are large and wide enough for what they serve."""
+    serves = _serves(faces, config)
+    area = np.where(serves, [config.foot_area, config.palm_area], np.inf).min(axis=1)
+    width = np.where(serves, [config.foot_width, config.palm_width], np.inf).min(axis=1)
+    regions = np.array([face.polygon for face in faces], object)
+    result: np.ndarray = np.greater_equal(shapely.area(regions), area)
     # A little less than the width, and mitred: a rectangle of exactly that width must not be lost to rounding.
-    return not region.buffer(1e-6 - width / 2, join_style="mitre").is_empty
+    inner = shapely.buffer(regions[result], 1e-6 - width[result] / 2, join_style="mitre")
+    result[result] = ~shapely.is_empty(inner)
+    return result

@@ -78,7 +78,9 @@ def _local_faces(
         low, high = np.maximum(rectangle.min(axis=0), -drawn), np.minimum(rectangle.max(axis=0), drawn)
         return [(pose, shapely.box(*low, *high))] if (high > low).all() else []
     if kind == types.mjGEOM_BOX:
-        return [(pose @ Pose(turn, turn[:, 2] * size), shapely.box(*-half, *half)) for turn, half in _box_faces(size)]
+        halves = [np.abs(turn[:, :2].T @ size) for turn in _BOX_TURNS]
+        shapes = [shapely.box(*-half, *half) for half in halves]
+        return [(pose @ Pose(turn, turn[:, 2] * size), box) for turn, box in zip(_BOX_TURNS, shapes, strict=True)]
     if kind == types.mjGEOM_CYLINDER:
         angle = 2 * np.pi * np.arange(_CAP_SIDES) / _CAP_SIDES
         cap = Polygon(size[0] * np.column_stack([np.cos(angle), np.sin(angle)]))
@@ -96,15 +98,17 @@ def _local_faces(
     return [(facet.frame, facet.polygon) for facet in facets]
 
 
-def _box_faces(size: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(box_from_face rotation, half extents along its x and y) of the six faces of a box."""
-    faces = []
+def _box_turns() -> list[np.ndarray]:
+    """Rotations box_from_face of the six faces of a box."""
+    turns = []
     for axis, sign in ((2, 1), (2, -1), (0, 1), (0, -1), (1, 1), (1, -1)):
         normal = sign * np.eye(3)[axis]
         x = np.eye(3)[0 if axis == 2 else (axis + 1) % 3]
-        turn = np.stack([x, np.cross(normal, x), normal], axis=1)
-        faces.append((turn, np.abs(turn[:, :2].T @ size)))
-    return faces
+        turns.append(np.stack([x, np.cross(normal, x), normal], axis=1))
+    return turns
+
+
+_BOX_TURNS = _box_turns()
 
 
 def square_around(points: np.ndarray, margin: float) -> tuple[float, float, float, float]:

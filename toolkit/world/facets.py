@@ -9,7 +9,10 @@ import shapely
 import trimesh
 from shapely.geometry import Polygon
 
+from toolkit.compiled import compiled
 from toolkit.geometry.pose import Pose
+
+_MANY = 100  # triangles that are merged along edges; of fewer the general union is as quick, and overlaps do not matter
 
 
 @dataclass(frozen=True)
@@ -59,44 +62,88 @@ def find_facets(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_a
     Returns:
         Facets, ordered by their first triangle's area, largest first.
     """
+    return [facet_of(mesh, group) for group in flat_groups(mesh, angle=angle, distance=distance, least_area=least_area)]
+
+
+def flat_groups(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_area: float = 0.0) -> list[np.ndarray]:
+    """Triangles (k,) of each of a mesh's flat facets, in the order in which it grew; see `find_facets`."""
     area = mesh.area_faces
-    usable = area > 1e-10
-    normals, corners = mesh.face_normals, mesh.triangles
-    neighbours: list[list[int]] = [[] for _ in range(len(area))]
-    for first, second in mesh.face_adjacency.tolist():
-        neighbours[first].append(second)
-        neighbours[second].append(first)
-    free = usable.tolist()
-    facets = []
-    for seed in np.argsort(-area, kind="stable").tolist():
+    pairs = mesh.face_adjacency
+    ends = pairs.ravel()
+    order = np.argsort(ends, kind="stable")
+    members, last = np.empty(len(area), np.int64), np.empty(len(area), np.int64)
+    count = _grow(
+        np.argsort(-area, kind="stable"),
+        area > 1e-10,
+        np.searchsorted(ends[order], np.arange(len(area) + 1)),
+        pairs[:, ::-1].ravel()[order],
+        np.ascontiguousarray(mesh.face_normals),
+        np.ascontiguousarray(mesh.triangles),
+        float(np.cos(angle)),
+        distance,
+        members,
+        last,
+    )
+    groups = np.split(members[: last[count - 1]], last[: count - 1]) if count else []
+    return [group for group in groups if area[group].sum() >= least_area]
+
+
+@compiled(kept=True)
+def _grow(seeds, free, first, neighbours, normals, corners, cosine, distance, members, last):
+    """Fill `members` with triangles, group after group, and `last` with where each group ends; returns their number."""
+    count, end = 0, 0
+    stack = np.empty(len(seeds), np.int64)
+    for seed in seeds:
         if not free[seed]:
             continue
-        normal, point = normals[seed], corners[seed, 0]
         free[seed] = False
-        group, stack = [seed], [seed]
-        while stack:
-            for other in neighbours[stack.pop()]:
-                if (
-                    free[other]
-                    and normals[other] @ normal > np.cos(angle)
-                    and np.abs((corners[other] - point) @ normal).max() < distance
-                ):
+        members[end] = stack[0] = seed
+        end, height = end + 1, 1
+        while height > 0:
+            height -= 1
+            here = stack[height]
+            for k in range(first[here], first[here + 1]):
+                other = neighbours[k]
+                if not free[other]:
+                    continue
+                alike, off = 0.0, 0.0
+                for axis in range(3):
+                    alike += normals[other, axis] * normals[seed, axis]
+                if alike <= cosine:
+                    continue
+                for corner in range(3):
+                    height_above = 0.0
+                    for axis in range(3):
+                        height_above += (corners[other, corner, axis] - corners[seed, 0, axis]) * normals[seed, axis]
+                    off = max(off, abs(height_above))
+                if off < distance:
                     free[other] = False
-                    group.append(other)
-                    stack.append(other)
-        if area[group].sum() >= least_area:
-            facets.append(_facet(corners[group], normals[group], area[group], np.sort(np.array(group))))
-    return facets
+                    members[end] = stack[height] = other
+                    end, height = end + 1, height + 1
+        last[count] = end
+        count += 1
+    return count
 
 
-def _facet(corners: np.ndarray, normals: np.ndarray, area: np.ndarray, triangles: np.ndarray) -> Facet:
-    """Facet of grouped triangles: corners (k, 3, 3), normals (k, 3), area (k,)."""
+def facet_of(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
+    """The facet that a group of triangles (k,) of a mesh makes."""
+    corners, area = mesh.triangles[group], mesh.area_faces[group]
     weight = area / area.sum()
-    normal = weight @ normals
+    normal = weight @ mesh.face_normals[group]
     frame = plane_frame(weight @ corners.mean(axis=1), normal / np.linalg.norm(normal))
     flat = frame.inverse() @ corners
-    shape = shapely.union_all(shapely.polygons(flat[..., :2])) if len(flat) > 1 else Polygon(flat[0, :, :2])
+    shape = _union(flat[..., :2]) if len(flat) > 1 else Polygon(flat[0, :, :2])
     if not isinstance(shape, Polygon):  # corners that only touch in a point: keep one piece, the largest
         parts = [part for part in shapely.get_parts(shapely.make_valid(shape)) if isinstance(part, Polygon)]
         shape = max(parts, key=lambda part: part.area, default=Polygon())
-    return Facet(frame, shape, triangles)
+    return Facet(frame, shape, np.sort(group))
+
+
+def _union(triangles: np.ndarray) -> shapely.Geometry:
+    """Union of triangles (k, 3, 2) that share edges and do not overlap; many are merged along their edges."""
+    shapes = shapely.polygons(triangles)
+    if len(triangles) > _MANY:
+        merged = shapely.coverage_union_all(shapes)
+        if abs(merged.area - shapely.area(shapes).sum()) < 1e-9 * merged.area:
+            return merged
+    return shapely.union_all(shapes)

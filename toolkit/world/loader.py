@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -23,13 +24,20 @@ _ABOVE_START, _BELOW_START = 0.15, 0.3  # m; where the ground is looked for, rel
 _AROUND_START = 0.25  # m; the start may be between two stones
 
 
-def load_world(path: Path | str, *, mjcf: str | None = None, config: SurfaceConfig = _DEFAULT) -> World:
+def load_world(
+    path: Path | str,
+    *,
+    mjcf: str | None = None,
+    config: SurfaceConfig = _DEFAULT,
+    progress: Callable[[float], None] = lambda share: None,
+) -> World:
     """Load a world from its MJCF file.
 
     Args:
         path: the file; its folder is where meshes are looked for, its name (without ending) names the world.
         mjcf: text to use in place of the file's content (a world made in memory).
         config: what counts as a contact surface.
+        progress: told now and then how much is done, in [0, 1].
 
     Returns:
         The world with its surfaces.
@@ -38,12 +46,13 @@ def load_world(path: Path | str, *, mjcf: str | None = None, config: SurfaceConf
         WorldError: one line that names the file, the thing at fault and the remedy.
     """
     path = Path(path)
-    source = read_source(path, mjcf)
+    source = read_source(path, mjcf, lambda share: progress(0.5 * share))
     model = source.model
     start, goal, timing = _start(path, model), _goal(path, model), _timing(path, model)
     palms = _start_palms(model)
     square = square_around(np.stack([start.position, goal.position]), config.plane_margin)
-    surfaces = extract_surfaces(source, solids_of(model, square=square), square, config)
+    solids = solids_of(model, square=square)
+    surfaces = extract_surfaces(source, solids, square, config, lambda share: progress(0.5 + 0.5 * share))
     if not any(surface.serves_foot for surface in surfaces):
         raise WorldError(
             f"{path}: no usable surface for feet; add a static colliding geom with a free flat top of at least "
@@ -51,7 +60,7 @@ def load_world(path: Path | str, *, mjcf: str | None = None, config: SurfaceConf
         )
     _check_ground(path, start, surfaces, palms)
     _check_walls(path, palms, surfaces, config)
-    return World(path.stem, path, model, surfaces, start, goal, timing, square=square, mjcf=mjcf, start_palms=palms)
+    return World(path.stem, path, model, surfaces, start, goal, timing, square, source.spec, palms)
 
 
 def _site(path: Path, model: mujoco.MjModel, name: str, example: str) -> int:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from toolkit.errors import RobotError, WorldError
+from toolkit.errors import InputError, RobotError
+from toolkit.mjcf import SIZES, compile_spec, copy_fields, one_line
 from toolkit.robot.model import RobotModel
-from toolkit.world.source import read_source
+from toolkit.world.options import set_options
 from toolkit.world.world import PALM_SITES, World
 
 WORLD_PREFIX = "world/"  # of everything in the scene that comes from the world
-
-_SIZES = ("memory", "nemax", "njmax", "nconmax", "nstack")  # of MuJoCo's buffers; -1 leaves them to MuJoCo
 
 
 def compose_scene(robot: RobotModel, world: World) -> mujoco.MjModel:
@@ -32,12 +31,9 @@ def compose_scene(robot: RobotModel, world: World) -> mujoco.MjModel:
 
     Raises:
         RobotError: the robot's model cannot be combined with a world.
-        WorldError: the world's file changed since it was loaded.
     """
     spec = mujoco.MjSpec.from_string(robot.mjcf, assets=dict(robot.assets))
-    source = read_source(world.path, world.mjcf)
-    _check_unchanged(source.model, world)
-    scenery = source.spec
+    scenery = world.scenery.copy()
     for key in list(spec.keys):
         spec.delete(key)
     for element in [*scenery.keys, *scenery.sensors, *scenery.pairs, *scenery.excludes]:
@@ -52,59 +48,39 @@ def compose_scene(robot: RobotModel, world: World) -> mujoco.MjModel:
         geom.margin, geom.gap, geom.solmix = 0.0, 0.0, 1.0
         geom.solref, geom.solimp = fresh.solref, fresh.solimp
     for part in (spec, scenery):
-        _set_options(part.option)
-        for size in _SIZES:
+        set_options(part.option)
+        for size in SIZES:
             setattr(part, size, -1)
-    _copy_fields(scenery.visual, spec.visual)
-    _copy_fields(scenery.stat, spec.stat)
-    if spec.assets and not scenery.assets:
-        scenery.assets = dict(spec.assets)  # MuJoCo warns of a child without any
+    copy_fields(scenery.visual, spec.visual)
+    copy_fields(scenery.stat, spec.stat)
+    _share_assets(spec, scenery)
     try:
         spec.attach(scenery, prefix=WORLD_PREFIX, frame=spec.worldbody.add_frame())
-        model = spec.compile()
-    except ValueError as error:
-        raise RobotError(f"{robot.folder}: cannot be put into {world.path}: {' '.join(str(error).split())}") from error
+        model = compile_spec(spec)
+    except (ValueError, InputError) as error:
+        raise RobotError(f"{robot.folder}: cannot be put into {world.path}: {one_line(error)}") from error
     _check_composed(model, robot, world)
     return model
 
 
-def _set_options(options) -> None:
-    """Default options but for the integrator, the cone and the gravity that every run uses."""
-    _copy_fields(mujoco.MjSpec().option, options)
-    options.timestep = 0.002
-    options.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    options.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    options.impratio = 100.0
-    options.gravity = [0.0, 0.0, -9.81]
-    if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):  # the default since MuJoCo 4
-        options.enableflags |= int(mujoco.mjtEnableBit.mjENBL_MULTICCD)
-
-
-def _copy_fields(source, target) -> None:
-    """Copy the public fields of one of MuJoCo's structs to another, nested structs included."""
-    for name in dir(source):
-        value = getattr(source, name)
-        if name.startswith("_") or callable(value):
-            continue
-        if isinstance(value, int | float | np.ndarray):
-            setattr(target, name, value)
-        else:
-            _copy_fields(value, getattr(target, name))
+def _share_assets(spec: mujoco.MjSpec, scenery: mujoco.MjSpec) -> None:
+    """Give both parts of a scene the files of both; those of the world get names that none of the robot has."""
+    files, names = dict(spec.assets), {}
+    for name, content in scenery.assets.items():
+        names[name] = name
+        while names[name] in files:
+            names[name] = f"world_{names[name]}"
+        files[names[name]] = content
+    for item in [*scenery.meshes, *scenery.hfields, *scenery.skins, *scenery.textures]:
+        item.file = names.get(item.file, item.file)
+    for texture in scenery.textures:
+        texture.cubefiles = [names.get(name, name) for name in texture.cubefiles]
+    spec.assets, scenery.assets = files, dict(files)  # MuJoCo warns of a child without any
 
 
 def _colliding(model: mujoco.MjModel, index: np.ndarray) -> np.ndarray:
     """Those of the geoms that collide."""
     return index[(model.geom_contype[index] | model.geom_conaffinity[index]) != 0]
-
-
-def _check_unchanged(model: mujoco.MjModel, world: World) -> None:
-    loaded = world.mujoco_model
-    same = model.ngeom == loaded.ngeom and model.nmesh == loaded.nmesh
-    if same:
-        same = np.array_equal(model.geom_size, loaded.geom_size) and np.array_equal(model.geom_pos, loaded.geom_pos)
-        same = same and np.array_equal(model.mesh_vert, loaded.mesh_vert)
-    if not same:
-        raise WorldError(f"{world.path}: the file changed since it was loaded; load it again")
 
 
 def _check_composed(model: mujoco.MjModel, robot: RobotModel, world: World) -> None:

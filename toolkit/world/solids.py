@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -24,8 +26,7 @@ class Solids:
         points: (n, 3) float, m; vertices in the world frame, solid after solid.
         low, high: (s, 3) float, m; boxes around the solids, along the axes of the world.
         edges: (k, 2) int; pairs of vertices. All of a solid's convex edges are among them.
-        edge_solid: (k,) int; solid of each edge, ascending.
-        point_solid: (n,) int; solid of each vertex, ascending.
+        edge_first: (s + 1,) int; solid i has the edges from edge_first[i] to edge_first[i + 1].
         triangles: (t, 3) int; their faces as triangles of vertices, counterclockwise from outside. Of half spaces and
             height fields the upper side only.
     """
@@ -34,32 +35,36 @@ class Solids:
     low: np.ndarray
     high: np.ndarray
     edges: np.ndarray
-    edge_solid: np.ndarray
-    point_solid: np.ndarray
+    edge_first: np.ndarray
     triangles: np.ndarray
 
-    def shadow(self, frame: Pose, bounds: tuple[float, ...], low: float, high: float) -> np.ndarray:
-        """Projections on a plane of what the solids fill between two heights above it.
+    def shadows(
+        self, frames: Sequence[Pose], bounds: np.ndarray, low: float, high: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Projections on planes of what the solids fill between two heights above each.
 
         Args:
-            frame: world_from_plane; z is the plane's normal.
-            bounds: (xmin, ymin, xmax, ymax), m, in the plane; solids outside are left out.
+            frames: world_from_plane of n planes; z is the normal.
+            bounds: (n, 4) float, m; xmin, ymin, xmax, ymax in each plane; solids outside are left out.
             low: m; lower height.
             high: m; upper height.
 
         Returns:
-            (s,) object array of shapely polygons in the plane's xy, one per solid that fills an area.
+            (k,) int, ascending, planes; (k,) shapely polygons in their xy, one per solid that fills an area.
         """
-        x0, y0, x1, y1 = bounds
-        room = frame @ np.array([[x, y, z] for x in (x0, x1) for y in (y0, y1) for z in (low, high)])
-        near = (self.high > room.min(axis=0)).all(axis=1) & (self.low < room.max(axis=0)).all(axis=1)
-        if not near.any():
-            return np.empty(0, object)
-        points = np.flatnonzero(near[self.point_solid])
-        local = np.empty_like(self.points)
-        local[points] = frame.inverse() @ self.points[points]
-        edges = np.flatnonzero(near[self.edge_solid])
-        ends, solid = local[self.edges[edges]], self.edge_solid[edges]
+        turn, origin = np.array([frame.rotation for frame in frames]), np.array([frame.position for frame in frames])
+        corners = [
+            [bounds[:, x], bounds[:, y], np.full(len(bounds), z)] for x in (0, 2) for y in (1, 3) for z in (low, high)
+        ]
+        room = np.einsum("nij,cjn->nci", turn, np.array(corners)) + origin[:, None]
+        least, most = room.min(axis=1), room.max(axis=1)
+        pairs = self._boxes.query(shapely.box(least[:, 0], least[:, 1], most[:, 0], most[:, 1]))
+        plane, solid = pairs[:, np.lexsort(pairs[::-1])]
+        near = (self.high[solid] > least[plane]).all(axis=1) & (self.low[solid] < most[plane]).all(axis=1)
+        plane, solid = plane[near], solid[near]
+        edges, pair = _ranges(self.edge_first, solid)
+        inverse = np.array([frame.inverse().position for frame in frames])
+        ends = self.points[self.edges[edges]] @ turn[plane[pair]] + inverse[plane[pair], None]
         height = ends[:, :, 2]
         rise = height[:, 1] - height[:, 0]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -68,14 +73,20 @@ class Solids:
         enter = np.where(level, 0.0, np.clip(np.minimum(at_low, at_high), 0.0, 1.0))
         leave = np.where(level, 1.0, np.clip(np.maximum(at_low, at_high), 0.0, 1.0))
         inside = np.where(level, (height[:, 0] > low) & (height[:, 0] < high), leave > enter)
-        enter, leave, ends, solid = enter[inside], leave[inside], ends[inside], solid[inside]
-        if len(solid) == 0:
-            return np.empty(0, object)
+        enter, leave, ends, pair = enter[inside], leave[inside], ends[inside], pair[inside]
+        if len(pair) == 0:
+            return np.empty(0, int), np.empty(0, object)
         along = ends[:, 1, :2] - ends[:, 0, :2]
         cut = ends[:, :1, :2] + np.stack([enter, leave], axis=1)[:, :, None] * along[:, None]
-        points = shapely.multipoints(cut.reshape(-1, 2), indices=_ranks(np.repeat(solid, 2)))
-        hulls = np.asarray(shapely.convex_hull(points))
-        return hulls[(shapely.get_type_id(hulls) == 3) & (shapely.area(hulls) > 1e-10)]
+        kept, rank = np.unique(pair, return_inverse=True)
+        hulls = np.asarray(shapely.convex_hull(shapely.linestrings(cut.reshape(-1, 2), indices=np.repeat(rank, 2))))
+        filled = (shapely.get_type_id(hulls) == 3) & (shapely.area(hulls) > 1e-10)
+        return plane[kept[filled]], hulls[filled]
+
+    @cached_property
+    def _boxes(self) -> shapely.STRtree:
+        """The solids' boxes seen from above."""
+        return shapely.STRtree(shapely.box(self.low[:, 0], self.low[:, 1], self.high[:, 0], self.high[:, 1]))
 
     @property
     def corners(self) -> np.ndarray:
@@ -99,26 +110,32 @@ def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    meshes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    points, edges, triangles, counts, total = (
+        [np.zeros((0, 3))],
+        [np.zeros((0, 2), int)],
+        [np.zeros((0, 3), int)],
+        [],
+        0,
+    )
     for index in np.flatnonzero((model.geom_contype | model.geom_conaffinity) != 0).tolist():
         pose = Pose(data.geom_xmat[index].reshape(3, 3), data.geom_xpos[index])
-        for points, faces, edges in _local_solids(model, index, pose, square):
-            meshes.append((pose @ points, faces, edges))
-    if not meshes:
-        empty = np.zeros((0, 3))
-        return Solids(
-            empty, empty, empty, np.zeros((0, 2), int), np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3), int)
-        )
-    counts = np.array([len(points) for points, _, _ in meshes])
-    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        for corners, faces, sides in _local_solids(model, index, pose, square):
+            many, each = corners.shape[:2]
+            first = total + each * np.arange(many)[:, None, None]
+            points.append((pose @ corners).reshape(-1, 3))
+            edges.append((first + sides).reshape(-1, 2))
+            triangles.append((first + faces).reshape(-1, 3))
+            counts.append(np.tile([each, len(sides)], (many, 1)))
+            total += many * each
+    numbers = np.concatenate([np.zeros((1, 2), int), *counts])
+    points, (point_first, edge_first) = np.concatenate(points), np.cumsum(numbers, axis=0).T
     return Solids(
-        np.concatenate([points for points, _, _ in meshes]),
-        np.array([points.min(axis=0) for points, _, _ in meshes]),
-        np.array([points.max(axis=0) for points, _, _ in meshes]),
-        np.concatenate([edges + at for at, (_, _, edges) in zip(first, meshes, strict=True)]),
-        np.repeat(np.arange(len(meshes)), [len(edges) for _, _, edges in meshes]),
-        np.repeat(np.arange(len(meshes)), counts),
-        np.concatenate([faces + at for at, (_, faces, _) in zip(first, meshes, strict=True)]),
+        points,
+        np.minimum.reduceat(points, point_first[:-1]) if len(points) else points,
+        np.maximum.reduceat(points, point_first[:-1]) if len(points) else points,
+        np.concatenate(edges),
+        edge_first,
+        np.concatenate(triangles),
     )
 
 
@@ -150,13 +167,15 @@ def _extent(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return points[:, :2].min(axis=0), points[:, :2].max(axis=0)
 
 
-def _ranks(ascending: np.ndarray) -> np.ndarray:
-    """0, 0, 1, 2, 2, ... for 3, 3, 5, 9, 9, ..."""
-    return np.cumsum(np.diff(ascending, prepend=ascending[0]) != 0)
+def _ranges(first: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Indices in the ranges first[i] to first[i + 1] of the chosen i, and for each which of the chosen it is of."""
+    counts = first[chosen + 1] - first[chosen]
+    owner = np.repeat(np.arange(len(chosen)), counts)
+    return np.arange(len(owner)) + (first[chosen] - np.cumsum(counts) + counts)[owner], owner
 
 
 def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
-    """(points, triangles, edges) of the convex solids of a geom, in the geom's frame."""
+    """Blocks of a geom's convex solids of one build: points (m, n, 3) in the geom's frame, triangles and edges."""
     kind, size = model.geom_type[index], model.geom_size[index]
     types = mujoco.mjtGeom
     if kind == types.mjGEOM_PLANE:
@@ -165,11 +184,11 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
         wide = plane_rectangle(model, index, pose, (x0 - _WIDE, y0 - _WIDE, x1 + _WIDE, y1 + _WIDE))
         points, _, edges = _hull(_extruded(wide, -_WIDE, 0.0))
         shown = plane_rectangle(model, index, pose, square)
-        first = len(points)
+        first = len(points[0])
         faces = np.array([[0, 1, 2], [0, 2, 3]]) + first
-        return [(np.concatenate([points, np.column_stack([shown, np.zeros(4)])]), faces, edges)]
+        return [(np.concatenate([points[0], np.column_stack([shown, np.zeros(4)])])[None], faces, edges)]
     if kind == types.mjGEOM_BOX:
-        return [(_CUBE * size, _CUBE_FACES, _CUBE_EDGES)]
+        return [(_CUBE[None] * size, _CUBE_FACES, _CUBE_EDGES)]
     if kind == types.mjGEOM_CYLINDER:
         angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
         circle = size[0] / np.cos(np.pi / _SIDES) * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -203,7 +222,7 @@ def _extruded(ring: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices, triangles (counterclockwise from outside) and edges of a convex hull."""
+    """One convex hull as a block of solids; triangles counterclockwise from outside."""
     hull = ConvexHull(points)
     points, index = points[hull.vertices], np.full(len(points), -1)
     index[hull.vertices] = np.arange(len(hull.vertices))
@@ -213,7 +232,7 @@ def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     inwards = (normal * hull.equations[:, :3]).sum(axis=1) < 0
     faces[inwards] = faces[inwards, ::-1]
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    return points, faces, np.unique(edges, axis=0)
+    return points[None], faces, np.unique(edges, axis=0)
 
 
 _CUBE = np.array([[x, y, z] for z in (-1.0, 1.0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
@@ -228,11 +247,9 @@ _PRISM_TOP = np.array([[3, 4, 5]])
 def _height_field_prisms(model: mujoco.MjModel, field: int):
     """Prisms from the base of a height field up to its triangles."""
     points, triangles = height_field_triangles(model, field)
-    base = -model.hfield_size[field, 3]
-    prisms = []
-    for corners in points[triangles]:
-        prisms.append((np.concatenate([corners * [1, 1, 0] + [0, 0, base], corners]), _PRISM_TOP, _PRISM_EDGES))
-    return prisms
+    top = points[triangles]
+    foot = top * [1, 1, 0] + [0, 0, -model.hfield_size[field, 3]]
+    return [(np.concatenate([foot, top], axis=1), _PRISM_TOP, _PRISM_EDGES)]
 
 
 def height_field_triangles(model: mujoco.MjModel, field: int) -> tuple[np.ndarray, np.ndarray]:

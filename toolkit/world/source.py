@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from toolkit.errors import WorldError
+from toolkit.errors import InputError, WorldError
+from toolkit.mjcf import SIZES, compile_spec, one_line, read_spec
 from toolkit.world.decomposition import Decomposition, decompose_mesh
 from toolkit.world.facets import Facet
+from toolkit.world.options import check_options
 
 VISUAL_GROUP = 2  # geoms that do not collide
 PART_GROUP = 3  # convex parts of a mesh that is drawn as a whole; hidden by default in MuJoCo's viewer
 RAY_GROUPS = np.array([1, 1, 0, 1, 1, 1], np.uint8)  # `geomgroup` of mj_ray that sees exactly what collides
 
 _ALL_BITS = 0x7FFFFFFF
-_NAN = re.compile(r"""=\s*["'][^"']*(?<![^\s"'])[+-]?nan(?![^\s"'])""", re.IGNORECASE)
+_LEAST = 1e-5  # m; of half a geom: what is thinner has no sides to compute with
 
 
 @dataclass(frozen=True)
@@ -26,10 +28,11 @@ class Source:
     """A world's scene, ready to compile or to take in a robot.
 
     Attributes:
-        spec: the scene; colliding geoms have all contact bits set, the others none.
+        spec: the scene; colliding geoms have all contact bits set, the others none; every geom has a name.
         model: `spec` compiled.
-        facets: mesh geom name -> its flat facets in the world frame, for mesh geoms replaced by convex parts.
-        owner: (ngeom,) labels; the authored geom that each geom of the model stands for.
+        facets: label of a mesh geom -> its flat facets in the world frame, for mesh geoms replaced by convex parts.
+        owner: (ngeom,) labels; the authored geom that each geom of the model stands for. A label is the geom's name,
+            or `type#id` where it has none; no two geoms have the same.
     """
 
     spec: mujoco.MjSpec
@@ -38,13 +41,7 @@ class Source:
     owner: tuple[str, ...]
 
 
-def one_line(message: object) -> str:
-    """A message of MuJoCo condensed to one line."""
-    text = str(message).replace("Error=", "").replace("XML Error: Error:", "").replace("XML Error:", "")
-    return " ".join(text.split()).removeprefix("Error: ")
-
-
-def read_source(path: Path, mjcf: str | None = None) -> Source:
+def read_source(path: Path, mjcf: str | None = None, progress: Callable[[float], None] = lambda share: None) -> Source:
     """Read and check a world's MJCF.
 
     MuJoCo collides a mesh geom as its convex hull. A mesh that is not convex is therefore replaced by convex parts,
@@ -53,6 +50,7 @@ def read_source(path: Path, mjcf: str | None = None) -> Source:
     Args:
         path: the MJCF file; meshes are looked for beside it.
         mjcf: its text where it exists in memory only.
+        progress: told how much of the meshes is done, in [0, 1].
 
     Returns:
         The scene.
@@ -62,59 +60,62 @@ def read_source(path: Path, mjcf: str | None = None) -> Source:
     """
     spec, model = _compiled(path, mjcf)
     _check_static(path, spec, model)
-    _check_finite(path, model)
+    check_options(path, spec.option)
     colliding = (model.geom_contype | model.geom_conaffinity) != 0
-    _check_geoms(path, model, colliding)
+    names = {model.geom(i).name for i in range(model.ngeom)} | {mesh.name for mesh in spec.meshes}
+    labels = [model.geom(i).name or _unused(_kind(model, i), names) for i in range(model.ngeom)]
+    _check_geoms(path, model, colliding, labels)
 
-    labels = [geom_label(model, i) for i in range(model.ngeom)]
-    parts = _decompositions(path, model, colliding, labels)
-    replaced = set(parts)
+    parts = _decompositions(path, model, colliding, labels, progress)
     for geom in list(spec.geoms):
-        _normalise(geom, model, bool(colliding[geom.id]), geom.id in replaced)
+        index = geom.id
+        geom.name = labels[index]
+        _normalise(geom, model, index, bool(colliding[index]) and index not in parts)
     owner = {}
     for index, decomposition in parts.items():
-        owner.update(_add_parts(spec, model, index, labels[index], decomposition))
+        owner.update(_add_parts(spec, model, index, labels[index], decomposition, names))
     try:
-        final = spec.compile()
-    except ValueError as error:
+        final = compile_spec(spec)
+    except (ValueError, InputError) as error:
         raise WorldError(f"{path}: a mesh cannot be split into convex parts ({one_line(error)})") from error
-    authored = iter(labels)
-    owners = tuple(owner[name] if (name := final.geom(i).name) in owner else next(authored) for i in range(final.ngeom))
+    owners = tuple(owner.get(name := final.geom(i).name, name) for i in range(final.ngeom))
     return Source(spec, final, {labels[i]: part.facets for i, part in parts.items()}, owners)
 
 
-def geom_label(model: mujoco.MjModel, index: int) -> str:
-    """A geom's name, or `type#id`."""
-    kind = mujoco.mjtGeom(int(model.geom_type[index])).name.removeprefix("mjGEOM_").lower()
-    return model.geom(index).name or f"{kind}#{index}"
+def _kind(model: mujoco.MjModel, index: int) -> str:
+    """A label for a geom without a name: `type#id`."""
+    return f"{mujoco.mjtGeom(int(model.geom_type[index])).name.removeprefix('mjGEOM_').lower()}#{index}"
+
+
+def _unused(name: str, taken: set[str]) -> str:
+    """A name that nothing has yet, the wanted one if possible; taken from now on."""
+    while name in taken:
+        name += "'"
+    taken.add(name)
+    return name
 
 
 def _compiled(path: Path, mjcf: str | None) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
-    if mjcf is None and not path.is_file():
-        raise WorldError(f"{path}: no such world file; give the path of an MJCF file")
-    _check_text(path, mjcf)
+    if mjcf is None:
+        try:
+            path.read_text(encoding="utf-8")
+        except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
+            raise WorldError(f"{path}: no such world file; give the path of an MJCF file") from None
+        except (OSError, UnicodeDecodeError) as error:
+            raise WorldError(f"{path}: cannot be read as text ({error}); give the path of an MJCF file") from error
     try:
-        if mjcf is None:
-            spec = mujoco.MjSpec.from_file(str(path))
-        else:
-            spec = mujoco.MjSpec.from_string(mjcf)
-            spec.modelfiledir = str(path.parent)
+        spec = read_spec(path, mjcf)
+        # A dropped or merged geom would no longer be where the file has it.
+        spec.compiler.discardvisual = spec.compiler.fusestatic = False
+        for size in SIZES:
+            setattr(spec, size, -1)
         for mesh in spec.meshes:
             mesh.maxhullvert = -1  # the whole hull collides
-        return spec, spec.compile()
-    except ValueError as error:
+        return spec, compile_spec(spec)
+    except InputError as error:
+        raise WorldError(f"{path}: {error}") from error
+    except (ValueError, OSError) as error:
         raise WorldError(f"{path}: MuJoCo cannot read this world: {one_line(error)}") from error
-
-
-def _check_text(path: Path, mjcf: str | None) -> None:
-    """Raise for NaN before MuJoCo, which would only write a warning into a log file, reads it."""
-    try:
-        text = mjcf if mjcf is not None else path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise WorldError(f"{path}: cannot be read as text ({error}); give the path of an MJCF file") from error
-    for number, line in enumerate(text.splitlines(), 1):
-        if _NAN.search(line):
-            raise WorldError(f"{path}: line {number} has a NaN: {line.strip()[:80]}; give plain numbers")
 
 
 def _check_static(path: Path, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
@@ -138,48 +139,35 @@ def _check_static(path: Path, spec: mujoco.MjSpec, model: mujoco.MjModel) -> Non
             )
 
 
-def _check_finite(path: Path, model: mujoco.MjModel) -> None:
-    """Raise for a number that is not finite, naming the thing it belongs to."""
-    fields = {
-        "geom": ("geom_pos", "geom_quat", "geom_size", "geom_friction"),
-        "site": ("site_pos", "site_quat", "site_size"),
-        "body": ("body_pos", "body_quat"),
-    }
-    for kind, names in fields.items():
-        for name in names:
-            values = getattr(model, name)
-            bad = ~np.isfinite(values).all(axis=tuple(range(1, values.ndim)))
-            if bad.any():
-                index = int(np.argmax(bad))
-                label = getattr(model, kind)(index).name or f"{kind}#{index}"
-                field = name.split("_")[1]
-                raise WorldError(f"{path}: {field} of {kind} '{label}' is not finite; give plain numbers")
-    for values, what in ((model.mesh_vert, "a mesh vertex"), (model.hfield_data, "a height of a height field")):
-        if not np.isfinite(values).all():
-            raise WorldError(f"{path}: {what} is not finite; repair the file it comes from")
-
-
-def _check_geoms(path: Path, model: mujoco.MjModel, colliding: np.ndarray) -> None:
+def _check_geoms(path: Path, model: mujoco.MjModel, colliding: np.ndarray, labels: list[str]) -> None:
     for index in np.flatnonzero(colliding).tolist():
-        friction = float(model.geom_friction[index, 0])
-        label = geom_label(model, index)
+        friction, label = float(model.geom_friction[index, 0]), labels[index]
         if friction <= 0.0:
             raise WorldError(
                 f"{path}: geom '{label}' has friction {friction:g}; give a sliding friction above zero "
                 "(the first number of `friction`)"
             )
+        size = model.geom_size[index]
+        if 0.0 < size[size > 0.0].min(initial=np.inf) < _LEAST:
+            raise WorldError(f"{path}: geom '{label}' is thinner than {_LEAST:g} m; give it a size, or remove it")
         if model.geom_type[index] == mujoco.mjtGeom.mjGEOM_SDF:
             raise WorldError(f"{path}: geom '{label}' is an SDF, which is not supported; use a mesh")
 
 
 def _decompositions(
-    path: Path, model: mujoco.MjModel, colliding: np.ndarray, labels: list[str]
+    path: Path,
+    model: mujoco.MjModel,
+    colliding: np.ndarray,
+    labels: list[str],
+    progress: Callable[[float], None],
 ) -> dict[int, Decomposition]:
     """Geom id -> decomposition, for the colliding mesh geoms that are not convex."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     result = {}
-    for index in np.flatnonzero(colliding & (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)).tolist():
+    meshes = np.flatnonzero(colliding & (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)).tolist()
+    for done, index in enumerate(meshes):
+        progress(done / len(meshes))
         vertices, triangles = mesh_of_geom(model, data, index)
         try:
             decomposition = decompose_mesh(vertices, triangles)
@@ -200,28 +188,32 @@ def mesh_of_geom(model: mujoco.MjModel, data: mujoco.MjData, index: int) -> tupl
     return vertices @ rotation.T + position, model.mesh_face[first : first + count].copy()
 
 
-def _normalise(geom, model: mujoco.MjModel, colliding: bool, replaced: bool) -> None:
+def _normalise(geom, model: mujoco.MjModel, index: int, collides: bool) -> None:
     """Set contact bits and the group of a geom: it collides with everything, or is there for the eye only."""
-    index = geom.id
-    if not colliding or replaced:
-        geom.contype = geom.conaffinity = 0
+    geom.contype = geom.conaffinity = _ALL_BITS if collides else 0
+    if not collides:
         geom.group = VISUAL_GROUP
         return
-    geom.contype = geom.conaffinity = _ALL_BITS
     if geom.group == VISUAL_GROUP:
         geom.group = 0
-    if model.geom_rgba[index, 3] == 0.0:  # MuJoCo's rays pass through what is invisible
-        geom.material = ""
+    material = int(model.geom_matid[index])
+    if model.geom_rgba[index, 3] == 0.0 or (material >= 0 and model.mat_rgba[material, 3] == 0.0):
+        geom.material = ""  # MuJoCo's rays pass through what is invisible
         geom.rgba = [0.5, 0.5, 0.5, 1e-3]
 
 
 def _add_parts(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, index: int, label: str, decomposition: Decomposition
+    spec: mujoco.MjSpec,
+    model: mujoco.MjModel,
+    index: int,
+    label: str,
+    decomposition: Decomposition,
+    taken: set[str],
 ) -> dict[str, str]:
     """Add a mesh geom's convex parts to the world body; returns part name -> label."""
     names = {}
     for number, vertices in enumerate(decomposition.parts):
-        name = f"{label}/part{number}"
+        name = _unused(f"{label}/part{number}", taken)
         centre = vertices.mean(axis=0)
         spec.add_mesh(name=name, uservert=(vertices - centre).ravel())
         spec.worldbody.add_geom(

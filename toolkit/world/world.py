@@ -41,7 +41,7 @@ class World:
         goal: goal region.
         timing: shift and swing time of a transition.
         square: (xmin, ymin, xmax, ymax), m; infinite planes are cut to it wherever they are drawn or listed.
-        mjcf: text of the scene where it exists in memory only; None where `path` holds it.
+        scenery: the scene as it was read, to be put together with a robot.
         start_palms: palm -> (3,) m; palms that start in contact, each on the surface nearest to its point; empty: the
             robot starts on its feet alone.
     """
@@ -54,5 +54,5 @@ class World:
     goal: Goal
     timing: Timing
     square: tuple[float, float, float, float] = (-10.0, -10.0, 10.0, 10.0)
-    mjcf: str | None = field(default=None, repr=False)
+    scenery: mujoco.MjSpec = field(default_factory=mujoco.MjSpec, repr=False)
     start_palms: Mapping[Limb, np.ndarray] = field(default_factory=dict)

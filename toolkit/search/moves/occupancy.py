@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from toolkit.compiled import compiled
+from toolkit.errors import RobotError
 from toolkit.geometry.limb import PALMS, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.obstacles import world_triangles
@@ -30,7 +31,11 @@ class BodyBox(NamedTuple):
 
     @classmethod
     def of(cls, robot: RobotModel, margin: float = 0.02) -> BodyBox:
-        """The box around torso, head, thighs and shoulders in the home posture; arms may fold in."""
+        """The box around torso, head, thighs and shoulders in the home posture; arms may fold in.
+
+        Raises:
+            RobotError: there is no shape to put a box around.
+        """
         model = robot.mujoco_model
         data = mujoco.MjData(model)
         data.qpos[:] = robot.home
@@ -49,6 +54,10 @@ class BodyBox(NamedTuple):
             if middle[2] + extent[2] < bottom + 0.05:
                 continue
             low, high = np.minimum(low, middle - extent), np.maximum(high, middle + extent)
+        if not np.isfinite(high).all():
+            raise RobotError(
+                f"{robot.folder}: no shape above the knees; add geoms to the torso, the head or the thighs"
+            )
         width = max(-low[1], high[1])
         for limb, arm in robot.arms.items():
             width = max(width, abs(arm.shoulder_in_com[1]) + 1.5 * float(robot.half_sizes[limb].min()))

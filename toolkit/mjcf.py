@@ -1,0 +1,173 @@
+"""Reading a model file once: its text, its includes and its assets, with MuJoCo's warnings caught."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from toolkit.errors import InputError
+
+LARGEST = 1e4
+"""m; nothing in a world or a robot is larger or farther away."""
+SIZES = ("memory", "nemax", "njmax", "nconmax", "nstack")
+"""Of MuJoCo's buffers; -1 leaves them to MuJoCo."""
+
+_NAN = re.compile(r"""=\s*["'][^"']*(?<![^\s"'])[+-]?nan(?![^\s"'])""", re.IGNORECASE)
+_MOST_CELLS = 4_000_000  # points of a height field, or pixels of a texture
+
+
+def one_line(message: object) -> str:
+    """A message of MuJoCo condensed to one line."""
+    text = str(message).replace("Error=", "").replace("XML Error: Error:", "").replace("XML Error:", "")
+    return " ".join(text.split()).removeprefix("Error: ")
+
+
+def read_spec(path: Path, text: str | None = None) -> mujoco.MjSpec:
+    """Read an MJCF file, or MJCF or URDF text, with everything that it names, into memory.
+
+    Args:
+        path: the file.
+        text: its content where that is not what is to be read.
+
+    Returns:
+        The spec; its files are in `spec.assets`, so that what happens to them on the disk does not matter any more.
+
+    Raises:
+        ValueError: MuJoCo cannot read it, or a file is missing.
+        InputError: in one line without the path, a number is NaN, or something is too large.
+    """
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise InputError("the name of the file or of its folder is not UTF-8; rename it") from None
+    with _caught() as found:
+        spec = mujoco.MjSpec.from_file(str(path)) if text is None else mujoco.MjSpec.from_string(text)
+    if any("NaN" in warning for warning in found):
+        text = path.read_text(encoding="utf-8") if text is None else text
+        lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), 1) if _NAN.search(line)]
+        where = [f"line {n} has a NaN: {line[:80]}" for n, line in lines] or ["a number is NaN"]
+        raise InputError(f"{where[0]}; give plain numbers")
+    for kind, items, sides in (
+        ("height field", spec.hfields, ("nrow", "ncol")),
+        ("texture", spec.textures, ("width", "height")),
+    ):
+        for item in items:
+            first, second = (getattr(item, side) for side in sides)
+            if first * second > _MOST_CELLS:
+                raise InputError(f"{kind} '{item.name}' has {first} x {second} cells; at most {_MOST_CELLS} are read")
+    _take_assets(spec, path.parent)
+    return spec
+
+
+def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Compile a spec.
+
+    Args:
+        spec: of `read_spec`, or made from such.
+
+    Returns:
+        The model, every number of which is finite, and every length at most `LARGEST`.
+
+    Raises:
+        ValueError: MuJoCo cannot compile it.
+        InputError: in one line without the path, a number cannot be used.
+    """
+    with _caught() as found:
+        model = spec.compile()
+    if found:
+        raise InputError(f"MuJoCo warns: {one_line(found[0])}")
+    names = sorted((name for name in dir(model) if "_" in name.strip("_")), key=lambda name: not _named(model, name))
+    arrays = {name: getattr(model, name) for name in names}
+    arrays = {name: a for name, a in arrays.items() if isinstance(a, np.ndarray) and a.dtype.kind == "f" and a.size}
+    for name, values in arrays.items():
+        if name.endswith(("_pos", "_size", "mesh_vert")):
+            _check(model, name, np.abs(values) <= LARGEST, f"is more than {LARGEST:g} m")
+        if name.endswith("quat") and not name.startswith("key_"):
+            good = np.abs(np.linalg.norm(values, axis=-1) - 1.0) < 1e-6
+            _check(model, name, good, "is no rotation")
+    for name, values in arrays.items():
+        if not name.startswith("numeric_"):
+            _check(model, name, np.isfinite(values), "is not finite")
+    return model
+
+
+def _check(model: mujoco.MjModel, name: str, good: np.ndarray, what: str) -> None:
+    """Raise, naming the thing, where a number of an array of the model is not good."""
+    if good.all():
+        return
+    row = int(np.argmin(good.reshape(len(good), -1).all(axis=1)))
+    values = getattr(model, name)[row]
+    kind, _, field = name.partition("_")
+    label = f"{kind} '{getattr(model, kind)(row).name or f'{kind}#{row}'}'" if _named(model, name) else f"a {kind}"
+    raise InputError(f"{field} of {label} {what if np.isfinite(values).all() else 'is not finite'}; give plain numbers")
+
+
+def _named(model: mujoco.MjModel, name: str) -> bool:
+    """Whether an array of the model has a row for each thing of a kind that has names."""
+    kind, values = name.partition("_")[0], getattr(model, name)
+    return hasattr(model, kind) and isinstance(values, np.ndarray) and getattr(model, f"n{kind}", -1) == len(values)
+
+
+def fields_of(struct: Any) -> Iterator[tuple[str, Any]]:
+    """Names and values of the public fields of one of MuJoCo's structs."""
+    for name in dir(struct):
+        value = getattr(struct, name)
+        if not name.startswith("_") and not callable(value):
+            yield name, value
+
+
+def copy_fields(source: Any, target: Any) -> None:
+    """Copy the public fields of one of MuJoCo's structs to another, nested structs included."""
+    for name, value in fields_of(source):
+        if isinstance(value, int | float | np.ndarray):
+            setattr(target, name, value)
+        else:
+            copy_fields(value, getattr(target, name))
+
+
+@contextmanager
+def _caught() -> Iterator[list[str]]:
+    """Collect MuJoCo's warnings, which else go to the terminal and to a log file, and make its errors ValueErrors."""
+    found: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(found.append)
+    try:
+        with warnings.catch_warnings(record=True) as others:
+            warnings.simplefilter("always")
+            yield found
+            found += [str(other.message) for other in others]
+    except (mujoco.FatalError, MemoryError) as error:
+        raise ValueError(one_line(error)) from error
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _take_assets(spec: mujoco.MjSpec, folder: Path) -> None:
+    """Read a spec's files under short unique names; those of an attached model are left to MuJoCo."""
+    assets: dict[str, bytes] = {}
+    names: dict[Path, str] = {}
+
+    def taken(name: str, directory: str) -> str:
+        file = (folder / directory / (Path(name).name if spec.strippath else name)).resolve()
+        if not name or not file.is_file():
+            return name
+        if file not in names:
+            names[file] = file.name if file.name not in assets else f"{len(names)}_{file.name}"
+            assets[names[file]] = file.read_bytes()
+        return names[file]
+
+    for item in [*spec.meshes, *spec.hfields, *spec.skins]:
+        item.file = taken(item.file, spec.compiler.meshdir)
+    for item in spec.textures:
+        item.file = taken(item.file, spec.compiler.texturedir)
+        item.cubefiles = [taken(name, spec.compiler.texturedir) for name in item.cubefiles]
+    spec.compiler.meshdir = spec.compiler.texturedir = ""
+    spec.strippath = False
+    spec.assets = assets
