@@ -32,7 +32,7 @@ def arguments() -> argparse.ArgumentParser:
     parser.add_argument("world", type=Path, help="MJCF scene with sites named start and goal")
     cli.add_robot_options(parser)
     cli.add_planning_options(parser)
-    parser.add_argument("--out", type=Path, help="output folder (default: runs/<world>-<robot>-<time>)")
+    parser.add_argument("--out", type=cli.path, help="output folder (default: runs/<world>-<robot>-<time>)")
     parser.add_argument("--no-recording", action="store_true", help="leave the rerun recording out")
     parser.set_defaults(pictures=True)
     return parser
@@ -55,14 +55,13 @@ def main(argv: list[str] | None = None) -> int:
     world = load_world(args.world)
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
-    folder = RunFolder(args.out, world.name, robot.name)
-    display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
-    planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
-    config = pipeline.PipelineConfig(
-        seed=args.seed, time_limit=args.time_limit, candidates=sys.maxsize, until="dynamics"
-    )
-    result = pipeline.run(robot, world, planner, config, display)
-    with folder:
+    with RunFolder(args.out, world.name, robot.name) as folder:  # one that cannot be written is noticed here
+        display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
+        planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
+        config = pipeline.PipelineConfig(
+            seed=args.seed, time_limit=args.time_limit, candidates=sys.maxsize, until="dynamics"
+        )
+        result = pipeline.run(robot, world, planner, config, display)
         write_run(folder.path, result, args, surface_seconds)
     if result.search.solutions:
         display.console.print(solution_table(result.search, result.trial.solution if result.trial else None))

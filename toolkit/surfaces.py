@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import os
 from pathlib import Path
 
 from toolkit import cli
@@ -26,7 +24,7 @@ def arguments() -> argparse.ArgumentParser:
     """The options of this command."""
     parser = cli.parser("surfaces", DESCRIPTION, EPILOG)
     parser.add_argument("world", type=Path, help="MJCF scene with sites named start and goal")
-    parser.add_argument("--out", type=Path, metavar="DIR", help=f"folder for {RECORDING} (default: table only)")
+    parser.add_argument("--out", type=cli.path, metavar="DIR", help=f"folder for {RECORDING} (default: table only)")
     return parser
 
 
@@ -39,7 +37,6 @@ def main(argv: list[str] | None = None) -> int:
     """
     args = arguments().parse_args(argv)
     # The viewer's library takes a second to import: mistakes in the world are reported before.
-    from toolkit.errors import InputError
     from toolkit.world.loader import load_world
 
     world = load_world(args.world)
@@ -50,19 +47,7 @@ def main(argv: list[str] | None = None) -> int:
     console.print(surface_table(world))
     if args.out is None:
         return 0
-    draft = args.out / f".{RECORDING}.tmp"
-    made = [folder for folder in (args.out, *args.out.parents) if not folder.exists()]
-    try:
-        args.out.mkdir(parents=True, exist_ok=True)
-        write_surface_recording(draft, world)
-        os.replace(draft, args.out / RECORDING)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            draft.unlink()
-        for folder in made:
-            with contextlib.suppress(OSError):
-                folder.rmdir()
-        raise InputError(f"{args.out}: cannot be written ({error.strerror or error}); choose another --out") from error
+    write_surface_recording(args.out / RECORDING, world)
     console.print(f"written to {args.out / RECORDING}", soft_wrap=True, markup=False)
     return 0
 

@@ -34,7 +34,7 @@ def arguments() -> argparse.ArgumentParser:
     cli.add_planning_options(parser)
     cli.add_disturbance_options(parser)
     cli.add_execution_options(parser)
-    parser.add_argument("--out", type=Path, help="output folder (default: runs/<world>-<robot>-<time>)")
+    parser.add_argument("--out", type=cli.path, help="output folder (default: runs/<world>-<robot>-<time>)")
     parser.add_argument(
         "--candidates", type=cli.positive(int), default=16, help="sequences to test at most (default: 16)"
     )
@@ -64,20 +64,19 @@ def main(argv: list[str] | None = None) -> int:
     world = load_world(args.world)
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
-    folder = RunFolder(args.out, world.name, robot.name)
-    if args.pictures or args.video:
-        require_rendering()
-    display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
-    config = replace(
-        pipeline.PipelineConfig(),
-        seed=args.seed,
-        time_limit=args.time_limit,
-        candidates=args.candidates,
-        execution=execution,
-    )
-    planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
-    result = pipeline.run(robot, world, planner, config, display)
-    with folder:
+    with RunFolder(args.out, world.name, robot.name) as folder:  # one that cannot be written is noticed here
+        if args.pictures or args.video:
+            require_rendering()
+        display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
+        config = replace(
+            pipeline.PipelineConfig(),
+            seed=args.seed,
+            time_limit=args.time_limit,
+            candidates=args.candidates,
+            execution=execution,
+        )
+        planner = pipeline.make_planner(robot, world, args.planner, planner_config(args))
+        result = pipeline.run(robot, world, planner, config, display)
         write_run(folder.path, result, args, surface_seconds)
     display.verdict(result.checks, result.passed, result.reason, folder.target, time.perf_counter() - began)
     return 0 if result.passed else 1

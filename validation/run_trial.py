@@ -197,7 +197,7 @@ def keep_run(
     options = argparse.Namespace(
         seed=case.seed, planner=settings.planner, robot=settings.robot, no_recording=not settings.recording
     )
-    folder = RunFolder(settings.out / "runs" / (name or case.name), result.world.name, settings.robot)
+    folder = RunFolder(settings.out / "runs" / (name or case.name), result.world.name, settings.robot, [WORLD_FILE])
     with folder:
         write_run(folder.path, result, options, surface_seconds)
         (folder.path / WORLD_FILE).write_text(case.mjcf(), encoding="utf-8")
@@ -206,7 +206,7 @@ def keep_run(
 
 def keep_failure(settings: TrialSettings, case: Case, world: World, reason: str) -> str:
     """The same for a trial that ended before there was anything but its world."""
-    folder = RunFolder(settings.out / "runs" / case.name, world.name, settings.robot)
+    folder = RunFolder(settings.out / "runs" / case.name, world.name, settings.robot, [WORLD_FILE])
     report = RunReport.of(
         world=world.name,
         robot=settings.robot,

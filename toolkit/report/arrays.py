@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import typing
 import zipfile
@@ -21,6 +22,16 @@ from toolkit.report.files import plain
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 T = TypeVar("T")
+
+_TIMES: dict[str, Any] = {
+    "centroidal_seconds": np.float64(np.nan),
+    "wholebody_seconds": np.float64(np.nan),
+    "tick_seconds": np.zeros(0),
+    "replan_seconds": np.float64(np.nan),
+    "real_time_factor": np.float64(np.nan),
+}
+"""What a clock measured, and what is read in its place: it is in the report, and these files are the same whenever the
+run is the same."""
 
 _REPLAY = ("timestep", "qpos0", "qvel0", "ctrl", "qpos", "tick_times")  # kept in double precision
 
@@ -79,7 +90,7 @@ def write_motion(path: Path, motion: CentroidalMotion | None, trajectory: WholeB
         arrays |= flatten(motion, "centroidal_") | {"centroidal_times": motion.problem.times}
     if trajectory is not None:
         arrays |= flatten(trajectory, "wholebody_")
-    np.savez(path, **arrays)  # type: ignore[arg-type]
+    _save(path, arrays)
 
 
 def read_motion(path: Path) -> tuple[CentroidalMotion | None, WholeBodyTrajectory | None]:
@@ -118,7 +129,7 @@ def write_execution(path: Path, execution: Execution) -> None:
         array = np.asarray(value)
         single = isinstance(value, np.ndarray) and array.dtype == float and item.name not in _REPLAY
         arrays[item.name] = array.astype(np.float32) if single else array
-    np.savez(path, **arrays)  # type: ignore[arg-type]
+    _save(path, arrays)
 
 
 def read_execution(path: Path, scene: mujoco.MjModel) -> Execution:
@@ -156,11 +167,18 @@ def _has_default(item: Field) -> bool:
     return item.default is not MISSING or item.default_factory is not MISSING
 
 
+def _save(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write an npz file without what a clock measured: equal arrays make equal files."""
+    content = io.BytesIO()
+    np.savez(content, **{name: array for name, array in arrays.items() if name not in _TIMES})  # type: ignore[arg-type]
+    path.write_bytes(content.getbuffer())
+
+
 def _load(path: Path) -> dict[str, np.ndarray]:
-    """All arrays of an npz file; InputError where it cannot be read."""
+    """All arrays of an npz file, and stand-ins for times; InputError where it cannot be read."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
+            return _TIMES | {name: archive[name] for name in archive.files}
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
     except (ValueError, zipfile.BadZipFile, EOFError) as error:

@@ -13,7 +13,7 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.execution.result import Execution
 from toolkit.report.blueprint import blueprint
-from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, start_recording
+from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, recording
 from toolkit.report.motion_scene import (
     TIMELINE,
     draw_centres,
@@ -79,8 +79,7 @@ def write_recording(
     executed = execution is not None and len(execution.tick_times) > 0
     feasible = motion is not None and motion.feasible
 
-    stream = start_recording(path, APPLICATION, f"{robot.name} in {world.name}")
-    try:
+    with recording(path, APPLICATION, f"{robot.name} in {world.name}") as stream:
         shown = {"executed": executed, "momenta": executed or feasible, "searched": search is not None}
         stream.send_blueprint(blueprint(world.mujoco_model, _way(world, sequence), **shown))
         stream.log("summary", rr.TextDocument(summary(report), media_type=rr.MediaType.MARKDOWN), static=True)
@@ -113,8 +112,6 @@ def write_recording(
             text = rr.TextDocument(search_summary(search), media_type=rr.MediaType.MARKDOWN)
             stream.log("search/solutions", text, static=True)
             draw_search(stream, search, _heights(_way(world, sequence)))
-    finally:
-        stream.disconnect()
 
 
 def _draw_robot(

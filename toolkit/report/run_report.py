@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.centroidal.residual import check, cop_margin, friction_margin
 from toolkit.errors import InputError
@@ -20,7 +22,7 @@ from toolkit.search.result import SearchResult, Solution
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.surface import Surface
 
-SCHEMA = 1
+SCHEMA = 2
 PACKAGES = ("mujoco", "placo", "pin", "casadi", "daqp", "numpy", "scipy", "numba", "rerun-sdk")
 
 SURFACES = ("count", "foot", "palm", "seconds")
@@ -56,6 +58,7 @@ EXECUTION = (
     "replan_seconds",
     "simulated_seconds",
     "real_time_factor",
+    "tick_seconds",
 )
 STAGES = dict(surfaces=SURFACES, planning=PLANNING, dynamics=DYNAMICS, wholebody=WHOLEBODY, execution=EXECUTION)
 """Every stage and its figures, in order. A stage that was not reached has its first figure False, the rest None."""
@@ -250,7 +253,15 @@ def _execution(execution: Execution | None) -> dict[str, Any]:
     """Figures of the simulated execution."""
     figures = _figures(EXECUTION, execution)
     if execution is not None:
+        figures["tick_seconds"] = _spread(execution.tick_seconds)
         figures["unplanned_contacts"] = len(execution.unplanned_contacts)
         figures["unplanned_contact_geoms"] = [list(pair) for pair in execution.unplanned_contacts]
         figures["fall_reason"] = execution.fall_reason
     return figures
+
+
+def _spread(seconds: np.ndarray) -> dict[str, float] | None:
+    """Median, 99th percentile and largest of wall-clock times; None where there are none."""
+    if not len(seconds):
+        return None
+    return {"median": float(np.median(seconds)), "p99": float(np.percentile(seconds, 99)), "max": float(seconds.max())}
