@@ -8,10 +8,10 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from toolkit.errors import InputError, ToolkitError
-from toolkit.interruption import Stopped, end_when_stopped, raise_when_stopped
+from toolkit.interruption import end_when_stopped
 from toolkit.world.timing import LONGEST, Timing
 
 AUTO_TIMINGS = (Timing(1.0, 1.0), Timing(0.4, 0.6), Timing(0.05, 0.35))
@@ -28,6 +28,10 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Leave with exit code 2."""
         self.exit(2, f"error: {' '.join(message.split())}; see {self.prog} --help\n")
+
+    def print_help(self, file: Any = None) -> None:
+        """Print the help; unlike argparse's own, this notices where it cannot be printed."""
+        (file or sys.stdout).write(self.format_help())
 
 
 def parser(module: str, description: str, epilog: str = "") -> argparse.ArgumentParser:
@@ -187,12 +191,8 @@ def run(main: Callable[[list[str] | None], int], argv: list[str] | None = None) 
     Whatever a user can cause is one line on standard error: an error of the toolkit, a file that cannot be read, a
     standard output that takes nothing, a signal.
     """
-    raise_when_stopped()
-    try:
-        code, line = _called(main, argv)
-    except Stopped as stop:  # before or after what `_called` watches
-        code, line = stop.exit_code, stop.word
     end_when_stopped()
+    code, line = _called(main, argv)
     if line:
         sys.stderr.write(line + "\n")
     sys.exit(code)
@@ -210,13 +210,11 @@ def _called(main: Callable[[list[str] | None], int], argv: list[str] | None) -> 
         sys.stdout.flush()
     except ToolkitError as error:
         code, line = error.exit_code, f"error: {' '.join(str(error).split())}"
-    except Stopped as stop:
-        code, line = stop.exit_code, stop.word
     except BrokenPipeError:
         code = 1
     except OSError as error:
-        where = f"{os.fsdecode(error.filename)}: " if isinstance(error.filename, (str, bytes)) else ""
-        code, line = 2, f"error: {where}{error.strerror or error}"
+        where = "standard output" if error.filename is None else os.fsdecode(error.filename)
+        code, line = 2, f"error: {where}: {error.strerror or error}"
     if sys.stdout is not None:
         try:
             sys.stdout.flush()

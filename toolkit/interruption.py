@@ -2,69 +2,48 @@
 
 from __future__ import annotations
 
-import _thread
+import atexit
 import os
 import signal
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
 
-SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 WORDS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
-IMPATIENCE = 2.0  # s; a signal that comes later than this after the first one ends the process at once
-
-
-class Stopped(KeyboardInterrupt):
-    """A signal asked the command to end.
-
-    Attributes:
-        exit_code: What a shell shows for a process that the signal ended.
-        word: What is said on standard error.
-    """
-
-    def __init__(self, number: int):
-        super().__init__(number)
-        self.exit_code, self.word = 128 + number, WORDS[signal.Signals(number).name]
-
-
-def raise_when_stopped() -> None:
-    """Raise `Stopped` in the main thread when a signal asks the process to end, from now on until it ends.
-
-    A signal that the process was started to ignore (by nohup, or in the background of a script) stays ignored.
-    Where the exception is swallowed by a callback that cannot raise, it is raised again.
-    """
-    first: list[float] = []
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        if not first:
-            first.append(time.monotonic())
-            raise Stopped(number)
-        if time.monotonic() - first[0] > IMPATIENCE:
-            os._exit(128 + number)
-
-    def swallowed(failure: Any) -> None:
-        if not isinstance(failure.exc_value, Stopped):
-            return usual(failure)
-        first.clear()
-        again = threading.Timer(0.02, _thread.interrupt_main, failure.exc_value.args)
-        again.daemon = True
-        again.start()
-
-    usual, sys.unraisablehook = sys.unraisablehook, swallowed
-    for number in SIGNALS:
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, stop)
+SIGNALS = tuple(getattr(signal, name) for name in WORDS if hasattr(signal, name))
+PATIENCE = 5.0  # s; what has not been cleared away by then stays
 
 
 def end_when_stopped() -> None:
-    """Let a signal end the process at once and without a word: everything that was to be cleared away is."""
+    """Let a signal end the process from now on: clear away, one line on standard error, and 128 + its number as code.
+
+    Nothing is raised in whatever is at work then: compiled extensions turn an exception into another one, or swallow
+    it. What has to be cleared away is registered with `weakref.finalize` or `atexit` instead. A signal that the process
+    was started to ignore (by nohup, or in the background of a script) stays ignored.
+    """
+    stopped: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        if stopped:
+            return
+        stopped.append(number)
+        late = threading.Timer(PATIENCE, os._exit, [128 + number])
+        late.daemon = True
+        late.start()
+        if "multiprocessing" in sys.modules:
+            for child in sys.modules["multiprocessing"].active_children():
+                child.terminate()
+        atexit._run_exitfuncs()
+        try:
+            os.write(2, f"{WORDS[signal.Signals(number).name]}\n".encode())
+        finally:
+            os._exit(128 + number)
+
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, signal.SIG_DFL)
+            signal.signal(number, stop)
 
 
 @contextmanager
@@ -76,11 +55,12 @@ def undisturbed() -> Iterator[None]:
     came: list[int] = []
     usual = {number: signal.getsignal(number) for number in SIGNALS}
     for number in SIGNALS:
-        signal.signal(number, lambda number, frame: came.append(number))
+        if usual[number] is not signal.SIG_IGN:
+            signal.signal(number, lambda number, frame: came.append(number))
     try:
         yield
     finally:
         for number, handler in usual.items():
             signal.signal(number, handler)
-    if came:
-        signal.raise_signal(came[0])
+        if came:
+            signal.raise_signal(came[0])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
 from pathlib import Path
 
 from toolkit import cli
@@ -48,6 +47,8 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     args = arguments().parse_args(argv)
     # Heavy imports come after the options, so that --help and mistakes in them answer at once.
+    from dataclasses import replace
+
     from toolkit import pipeline
     from toolkit.execution.options import execution_config
     from toolkit.report.console import StageConsole

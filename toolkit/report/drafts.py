@@ -103,18 +103,16 @@ def write_whole(path: Path, content: bytes, option: str = "--out") -> None:
             return
         if place.exists() and not place.is_file():
             raise InputError(f"{path}: is a folder or no ordinary file; choose another {option}")
-        draft = draft_in(place.parent)
-        try:
-            with undisturbed():
+        with undisturbed():
+            try:
                 made += make_folders(place.parent)
                 clear_drafts(place.parent)
-            draft.write_bytes(content)
-            os.replace(draft, place)
-        except BaseException:
-            with undisturbed():
-                remove(draft)
+                draft_in(place.parent).write_bytes(content)
+                os.replace(draft_in(place.parent), place)
+            except OSError:
+                remove(draft_in(place.parent))
                 remove_folders(made)
-            raise
+                raise
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another {option}") from error
 

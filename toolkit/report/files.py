@@ -255,7 +255,7 @@ def write_scene(path: Path, scene: mujoco.MjModel) -> None:
     """Save a compiled model; `mujoco.MjModel.from_binary_path` reads it."""
     content = np.zeros(mujoco.mj_sizeModel(scene), np.uint8)
     mujoco.mj_saveModel(scene, None, content)
-    path.write_bytes(content)
+    path.write_bytes(content.tobytes())
 
 
 def read_scene(path: Path) -> mujoco.MjModel:
