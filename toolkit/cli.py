@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import logging
 import os
 import sys
 from collections.abc import Callable
@@ -20,6 +21,11 @@ EXIT_CODES = "exit codes: 0 success, 1 a plan or check failed (the reason is pri
 
 LARGEST = 2**31 - 1
 """Largest count that a command accepts, and the largest seed: what every library behind it can hold."""
+
+
+_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""How many threads a library of matrix products takes: one, since more of them change a result's last digits, and the
+matrices are small."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -192,6 +198,8 @@ def run(main: Callable[[list[str] | None], int], argv: list[str] | None = None) 
     standard output that takes nothing, a signal.
     """
     end_when_stopped()
+    os.environ.update(dict.fromkeys(_BLAS_THREADS, "1"))
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # that it found no folder for its cache is no news
     code, line = _called(main, argv)
     if line:
         sys.stderr.write(line + "\n")

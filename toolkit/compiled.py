@@ -11,6 +11,7 @@ written, in numba's folder of the user. Where neither can be written, it is comp
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import hashlib
 import types
@@ -87,7 +88,8 @@ class _SourceCache(FunctionCache):
 
     def _save_overload(self, sig, data):
         self._digest()
-        super()._save_overload(sig, data)
+        with contextlib.suppress(OSError):  # the disk is full, or no longer to be written: compile it anew next time
+            super()._save_overload(sig, data)
 
     def _digest(self) -> None:
         """Stamp the index with the digest instead of the file's time; late, since callees may be defined late."""
