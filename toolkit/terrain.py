@@ -25,13 +25,15 @@ examples:
 
 MOST = 100
 """Most rows, columns or steps of a world, and most walls."""
+GREATEST = 1000.0
+"""Greatest length in m, angle in degrees or time in s."""
 
 
 def _finite(text: str) -> float:
-    """An argparse type: a finite number."""
+    """An argparse type: a number, no larger than worlds are."""
     value = float(text)
-    if not abs(value) < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+    if not abs(value) <= GREATEST:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from -{GREATEST:g} to {GREATEST:g}")
     return value
 
 

@@ -365,6 +365,8 @@ def test_equal_arrays_make_equal_files_whatever_the_clock_said(run, tmp_path):
         (lambda plan: plan["start"][0].update(surface=1e400), "start is broken"),
         (lambda plan: plan["start"][0].update(friction=10**400), "start is broken"),
         (lambda plan: plan["start"][0].update(friction=-1), "friction above zero"),
+        (lambda plan: plan["start"][0].update(position=[1e308, 0, 0]), "numbers within 10000"),
+        (lambda plan: plan["start"][0].update(quaternion_wxyz=[1e-300, 0, 0, 0]), "not all zero"),
         (lambda plan: plan["transitions"][0]["times"].update(swing=1e9), "at most 10 s"),
         (lambda plan: plan["transitions"][0]["times"].update(shift=10**400), "is broken: int too large"),
     ],

@@ -18,6 +18,8 @@ from toolkit.search.result import Solution
 from toolkit.world.timing import LONGEST, Timing
 
 SCHEMA = 1
+LARGEST = 1e4
+"""Greatest number that a contact may have: no world is so large in m."""
 
 
 def write_plan(
@@ -113,11 +115,12 @@ def _read_contact(entry: dict[str, Any]) -> Contact:
     """Inverse of `_contact_entry`; KeyError, TypeError or ValueError where it is broken."""
     position = np.array(entry["position"], float)
     quaternion_wxyz = np.array(entry["quaternion_wxyz"], float)
-    if position.shape != (3,) or quaternion_wxyz.shape != (4,) or not np.linalg.norm(quaternion_wxyz) > 0:
+    if position.shape != (3,) or quaternion_wxyz.shape != (4,) or not np.abs(quaternion_wxyz).max() > 1e-6:
         raise ValueError("position needs 3 numbers, quaternion_wxyz 4 that are not all zero")
     friction, surface = float(entry["friction"]), int(entry["surface"])
-    if not (np.isfinite(position).all() and np.isfinite(quaternion_wxyz).all() and 0 < friction < np.inf):
-        raise ValueError("position, quaternion_wxyz and friction must be finite numbers, friction above zero")
+    numbers = np.abs([*position, *quaternion_wxyz, friction])
+    if not (numbers <= LARGEST).all() or friction <= 0:
+        raise ValueError(f"position, quaternion_wxyz and friction are numbers within {LARGEST:g}, friction above zero")
     if not abs(surface) < 2**31:
         raise ValueError("surface is no index of a surface")
     return Contact(Limb.from_label(entry["limb"]), Pose.from_quaternion(position, quaternion_wxyz), friction, surface)
