@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import io
+import logging
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from toolkit.errors import InputError, ToolkitError
-from toolkit.world.timing import Timing
+from toolkit.interruption import end_when_stopped
+from toolkit.world.timing import LONGEST, Timing
 
 if TYPE_CHECKING:
     from toolkit.execution.config import ExecutionConfig
@@ -23,9 +25,30 @@ AUTO_TIMINGS = (Timing(1.0, 1.0), Timing(0.4, 0.6), Timing(0.05, 0.35))
 EXIT_CODES = "exit codes: 0 success, 1 a plan or check failed (the reason is printed), 2 bad input"
 
 
+LARGEST = 2**31 - 1
+"""Largest count that a command accepts, and the largest seed: what every library behind it can hold."""
+
+
+_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""How many threads a library of matrix products takes: one, since more of them change a result's last digits, and the
+matrices are small."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that says in one line what is wrong with a command line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Leave with exit code 2."""
+        self.exit(2, f"error: {' '.join(message.split())}; see {self.prog} --help\n")
+
+    def print_help(self, file: Any = None) -> None:
+        """Print the help; unlike argparse's own, this notices where it cannot be printed."""
+        (file or sys.stdout).write(self.format_help())
+
+
 def parser(module: str, description: str, epilog: str = "") -> argparse.ArgumentParser:
     """Argument parser of `python -m toolkit.<module>` whose help teaches."""
-    return argparse.ArgumentParser(
+    return _Parser(
         prog=f"python -m toolkit.{module}",
         description=description,
         epilog=f"{epilog}\n\n{EXIT_CODES}".strip(),
@@ -46,7 +69,7 @@ def add_robot_options(target: argparse.ArgumentParser) -> None:
 
 def add_planning_options(target: argparse.ArgumentParser) -> None:
     """Add what every command that plans understands."""
-    target.add_argument("--seed", type=int, default=0, help="seed of every random draw (default: %(default)s)")
+    target.add_argument("--seed", type=seed, default=0, help="seed of every random draw (default: %(default)s)")
     target.add_argument(
         "--planner",
         choices=("auto", "learned", "optimiser", "kinematic", "quasi-static"),
@@ -186,31 +209,6 @@ def plain_options(args: argparse.Namespace) -> dict[str, Any]:
     return {k: v for k, v in values if isinstance(v, (bool, int, float, str, Path)) and k not in ("seed", "out")}
 
 
-@contextmanager
-def whole_file(path: Path, *, parents: bool = False) -> Iterator[Path]:
-    """A file to write into, which appears as `path` only when the block has ended without an error.
-
-    Args:
-        path: The file.
-        parents: Whether to make the folders that it lies in; they are removed again where nothing could be written.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    draft = path.with_name(f".{path.name}.tmp")
-    made = [folder for folder in path.parents if parents and not folder.exists()]
-    try:
-        for folder in reversed(made):
-            folder.mkdir()
-        yield draft
-        os.replace(draft, path)
-    except OSError as error:
-        for remove in (draft.unlink, *(folder.rmdir for folder in made)):
-            with suppress(OSError):
-                remove()
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another --out") from error
-
-
 def _terrain_error(text: str) -> tuple[float, float]:
     """An argparse type: metres, or metres and degrees."""
     parts = text.split(",")
@@ -239,18 +237,38 @@ def timing(text: str) -> tuple[Timing, ...]:
         shift, swing = (float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not SHIFT,SWING in seconds, nor auto") from None
-    if not (0 < shift < float("inf") and 0 < swing < float("inf")):
-        raise argparse.ArgumentTypeError(f"{text}: both times must be above zero")
+    if not (0 < shift <= LONGEST and 0 < swing <= LONGEST):
+        raise argparse.ArgumentTypeError(f"{text}: both times must be above zero and at most {LONGEST:g} s")
     return (Timing(shift, swing),)
 
 
-def positive(kind: Callable[[str], float]) -> Callable[[str], float]:
-    """An argparse type: a number of `kind` that is finite and above zero."""
+def path(text: str) -> Path:
+    """An argparse type: a path that names something."""
+    if not text:
+        raise argparse.ArgumentTypeError("is empty; give a path")
+    return Path(text)
+
+
+def seed(text: str) -> int:
+    """An argparse type: the seed of random draws."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if not 0 <= value <= LARGEST:
+        raise argparse.ArgumentTypeError(f"{text}: give a whole number from 0 to {LARGEST}")
+    return value
+
+
+def positive(kind: Callable[[str], float], largest: int = LARGEST) -> Callable[[str], float]:
+    """An argparse type: a number of `kind` above zero; a count is at most `largest`, any other number is finite."""
 
     def convert(text: str) -> float:
         value = kind(text)
         if not 0 < value < float("inf"):
             raise argparse.ArgumentTypeError(f"{text} is not above zero")
+        if kind is int and value > largest:
+            raise argparse.ArgumentTypeError(f"{text} is above {largest}, the most that is accepted")
         return value
 
     convert.__name__ = f"positive {kind.__name__}"
@@ -258,17 +276,64 @@ def positive(kind: Callable[[str], float]) -> Callable[[str], float]:
 
 
 def run(main: Callable[[list[str] | None], int], argv: list[str] | None = None) -> None:
-    """Call `main`, turn toolkit errors into one line on stderr, and leave with the exit code."""
-    try:
-        code = main(argv)
-    except ToolkitError as error:
-        message = " ".join(str(error).split())
-        sys.stderr.write(f"error: {message}\n")
-        code = error.exit_code
-    except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
-        code = 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 1
+    """Call `main` and leave with its exit code.
+
+    Whatever a user can cause is one line on standard error: an error of the toolkit, a file that cannot be read, a
+    standard output that takes nothing, a signal.
+    """
+    end_when_stopped()
+    os.environ.update(dict.fromkeys(_BLAS_THREADS, "1"))
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # that it found no folder for its cache is no news
+    code, line = _called(main, argv)
+    if line:
+        sys.stderr.write(line + "\n")
     sys.exit(code)
+
+
+def _called(main: Callable[[list[str] | None], int], argv: list[str] | None) -> tuple[int, str]:
+    """Exit code of `main`, and the line for standard error, "" for none."""
+    code, line = 0, ""
+    try:
+        _check_surroundings()
+        try:
+            code = main(argv)
+        except SystemExit as left:  # argparse has said why
+            code = left.code if isinstance(left.code, int) else 0
+        sys.stdout.flush()
+    except ToolkitError as error:
+        code, line = error.exit_code, f"error: {' '.join(str(error).split())}"
+    except BrokenPipeError:
+        code = 1
+    except OSError as error:
+        where = "standard output" if error.filename is None else os.fsdecode(error.filename)
+        code, line = 2, f"error: {where}: {error.strerror or error}"
+    if sys.stdout is not None:
+        try:
+            sys.stdout.flush()
+        except OSError:  # what is left in its buffer has nowhere to go
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return code, line
+
+
+def _check_surroundings() -> None:
+    """See that there are standard streams that take any text, and a working directory.
+
+    Raises:
+        InputError: standard output is closed, or the working directory is gone.
+    """
+    closed = sys.stdout is None
+    for descriptor in range(3):  # else the next file that is opened becomes a standard stream
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")
+    if closed:
+        raise InputError("standard output is closed; send it to /dev/null where it is not wanted")
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        os.getcwd()
+    except OSError:
+        raise InputError("the working directory no longer exists; change into another one") from None

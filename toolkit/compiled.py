@@ -13,6 +13,7 @@ A formula that Python, NumPy arrays, CasADi's symbols and compiled functions sha
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import hashlib
 import types
@@ -98,7 +99,8 @@ class _SourceCache(FunctionCache):
 
     def _save_overload(self, sig, data):
         self._digest()
-        super()._save_overload(sig, data)
+        with contextlib.suppress(OSError):  # the disk is full, or no longer to be written: compile it anew next time
+            super()._save_overload(sig, data)
 
     def _digest(self) -> None:
         """Stamp the index with the digest instead of the file's time; late, since callees may be defined late."""

@@ -32,7 +32,7 @@ def arguments() -> argparse.ArgumentParser:
     parser.add_argument("world", type=Path, help="MJCF scene with sites named start and goal")
     cli.add_robot_options(parser)
     cli.add_planning_options(parser)
-    parser.add_argument("--out", type=Path, help="output folder (default: runs/<world>-<robot>-<time>)")
+    parser.add_argument("--out", type=cli.path, help="output folder (default: runs/<world>-<robot>-<time>)")
     parser.add_argument("--no-recording", action="store_true", help="leave the rerun recording out")
     parser.set_defaults(pictures=True)
     return parser
@@ -55,13 +55,12 @@ def main(argv: list[str] | None = None) -> int:
     world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
-    folder = RunFolder(args.out, world.name, robot.name)
-    display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
-    planner = make_planner(robot, world, options.planner, options.planner_config())
-    config = PipelineConfig(seed=args.seed, time_limit=options.time_limit, candidates=sys.maxsize, until="dynamics")
-    result = run(robot, world, planner, config, display)
-    written = RunOptions(not args.no_recording, args.pictures, False, surface_seconds, cli.plain_options(args))
-    with folder:
+    with RunFolder(args.out, world.name, robot.name) as folder:  # one that cannot be written is noticed here
+        display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
+        planner = make_planner(robot, world, options.planner, options.planner_config())
+        config = PipelineConfig(seed=args.seed, time_limit=options.time_limit, candidates=sys.maxsize, until="dynamics")
+        result = run(robot, world, planner, config, display)
+        written = RunOptions(not args.no_recording, args.pictures, False, surface_seconds, cli.plain_options(args))
         write_run(folder.path, result, written)
     if result.search.solutions:
         display.console.print(solution_table(result.search, result.trial.solution if result.trial else None))

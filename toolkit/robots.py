@@ -7,18 +7,15 @@ python -m toolkit.robots NAME --picture OUT.png        its home posture, rendere
 
 from __future__ import annotations
 
+import typing
 from pathlib import Path
 
-import imageio.v3 as imageio
-from rich.console import Console
-from rich.table import Table
-
 from toolkit import cli
-from toolkit.errors import InputError, RobotError
-from toolkit.robot.description import FILE_NAME, read_description
-from toolkit.robot.loader import find_robots, load_robot, robots_folder
-from toolkit.robot.model import RobotModel
-from toolkit.robot.picture import render_home
+
+if typing.TYPE_CHECKING:
+    from rich.console import Console
+
+    from toolkit.robot.model import RobotModel
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -35,10 +32,15 @@ def main(argv: list[str] | None = None) -> int:
     """
     parser = cli.parser("robots", "List the robots, describe one, or picture one.")
     parser.add_argument("name", nargs="?", help="a robot's name or folder; all robots where left out")
-    parser.add_argument("--picture", type=Path, metavar="OUT.png", help="render the home posture into this file")
+    parser.add_argument("--picture", type=cli.path, metavar="OUT.png", help="render the home posture into this file")
     parser.add_argument("--robots", type=Path, metavar="DIR", help="folder with the robots (default: robots/)")
     options = parser.parse_args(argv)
-    console = Console()
+    # Heavy imports come after the options, so that --help and mistakes in them answer at once.
+    from toolkit.errors import InputError
+    from toolkit.report.console import make_console
+    from toolkit.robot.loader import find_robots, load_robot
+
+    console = make_console()
     if options.name is None:
         if options.picture:
             raise InputError("--picture needs the name of a robot: one of " + ", ".join(find_robots(options.robots)))
@@ -55,6 +57,12 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _list(console: Console, robots_dir: Path | None) -> int:
+    from rich.table import Table
+
+    from toolkit.errors import RobotError
+    from toolkit.robot.description import FILE_NAME, read_description
+    from toolkit.robot.loader import find_robots, load_robot, robots_folder
+
     names = find_robots(robots_dir)
     if not names:
         raise RobotError(f"no robot in {robots_folder(robots_dir)}: a robot is a folder with a {FILE_NAME}")
@@ -79,6 +87,10 @@ def _list(console: Console, robots_dir: Path | None) -> int:
 
 
 def _describe(console: Console, robot: RobotModel) -> None:
+    from rich.table import Table
+
+    from toolkit.robot.description import FILE_NAME, read_description
+
     facts = read_description(robot.folder / FILE_NAME)
     console.print(f"{robot.name}: {facts.description}\nlicence {facts.licence}; source: {facts.source}", markup=False)
     console.print(f"{robot.mass:.2f} kg, CoM at {robot.com_height:.3f} m, {len(robot.joint_names)} joints")
@@ -100,12 +112,13 @@ def _describe(console: Console, robot: RobotModel) -> None:
 
 
 def _picture(robot: RobotModel, path: Path) -> None:
-    pixels = render_home(robot)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        imageio.imwrite(path, pixels)
-    except OSError as error:
-        raise InputError(f"--picture {path}: cannot be written ({error.strerror})") from None
+    import imageio.v3 as imageio
+
+    from toolkit.report.drafts import write_whole
+    from toolkit.robot.picture import render_home
+
+    picture = imageio.imwrite("<bytes>", render_home(robot), extension=path.suffix.lower())
+    write_whole(path, typing.cast(bytes, picture), "--picture")
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ def arguments() -> argparse.ArgumentParser:
     """The options of this command."""
     parser = cli.parser("surfaces", DESCRIPTION, EPILOG)
     parser.add_argument("world", type=Path, help="MJCF scene with sites named start and goal")
-    parser.add_argument("--out", type=Path, metavar="DIR", help=f"folder for {RECORDING} (default: table only)")
+    parser.add_argument("--out", type=cli.path, metavar="DIR", help=f"folder for {RECORDING} (default: table only)")
     return parser
 
 
@@ -51,8 +51,7 @@ def main(argv: list[str] | None = None) -> int:
     console.print(surface_table(world))
     if args.out is None:
         return 0
-    with cli.whole_file(args.out / RECORDING, parents=True) as draft:
-        write_surface_recording(draft, world)
+    write_surface_recording(args.out / RECORDING, world)
     console.print(f"written to {args.out / RECORDING}", soft_wrap=True, markup=False)
     return 0
 

@@ -23,11 +23,17 @@ examples:
 """
 
 
+MOST = 100
+"""Most rows, columns or steps of a world, and most walls."""
+GREATEST = 1000.0
+"""Greatest length in m, angle in degrees or time in s."""
+
+
 def _finite(text: str) -> float:
-    """An argparse type: a finite number."""
+    """An argparse type: a number, no larger than worlds are."""
     value = float(text)
-    if not abs(value) < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+    if not abs(value) <= GREATEST:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from -{GREATEST:g} to {GREATEST:g}")
     return value
 
 
@@ -40,15 +46,15 @@ def arguments() -> argparse.ArgumentParser:
     for kind, generator in KINDS.items():
         text = inspect.getdoc(generator) or ""
         options = kinds.add_parser(kind, description=text.splitlines()[0])
-        options.add_argument("--seed", type=int, default=0, help="seed of everything random (default: 0)")
-        options.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: standard output)")
+        options.add_argument("--seed", type=cli.seed, default=0, help="of everything random (default: 0)")
+        options.add_argument("--out", type=cli.path, metavar="FILE", help="file to write (default: standard output)")
         described = dict(line.strip().split(": ", 1) for line in text.splitlines() if ": " in line)
         for name, parameter in inspect.signature(generator, eval_str=True).parameters.items():
             if parameter.kind is not inspect.Parameter.KEYWORD_ONLY:
                 continue
             options.add_argument(
                 f"--{name.replace('_', '-')}",
-                type=cli.positive(int) if parameter.annotation is int else _finite,
+                type=cli.positive(int, MOST) if parameter.annotation is int else _finite,
                 default=parameter.default,
                 help=f"{described[name].rstrip('.')} (default: {parameter.default:g})",
             )
@@ -64,20 +70,17 @@ def main(argv: list[str] | None = None) -> int:
     options = vars(arguments().parse_args(argv))
     import numpy as np
 
-    from toolkit.errors import InputError
+    from toolkit.report.drafts import write_whole
     from toolkit.world.generators import KINDS
     from toolkit.world.loader import load_world
 
     kind, seed, out = options.pop("kind"), options.pop("seed"), options.pop("out")
-    if seed < 0:
-        raise InputError(f"--seed {seed}: give a whole number from 0 on")
     text = KINDS[kind](np.random.default_rng(seed), **options)
     load_world(out or Path(f"{kind}.xml"), mjcf=text)  # what is written can be used
     if out is None:
         sys.stdout.write(text)
-        return 0
-    with cli.whole_file(out) as draft:
-        draft.write_text(text)
+    else:
+        write_whole(out, text.encode())
     return 0
 
 

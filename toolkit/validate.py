@@ -33,7 +33,7 @@ def arguments() -> argparse.ArgumentParser:
     cli.add_planning_options(parser)
     cli.add_disturbance_options(parser)
     cli.add_execution_options(parser)
-    parser.add_argument("--out", type=Path, help="output folder (default: runs/<world>-<robot>-<time>)")
+    parser.add_argument("--out", type=cli.path, help="output folder (default: runs/<world>-<robot>-<time>)")
     parser.add_argument(
         "--candidates", type=cli.positive(int), default=16, help="sequences to test at most (default: 16)"
     )
@@ -62,17 +62,16 @@ def main(argv: list[str] | None = None) -> int:
     world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot, args.robots)
-    folder = RunFolder(args.out, world.name, robot.name)
-    if args.pictures or args.video:
-        require_rendering()
-    display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
-    planner = make_planner(robot, world, options.planner, options.planner_config())
-    config = PipelineConfig(
-        seed=args.seed, time_limit=options.time_limit, candidates=args.candidates, execution=execution
-    )
-    result = run(robot, world, planner, config, display)
-    written = RunOptions(not args.no_recording, args.pictures, args.video, surface_seconds, cli.plain_options(args))
-    with folder:
+    with RunFolder(args.out, world.name, robot.name) as folder:  # one that cannot be written is noticed here
+        if args.pictures or args.video:
+            require_rendering()
+        display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
+        planner = make_planner(robot, world, options.planner, options.planner_config())
+        config = PipelineConfig(
+            seed=args.seed, time_limit=options.time_limit, candidates=args.candidates, execution=execution
+        )
+        result = run(robot, world, planner, config, display)
+        written = RunOptions(not args.no_recording, args.pictures, args.video, surface_seconds, cli.plain_options(args))
         write_run(folder.path, result, written)
     display.verdict(result.checks, result.passed, result.reason, folder.target, time.perf_counter() - began)
     return 0 if result.passed else 1

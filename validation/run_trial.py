@@ -196,7 +196,7 @@ def keep_run(
         surface_seconds=surface_seconds,
         settings={"planner": settings.planner, "robot": settings.robot},
     )
-    folder = RunFolder(settings.out / "runs" / (name or case.name), result.world.name, settings.robot)
+    folder = RunFolder(settings.out / "runs" / (name or case.name), result.world.name, settings.robot, [WORLD_FILE])
     with folder:
         write_run(folder.path, result, options)
         (folder.path / WORLD_FILE).write_text(case.mjcf(), encoding="utf-8")
@@ -205,7 +205,7 @@ def keep_run(
 
 def keep_failure(settings: TrialSettings, case: Case, world: World, reason: str) -> str:
     """The same for a trial that ended before there was anything but its world."""
-    folder = RunFolder(settings.out / "runs" / case.name, world.name, settings.robot)
+    folder = RunFolder(settings.out / "runs" / case.name, world.name, settings.robot, [WORLD_FILE])
     report = RunReport.without_search(world, settings.robot, case.seed, reason, {"planner": settings.planner})
     with folder:
         write_report(folder.path / REPORT, report)

@@ -2,7 +2,13 @@
 
 import errno
 import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -13,20 +19,50 @@ from toolkit.contacts.failure import Failure
 from toolkit.errors import InputError
 from toolkit.execution.check import Result
 from toolkit.report.arrays import write_execution, write_motion
+from toolkit.report.drafts import clear_drafts, draft_in, write_whole
 from toolkit.report.files import REPORT, RunFolder, read_json, write_json, write_scene
 from toolkit.report.plan_file import read_plan, write_plan
 from toolkit.report.run_report import STAGES, RunReport, write_report
 
+ROOT = Path(__file__).resolve().parents[2]
+CLOCKED = ("seconds", "tick_seconds", "replan_seconds", "real_time_factor")
+
+
+EARLIER = '{"schema": 2, "verdict": "PASS", "stages": {}}'
+
 
 def finish(folder):
-    (folder.path / REPORT).write_text("{}")
+    (folder.path / REPORT).write_text(EARLIER)
+
+
+def names(folder):
+    return sorted(os.listdir(folder))
+
+
+def earlier_run(folder, text=EARLIER):
+    folder.mkdir()
+    (folder / REPORT).write_text(text)
+    return folder
+
+
+def left_by_a_killed_run(target):
+    """Start a run in another process and kill it."""
+    text = (
+        "import os, pathlib, sys, time; from toolkit.report.files import RunFolder\n"
+        "with RunFolder(pathlib.Path(sys.argv[1]), 'w', 'r') as folder:\n"
+        "    (folder.path / 'plan.json').write_text('half'); os.kill(os.getpid(), 9)"
+    )
+    done = subprocess.run([sys.executable, "-c", text, str(target)], cwd=ROOT, check=False)
+    assert done.returncode == -9
+    assert len(names(target)) == 1 and names(target)[0].endswith(".tmp")
 
 
 def test_the_folder_appears_whole(tmp_path):
     with RunFolder(tmp_path / "a" / "run", "w", "r") as folder:
+        (folder.path / "plan.json").write_text("{}")
         finish(folder)
-        assert not (tmp_path / "a" / "run").exists()
-    assert [path.name for path in (tmp_path / "a").iterdir()] == ["run"]
+        assert all(name.startswith(".") for name in names(tmp_path / "a" / "run"))
+    assert names(tmp_path / "a") == ["run"] and names(tmp_path / "a" / "run") == ["plan.json", REPORT]
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
@@ -44,36 +80,91 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path):
 
 
 def test_an_exception_keeps_the_earlier_run(tmp_path):
-    target = tmp_path / "run"
-    target.mkdir()
-    (target / REPORT).write_text("old")
+    target = earlier_run(tmp_path / "run")
     with pytest.raises(ValueError), RunFolder(target, "w", "r") as folder:
-        finish(folder)
+        (folder.path / REPORT).write_text("new")
         raise ValueError
-    assert (target / REPORT).read_text() == "old"
-    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+    assert (target / REPORT).read_text() == EARLIER
+    assert names(tmp_path) == ["run"] and names(target) == [REPORT]
 
 
-def test_an_earlier_run_is_replaced_as_a_whole(tmp_path):
-    target = tmp_path / "run"
-    target.mkdir()
-    (target / REPORT).write_text("old")
-    (target / "left over").write_text("old")
+def test_an_earlier_run_is_replaced_as_a_whole_and_its_folder_stays(tmp_path):
+    target = earlier_run(tmp_path / "run")
+    (target / "strip.png").write_text("old")
+    before = target.stat().st_ino
     with RunFolder(target, "w", "r") as folder:
-        finish(folder)
-    assert [path.name for path in target.iterdir()] == [REPORT]
-    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+        (folder.path / REPORT).write_text("new")
+        assert names(target)[1:] == [REPORT, "strip.png"]
+    assert names(target) == [REPORT] and (target / REPORT).read_text() == "new"
+    assert names(tmp_path) == ["run"] and target.stat().st_ino == before
+
+
+def test_files_that_cannot_all_be_moved_stay_as_they_were(tmp_path, monkeypatch):
+    target = earlier_run(tmp_path / "run")
+    (target / "plan.json").write_text("old")
+    rename = Path.rename
+
+    def failing(self, place):
+        if self.name == "motion.npz":
+            raise OSError(errno.EIO, "Input/output error")
+        return rename(self, place)
+
+    monkeypatch.setattr(Path, "rename", failing)
+    with pytest.raises(InputError, match="Input/output error"), RunFolder(target, "w", "r") as folder:
+        for name in ("plan.json", "motion.npz", REPORT):
+            (folder.path / name).write_text("new")
+    assert names(target) == ["plan.json", REPORT]
+    assert (target / "plan.json").read_text() == "old" and (target / REPORT).read_text() == EARLIER
+
+
+@pytest.mark.parametrize("strange", ["thesis.txt", "data/", "plan.json/", "recording.rrd@"])
+def test_what_no_run_has_written_is_never_removed(tmp_path, strange):
+    target = earlier_run(tmp_path / "run")
+    path = target / strange.rstrip("/@")
+    if strange.endswith("/"):
+        path.mkdir()
+    elif strange.endswith("@"):
+        path.symlink_to("/etc/hostname")
+    else:
+        path.write_text("precious")
+    with pytest.raises(InputError, match=f"holds {path.name}, which no run has written"):
+        RunFolder(target, "w", "r")
+    assert names(target) == sorted([path.name, REPORT])
+
+
+def test_a_report_of_another_program_is_no_earlier_run(tmp_path):
+    for text in ("{}", "[1]", "report", '{"schema": 2}'):
+        target = earlier_run(tmp_path / "run", text)
+        with pytest.raises(InputError, match="not an earlier run"):
+            RunFolder(target, "w", "r")
+        shutil.rmtree(target)
 
 
 def test_a_foreign_folder_is_refused_before_anything_is_done(tmp_path):
     (tmp_path / "thesis.txt").write_text("precious")
     with pytest.raises(InputError, match="not an earlier run"):
         RunFolder(tmp_path, "w", "r")
+    with pytest.raises(InputError, match="not an earlier run"):
+        RunFolder(Path("/"), "w", "r")
     with pytest.raises(InputError, match="is a file"):
         RunFolder(tmp_path / "thesis.txt", "w", "r")
     with pytest.raises(InputError, match="cannot write into .*thesis.txt; give --out another folder"):
         RunFolder(tmp_path / "thesis.txt" / "a" / "run", "w", "r")
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "a/" + "ö" * 200, "/proc/none/run", "y" * 5000])
+def test_a_folder_that_cannot_be_made_is_found_out_at_the_start(tmp_path, name):
+    with pytest.raises(InputError, match="cannot write"), RunFolder(tmp_path / name, "w", "r"):
+        pytest.fail("the run began")
+    assert names(tmp_path) == []
+
+
+def test_a_file_that_comes_into_the_folder_meanwhile_is_kept(tmp_path):
+    with pytest.raises(InputError, match="plan.json has come into it"), RunFolder(tmp_path / "run", "w", "r") as folder:
+        finish(folder)
+        (tmp_path / "run" / "plan.json").write_text("precious")
+    assert names(tmp_path / "run") == ["plan.json"]
 
 
 def test_an_empty_folder_is_used_and_the_default_one_is_named_after_world_and_robot(tmp_path, monkeypatch):
@@ -82,12 +173,75 @@ def test_an_empty_folder_is_used_and_the_default_one_is_named_after_world_and_ro
         finish(folder)
     assert (tmp_path / "run" / REPORT).exists()
     monkeypatch.chdir(tmp_path)
-    with RunFolder(None, "stairs", "walker") as folder:
-        finish(folder)
-    with RunFolder(None, "stairs", "walker") as other:
+    with RunFolder(None, "stairs", "walker") as folder, RunFolder(None, "stairs", "walker") as other:
         finish(other)
+        finish(folder)
     assert folder.target.parent == tmp_path / "runs" and folder.target.name.startswith("stairs-walker-2")
-    assert folder.target != other.target
+    assert folder.target != other.target and names(folder.target) == names(other.target) == [REPORT]
+    with RunFolder(None, "w" * 300, "r\udcff") as folder:
+        finish(folder)
+    assert len(names(tmp_path / "runs")) == 3
+
+
+def test_two_runs_never_share_a_folder(tmp_path):
+    with RunFolder(tmp_path / "run", "w", "r") as folder:
+        with pytest.raises(InputError, match="another run is writing there"):
+            RunFolder(tmp_path / "run", "w", "r")
+        finish(folder)
+    late = RunFolder(tmp_path / "run", "w", "r")
+    with RunFolder(tmp_path / "run", "w", "r") as folder:
+        with pytest.raises(InputError, match="cannot write there|another run is writing there"), late:
+            pass
+        finish(folder)
+    assert names(tmp_path / "run") == [REPORT]
+
+
+def test_what_a_killed_run_left_is_cleared_by_a_later_one(tmp_path, monkeypatch):
+    left_by_a_killed_run(tmp_path / "run")
+    with RunFolder(tmp_path / "run", "w", "r") as folder:
+        finish(folder)
+    assert names(tmp_path / "run") == [REPORT]
+    left_by_a_killed_run(tmp_path / "runs" / "killed")
+    monkeypatch.chdir(tmp_path)
+    with RunFolder(None, "w", "r") as folder:
+        finish(folder)
+    assert names(tmp_path / "runs") == [folder.target.name]
+
+
+def test_a_run_killed_while_its_files_were_moved_is_known_as_one(tmp_path):
+    left_by_a_killed_run(tmp_path / "run")
+    (tmp_path / "run" / "plan.json").write_text("moved already")
+    with RunFolder(tmp_path / "run", "w", "r") as folder:
+        finish(folder)
+    assert names(tmp_path / "run") == [REPORT]
+
+
+def test_drafts_of_processes_that_go_on_or_cannot_be_seen_are_left(tmp_path):
+    (tmp_path / ".elsewhere-0.99999999-5.tmp").mkdir()
+    process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    other = draft_in(tmp_path).name.rpartition(".tmp")[0].rpartition(".")[0]
+    started = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[19]
+    (tmp_path / f"{other}.{process.pid}-{started}.tmp").mkdir()
+    draft_in(tmp_path).mkdir()
+    assert not clear_drafts(tmp_path) and len(names(tmp_path)) == 3
+    process.communicate(b"\n")
+    assert clear_drafts(tmp_path) and len(names(tmp_path)) == 2
+    (tmp_path / f"{other}.{os.getpid()}-1.tmp").mkdir()  # the number was another process's before
+    assert clear_drafts(tmp_path) and len(names(tmp_path)) == 2
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path):
+    write_whole(tmp_path / "a" / "x.txt", b"text")
+    (tmp_path / "link").symlink_to(tmp_path / "a" / "x.txt")
+    write_whole(tmp_path / "link", b"through it")
+    assert (tmp_path / "a" / "x.txt").read_text() == "through it" and (tmp_path / "link").is_symlink()
+    write_whole(Path("/dev/null"), b"nowhere")
+    assert Path("/dev/null").is_char_device()
+    os.mkfifo(tmp_path / "pipe")
+    for bad in ("pipe", "a", "link/deeper/y", "new/" + "z" * 300):
+        with pytest.raises(InputError, match="choose another --picture"):
+            write_whole(tmp_path / bad, b"", "--picture")
+    assert names(tmp_path) == ["a", "link", "pipe"] and names(tmp_path / "a") == ["x.txt"]
 
 
 def test_json_is_strict(tmp_path):
@@ -101,6 +255,8 @@ def test_json_is_strict(tmp_path):
         "c": [True, 3],
         "d": "PASS",
     }
+    write_json(path, {"name\udcff": Path("\udcff.xml")})  # a file's name that is no UTF-8
+    assert json.loads(path.read_text()) == {"name\\udcff": "\\udcff.xml"}
     tricky = {"text [1,\n 2]": ["a, 1", "[ 2 ]"], "empty": [], "nested": [[1, 2], [None, 4e-9]], "one": [-1.5]}
     write_json(path, tricky)
     assert (
@@ -119,7 +275,9 @@ def test_the_report_keeps_every_figure_and_every_result(run, tmp_path):
     assert content["verdict"] == "FAIL" and content["seed"] == 3 and content["reason"] == run.report.reason
     for stage, names in STAGES.items():
         assert set(names) <= set(content["stages"][stage]), stage
-    assert [check["result"] for check in content["checks"]] == ["PASS", "FAIL", "FAIL", "NOT_CHECKED"]
+    results = [check["result"] for check in content["checks"]]
+    assert results == ["PASS", "FAIL", "FAIL", "NOT_CHECKED"]
+    assert content["stages"]["execution"]["tick_seconds"] == pytest.approx({"median": 1e-3, "p99": 1e-3, "max": 1e-3})
 
 
 def test_a_report_of_a_run_without_a_search_has_every_figure(run):
@@ -147,6 +305,38 @@ def test_the_plan_round_trips(run, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[" * 100_000, "too deep"),
+        ('{"a":' * 100_000, "too deep"),
+        ('{"schema": ' + "9" * 5000 + "}", "not a JSON file"),
+        ('{"schema": 1, "start": [{"position": [NaN, 0, 0]}], "transitions": []}', "start has no valid"),
+        ("[]", "schema is broken"),
+        ("null", "schema is broken"),
+    ],
+)
+def test_a_plan_that_is_no_plan_gets_one_line(tmp_path, text, message):
+    (tmp_path / "plan.json").write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_plan(tmp_path / "plan.json")
+    (tmp_path / "plan.json").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not a JSON file"):
+        read_plan(tmp_path / "plan.json")
+
+
+def test_equal_arrays_make_equal_files_whatever_the_clock_said(run, tmp_path):
+    write_motion(tmp_path / "motion.npz", run.motion, run.trajectory)
+    write_execution(tmp_path / "execution.npz", run.execution)
+    before = [(tmp_path / name).read_bytes() for name in ("motion.npz", "execution.npz")]
+    slower = dict(tick_seconds=2 * run.execution.tick_seconds, real_time_factor=0.1, replan_seconds=9.0)
+    write_motion(tmp_path / "motion.npz", replace(run.motion, seconds=9.0), replace(run.trajectory, seconds=9.0))
+    write_execution(tmp_path / "execution.npz", replace(run.execution, **slower))
+    assert before == [(tmp_path / name).read_bytes() for name in ("motion.npz", "execution.npz")]
+    with zipfile.ZipFile(tmp_path / "motion.npz") as archive:
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+
+
+@pytest.mark.parametrize(
     ("change", "message"),
     [
         (lambda plan: plan["transitions"][1].pop("limb"), r"transitions\[1\] has no valid 'limb'"),
@@ -156,6 +346,15 @@ def test_the_plan_round_trips(run, tmp_path):
         (lambda plan: plan["start"].pop(), "a stance needs both feet"),
         (lambda plan: plan["transitions"].insert(0, plan["transitions"][-1]), "not in contact and cannot be broken"),
         (lambda plan: plan.update(schema=99), "has schema 99"),
+        (lambda plan: plan["start"][0].update(position=[0, 0, 10**400]), "start is broken: int too large"),
+        (lambda plan: plan["start"][0].update(surface=10**40), "no index of a surface"),
+        (lambda plan: plan["start"][0].update(surface=1e400), "start is broken"),
+        (lambda plan: plan["start"][0].update(friction=10**400), "start is broken"),
+        (lambda plan: plan["start"][0].update(friction=-1), "friction above zero"),
+        (lambda plan: plan["start"][0].update(position=[1e308, 0, 0]), "numbers within 10000"),
+        (lambda plan: plan["start"][0].update(quaternion_wxyz=[1e-300, 0, 0, 0]), "not all zero"),
+        (lambda plan: plan["transitions"][0]["times"].update(swing=1e9), "at most 10 s"),
+        (lambda plan: plan["transitions"][0]["times"].update(shift=10**400), "is broken: int too large"),
     ],
 )
 def test_a_broken_plan_is_named(run, tmp_path, change, message):

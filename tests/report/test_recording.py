@@ -3,6 +3,7 @@
 import json
 from collections import defaultdict
 from dataclasses import fields, replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -231,7 +232,11 @@ def test_standing_puts_the_home_posture_on_a_frame(run):
 
 
 def test_a_recording_of_surfaces_alone_needs_no_robot(run, tmp_path):
-    stream = draw.start_recording(tmp_path / "surfaces.rrd", "surfaces", "made-up")
-    draw.draw_surfaces(stream, run.plan.world.surfaces)
-    stream.disconnect()
+    with draw.recording(tmp_path / "surfaces.rrd", "surfaces", "made-up\udcff") as stream:
+        draw.draw_surfaces(stream, run.plan.world.surfaces)
     assert Recording(tmp_path / "surfaces.rrd").has("/world/surfaces/palm/fill")
+
+
+def test_a_full_disk_is_an_error_and_no_wait(run):
+    with pytest.raises(OSError, match="No space left"), draw.recording(Path("/dev/full"), "surfaces", "x") as stream:
+        draw.draw_surfaces(stream, run.plan.world.surfaces)

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from rerun.chunk import RrdReader
@@ -32,7 +33,6 @@ def test_terrain_goes_to_standard_output_and_takes_options(tmp_path, capsys):
     ("arguments", "message"),
     [
         (["stairs", "--friction", "0"], "friction 0"),
-        (["stairs", "--seed", "-1"], "--seed -1"),
         (["stairs", "--shift", "-1"], "transition_timing"),
         (["slope", "--angle", "60"], "."),
         (["gap", "--out", "/proc/none/x.xml"], "cannot be written"),
@@ -46,6 +46,30 @@ def test_terrain_refuses_what_makes_no_world(arguments, message, tmp_path):
     with pytest.raises((InputError, WorldError), match=message):
         terrain.main([*arguments, *out])
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["stairs", "--seed", "-1"], "-1: give a whole number from 0"),
+        (["stairs", "--seed", "9" * 30], "give a whole number from 0"),
+        (["rubble_field", "--rows", "100000"], "100000 is above 100, the most that is accepted"),
+        (["stairs", "--steps", "0"], "0 is not above zero"),
+        (["stairs", "--out", ""], "is empty; give a path"),
+    ],
+)
+def test_terrain_names_the_bound_of_an_option_in_one_line(arguments, message, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        terrain.main(arguments)
+    line = capsys.readouterr().err
+    assert message in line and line.count("\n") == 1 and line.startswith("error: ")
+
+
+def test_terrain_writes_into_a_device_and_leaves_it_one(tmp_path):
+    assert terrain.main(["gap", "--out", "/dev/null"]) == 0
+    assert Path("/dev/null").is_char_device()
+    with pytest.raises(InputError, match="No space left"):
+        terrain.main(["gap", "--out", "/dev/full"])
 
 
 def test_surfaces_prints_a_row_for_each(tmp_path, capsys):

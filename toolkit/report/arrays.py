@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,9 @@ from toolkit.contacts.failure import Failure
 from toolkit.execution.result import Execution
 from toolkit.report.files import check_entries, plain
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
+
+_TIMES = ("centroidal_seconds", "wholebody_seconds", "tick_seconds", "replan_seconds", "real_time_factor")
+"""What a clock measured. It is in the report: these files are the same whenever the run is the same."""
 
 _REPLAY = ("timestep", "qpos0", "qvel0", "ctrl", "qpos", "tick_times")  # kept in double precision
 
@@ -50,7 +55,7 @@ def write_motion(path: Path, motion: CentroidalMotion, trajectory: WholeBodyTraj
     if trajectory is not None:
         arrays |= flatten(replace(trajectory, failure=None), "wholebody_") | _when(trajectory.failure, "wholebody_")
         arrays |= {f"wholebody_{name}": np.asarray(getattr(trajectory, name)) for name in ("feasible", "reason")}
-    np.savez(path, **arrays)  # type: ignore[arg-type]
+    _save(path, arrays)
 
 
 def _when(failure: Failure | None, prefix: str = "") -> dict[str, np.ndarray]:
@@ -80,4 +85,11 @@ def write_execution(path: Path, execution: Execution) -> None:
         array = np.asarray(value)
         single = isinstance(value, np.ndarray) and array.dtype == float and name not in _REPLAY
         arrays[name] = array.astype(np.float32) if single else array
-    np.savez(path, **arrays)  # type: ignore[arg-type]
+    _save(path, arrays)
+
+
+def _save(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write an npz file without what a clock measured: equal arrays make equal files."""
+    content = io.BytesIO()
+    np.savez(content, **{name: array for name, array in arrays.items() if name not in _TIMES})  # type: ignore[arg-type]
+    path.write_bytes(content.getbuffer())

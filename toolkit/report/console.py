@@ -6,6 +6,7 @@ import sys
 import weakref
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich import box
 from rich.console import Console
@@ -22,6 +23,7 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
+from toolkit.errors import InputError
 from toolkit.execution.check import Check, Result
 from toolkit.search.result import SearchResult, Solution
 
@@ -29,9 +31,26 @@ STYLES = {Result.PASS: "bold green", Result.FAIL: "bold red", Result.NOT_CHECKED
 PLAIN_WIDTH = 160  # columns assumed where the output is no terminal
 
 
+class _Console(Console):
+    """A console that blames standard output where it takes nothing more, as on a full disk."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print as rich does.
+
+        Raises:
+            InputError: standard output cannot be written.
+        """
+        try:
+            super().print(*objects, **options)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise InputError(f"standard output cannot be written ({error.strerror})") from error
+
+
 def make_console() -> Console:
     """A console on standard output; plain, uncoloured and wide where that is no terminal."""
-    return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH, highlight=False)
+    return _Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH, highlight=False)
 
 
 def progress_bar(console: Console) -> Progress:

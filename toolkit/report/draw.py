@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import mujoco
@@ -22,15 +23,28 @@ SCENE_SHADE = 0.8  # darkens the scene a little, so that what is drawn on a brig
 SURFACE_OFFSET = 0.002  # m along the normal, so that a surface does not flicker with the geom it lies on
 
 
-def start_recording(path: Path, application: str, name: str) -> rr.RecordingStream:
-    """A stream that writes into `path` and knows no time but the one it is given; close it with `disconnect()`."""
+@contextmanager
+def recording(
+    path: Path, application: str, name: str, write: Callable[[Path, bytes], object] = Path.write_bytes
+) -> Iterator[rr.RecordingStream]:
+    """A stream that knows no time but the one it is given, and whose content is written to `path` at the end.
+
+    The content is kept in memory until then: the library itself waits forever for a disk that is full.
+
+    Raises:
+        OSError: the file cannot be written (or what `write` raises then).
+    """
     stream = rr.RecordingStream(application)
     stream.set_log_tick_enabled(False)
     stream.set_log_time_enabled(False)
-    stream.save(path)
-    stream.send_recording_name(name)
-    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    return stream
+    content = stream.binary_stream()
+    try:
+        stream.send_recording_name(name.encode("utf-8", "backslashreplace").decode("utf-8"))
+        stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        yield stream
+        write(path, content.read() or b"")
+    finally:
+        stream.disconnect()
 
 
 def draw_scene(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "world/scene") -> None:

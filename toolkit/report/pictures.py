@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -70,17 +71,26 @@ def video(
 
     Raises:
         InputError: this machine cannot render; the message says what to install.
+        OSError: the file cannot be written.
     """
     rows = np.searchsorted(times, np.arange(times[0], times[-1] + 1e-9, 1 / fps) - 1e-9)
     cameras = follow(scene, qpos, times)
     with OffscreenRenderer(scene, *size, shadows=False) as renderer:
-        sink = imageio_ffmpeg.write_frames(str(path), size, fps=fps, codec="libx264", quality=7)
-        sink.send(None)
+        sink = imageio_ffmpeg.write_frames(
+            str(path), size, fps=fps, codec="libx264", quality=7, ffmpeg_log_level="fatal"
+        )
         try:
+            sink.send(None)
             for i in rows:
                 sink.send(renderer.render(qpos[i], cameras[i], patches=patches, text=f"{times[i]:.1f} s"))
+            sink.close()
+            whole = imageio_ffmpeg.count_frames_and_secs(str(path))[0] == len(rows)
+        except (OSError, RuntimeError) as error:  # with all that the encoder has said
+            raise OSError(errno.EIO, f"{path.name} is not whole, the disk may be full") from error
         finally:
             sink.close()
+        if not whole:
+            raise OSError(errno.EIO, f"{path.name} is not whole, the disk may be full")
 
 
 class follow:

@@ -16,9 +16,11 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.report.files import read_json, write_json
 from toolkit.search.result import Solution
-from toolkit.world.timing import Timing
+from toolkit.world.timing import LONGEST, Timing
 
 SCHEMA = 1
+LARGEST = 1e4
+"""Greatest number that a contact may have: no world is so large in m."""
 
 
 def write_plan(path: Path, plan: MotionPlan, solution: Solution) -> None:
@@ -89,7 +91,7 @@ def read_plan(path: Path) -> ContactSequence:
             stance = transitions[-1].apply(stance)
     except KeyError as error:
         raise InputError(f"{path}: {where} has no valid {error}") from error
-    except (TypeError, ValueError, AttributeError) as error:
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
         raise InputError(f"{path}: {where} is broken: {error}") from error
     return ContactSequence(start, tuple(transitions))
 
@@ -109,17 +111,24 @@ def _read_contact(entry: dict[str, Any]) -> Contact:
     """Inverse of `_contact_entry`; KeyError, TypeError or ValueError where it is broken."""
     position = np.array(entry["position"], float)
     quaternion_wxyz = np.array(entry["quaternion_wxyz"], float)
-    if position.shape != (3,) or quaternion_wxyz.shape != (4,) or not np.linalg.norm(quaternion_wxyz) > 0:
+    if position.shape != (3,) or quaternion_wxyz.shape != (4,) or not np.abs(quaternion_wxyz).max() > 1e-6:
         raise ValueError("position needs 3 numbers, quaternion_wxyz 4 that are not all zero")
-    pose = Pose.from_quaternion(position, quaternion_wxyz)
-    return Contact(Limb.from_label(entry["limb"]), pose, float(entry["friction"]), int(entry["surface"]))
+    friction, surface = float(entry["friction"]), int(entry["surface"])
+    numbers = np.abs([*position, *quaternion_wxyz, friction])
+    if not (numbers <= LARGEST).all() or friction <= 0:
+        raise ValueError(f"position, quaternion_wxyz and friction are numbers within {LARGEST:g}, friction above zero")
+    if not abs(surface) < 2**31:
+        raise ValueError("surface is no index of a surface")
+    return Contact(Limb.from_label(entry["limb"]), Pose.from_quaternion(position, quaternion_wxyz), friction, surface)
 
 
 def _read_transition(entry: dict[str, Any]) -> ContactTransition:
     """One transition; KeyError, TypeError or ValueError where it is broken."""
     timing = Timing(float(entry["times"]["shift"]), float(entry["times"]["swing"]))
-    if not (timing.shift >= 0 and timing.swing > 0):
-        raise ValueError(f"shift {timing.shift} and swing {timing.swing} must not be negative")
+    if not (0 <= timing.shift <= LONGEST and 0 < timing.swing <= LONGEST):
+        raise ValueError(
+            f"shift {timing.shift} and swing {timing.swing} must not be negative, and at most {LONGEST:g} s"
+        )
     if entry["action"] not in ("make", "break"):
         raise ValueError(f'action is "{entry["action"]}", must be "make" or "break"')
     contact = _read_contact(entry) if entry["action"] == "make" else None

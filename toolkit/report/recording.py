@@ -13,7 +13,7 @@ from toolkit.contacts.sequence import ContactSequence
 from toolkit.execution.result import Execution
 from toolkit.pipeline.loop import PipelineResult
 from toolkit.report.blueprint import blueprint
-from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, start_recording
+from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, recording
 from toolkit.report.motion_scene import (
     TIMELINE,
     draw_centres,
@@ -58,8 +58,7 @@ def write_recording(path: Path, result: PipelineResult, report: RunReport, rate:
     executed = execution is not None and len(execution.samples.tick_times) > 0
     feasible = motion is not None and motion.feasible
 
-    stream = start_recording(path, APPLICATION, f"{robot.name} in {world.name}")
-    try:
+    with recording(path, APPLICATION, f"{robot.name} in {world.name}") as stream:
         shown = {"executed": executed, "momenta": executed or feasible}
         stream.send_blueprint(blueprint(world.mujoco_model, _way(world, sequence), **shown))
         stream.log("summary", rr.TextDocument(summary(report), media_type=rr.MediaType.MARKDOWN), static=True)
@@ -88,11 +87,10 @@ def write_recording(path: Path, result: PipelineResult, report: RunReport, rate:
         elif motion is not None and motion.feasible:
             plot_motion(stream, motion)
         send_contact_states(stream, schedule, execution)
-        text = rr.TextDocument(search_summary(search), media_type=rr.MediaType.MARKDOWN)
-        stream.log("search/solutions", text, static=True)
-        draw_search(stream, search, _heights(_way(world, sequence)))
-    finally:
-        stream.disconnect()
+        if search is not None:
+            text = rr.TextDocument(search_summary(search), media_type=rr.MediaType.MARKDOWN)
+            stream.log("search/solutions", text, static=True)
+            draw_search(stream, search, _heights(_way(world, sequence)))
 
 
 def _draw_robot(

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.centroidal.residual import check, cop_margin, friction_margin
 from toolkit.execution.check import Check
@@ -16,7 +18,7 @@ from toolkit.pipeline.loop import PipelineResult
 from toolkit.report.files import check_entries, write_json
 from toolkit.world.world import World
 
-SCHEMA = 1
+SCHEMA = 2
 PACKAGES = ("mujoco", "placo", "pin", "casadi", "daqp", "numpy", "scipy", "numba", "rerun-sdk")
 
 SURFACES = ("count", "foot", "palm", "seconds")
@@ -52,6 +54,7 @@ EXECUTION = (
     "replan_seconds",
     "simulated_seconds",
     "real_time_factor",
+    "tick_seconds",
 )
 STAGES = dict(surfaces=SURFACES, planning=PLANNING, dynamics=DYNAMICS, wholebody=WHOLEBODY, execution=EXECUTION)
 """Every stage and its figures, in order. A stage that was not reached has its first figure False, the rest None."""
@@ -215,7 +218,15 @@ def _execution(execution: Execution | None) -> dict[str, Any]:
         return _figures(EXECUTION, None)
     named = execution.named()
     figures = {name: named[name] for name in EXECUTION}
+    figures["tick_seconds"] = _spread(execution.samples.tick_seconds)
     figures["unplanned_contacts"] = len(execution.unplanned_contacts)
     figures["unplanned_contact_geoms"] = [list(pair) for pair in execution.unplanned_contacts]
     figures["fall_reason"] = named["fall_reason"]
     return figures
+
+
+def _spread(seconds: np.ndarray) -> dict[str, float] | None:
+    """Median, 99th percentile and largest of wall-clock times; None where there are none."""
+    if not len(seconds):
+        return None
+    return {"median": float(np.median(seconds)), "p99": float(np.percentile(seconds, 99)), "max": float(seconds.max())}

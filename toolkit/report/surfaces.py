@@ -13,7 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from toolkit.report.colors import FOOT_SURFACE, PALM_SURFACE, START
-from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, start_recording
+from toolkit.report.drafts import write_whole
+from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, recording
 from toolkit.world.world import World
 
 
@@ -44,11 +45,13 @@ def write_surface_recording(path: Path, world: World) -> None:
     """Write a recording of a world's geoms with its surfaces, their outlines and normals, the start and the goal.
 
     Args:
-        path: file to write.
+        path: file to write; it appears whole or not at all.
         world: the world.
+
+    Raises:
+        InputError: it cannot be written.
     """
-    stream = start_recording(path, "contact surfaces", world.name)
-    try:
+    with recording(path, "contact surfaces", world.name, write_whole) as stream:
         scene = rrb.Spatial3DView(
             origin="world",
             name="Surfaces: blue for feet, amber for palms",
@@ -79,8 +82,6 @@ def write_surface_recording(path: Path, world: World) -> None:
             labels=["start"],
         )
         stream.log("world/start", heading, static=True)
-    finally:
-        stream.disconnect()
 
 
 def _eye(world: World) -> rrb.EyeControls3D:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+LONGEST = 10.0
+"""Longest shift and longest swing in s. Time and memory grow with them, and slower motions are no different ones."""
+
 
 @dataclass(frozen=True)
 class Timing:

@@ -1,0 +1,248 @@
+"""Odd command lines and damaged plan files end in one line and a code of 0, 1 or 2, and leave nothing behind.
+
+A few cases run by default. For a long run:
+
+    FUZZ_SECONDS=3600 FUZZ_SEED=7 python -m pytest tests/fuzz/test_commands.py -m slow -s
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.report.conftest import make_sequence
+from toolkit.errors import InputError
+from toolkit.report.plan_file import read_plan, write_plan
+from toolkit.robot.loader import find_robots
+from toolkit.world.generators import KINDS
+
+ROOT = Path(__file__).resolve().parents[2]
+SECONDS = float(os.environ.get("FUZZ_SECONDS", 300))
+SEED = int(os.environ.get("FUZZ_SEED", 0))
+LIMIT = 60  # s; a case that takes longer hangs
+
+WORLD = """
+<mujoco>
+  <custom><numeric name="transition_timing" data="0.3 0.4"/></custom>
+  <worldbody>
+    <geom name="floor" type="plane" size="0 0 1" friction="0.7"/>
+    <site name="start" pos="0 0 0"/>
+    <site name="goal" type="cylinder" pos="0.3 0 0" size="0.15 0.02"/>
+  </worldbody>
+</mujoco>
+"""
+ODD = [
+    "", " ", "0", "1", "-1", "2", "-0.0", "0.5", "1e-300", "1e300", "-1e300", "nan", "inf", "-inf", "1e400", "9" * 23,
+    "9" * 5000, "0x10", "1_0", "\u0663", "\udcff", "a,b", "1,1", "0.05,0.05", "100,100", "1e9,1e9", "1,nan",
+    "auto", "x" * 300, "/", ".", "..", "/dev/null", "/dev/full", "/proc/none/x", "-", "--", "--help", "\n",
+    "two\nlines", "%s", "%(default)s", "[red]x", "{}", "\x1b[2J", "~", "$HOME", "out", "out/deep/er", "taken",
+    "taken/in", "world.xml", "folder", "earlier", "foreign", "empty.xml", "binary.xml", "link",
+    "pipe", "na\udcefme", "\u00f6\u4e16",
+]  # fmt: skip
+PLANNING = ["--seed", "--planner", "--timing", "--no-palms", "--steps", "--heuristic", "--robot", "--robots"]
+DISTURBANCES = ["--push", "--mass-error", "--friction-error", "--terrain-error", "--state-noise", "--delay"]
+VALIDATE = ["--candidates", "--no-replanning", *DISTURBANCES]
+FLAGS = {"--no-palms", "--no-replanning", "--no-recording"}
+
+
+def make_surroundings(folder: Path) -> None:
+    """What a case finds in its working directory."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (folder / "world.xml").write_text(WORLD)
+    (folder / "empty.xml").write_text("")
+    (folder / "binary.xml").write_bytes(bytes(range(256)))
+    (folder / "taken").write_text("precious")
+    (folder / "link").symlink_to("nowhere/at/all")
+    os.mkfifo(folder / "pipe")
+    for name, content in (("earlier", {"schema": 2, "verdict": "PASS", "stages": {}}), ("foreign", {"schema": 2})):
+        (folder / name).mkdir()
+        (folder / name / "report.json").write_text(json.dumps(content))
+    (folder / "folder").mkdir()
+
+
+def odd(rng: np.random.Generator) -> str:
+    """One of the odd values, or two of them as one."""
+    first = ODD[int(rng.integers(len(ODD)))]
+    return first + ODD[int(rng.integers(len(ODD)))] if rng.random() < 0.1 else first
+
+
+def odd_options(rng: np.random.Generator, names: list[str], most: int) -> list[str]:
+    """Some options, most of them with values."""
+    words: list[str] = []
+    for name in rng.choice(names, int(rng.integers(0, most + 1))):
+        words += [str(name)] if name in FLAGS and rng.random() < 0.9 else [f"{name}={odd(rng)}"]
+    return words
+
+
+def command_line(rng: np.random.Generator) -> tuple[str, list[str]]:
+    """A module and its arguments; the budgets of planning stay small."""
+    module = str(rng.choice(["validate", "plan", "terrain", "terrain", "terrain", "surfaces", "surfaces", "robots"]))
+    world = "world.xml" if rng.random() < 0.7 else odd(rng)
+    out = [] if rng.random() < 0.3 else ["--out", odd(rng)]
+    if module == "terrain":
+        kind = str(rng.choice([*KINDS, odd(rng)]))
+        defaults = getattr(KINDS.get(kind), "__kwdefaults__", None) or {"rows": 1}
+        words = [kind, *odd_options(rng, ["--seed", *(f"--{name.replace('_', '-')}" for name in defaults)], 3), *out]
+    elif module == "surfaces":
+        words = [world, *out]
+    elif module == "robots":
+        name = [] if rng.random() < 0.2 else [find_robots()[0] if rng.random() < 0.7 else odd(rng)]
+        words = [*name, *odd_options(rng, ["--robots", "--picture"], 2)]
+    else:
+        names = PLANNING + (VALIDATE if module == "validate" else [])
+        budget = ["--time-limit=0.3", "--expansions=20", *(["--candidates=1"] if module == "validate" else [])]
+        tried = odd_options(rng, ["--time-limit", "--expansions"], 1)
+        words = [world, "--no-recording", *odd_options(rng, names, 2), *budget, *tried, *out]
+        if tried:  # the other one still ends the search
+            words += ["--expansions=20"] if "time" in tried[0] else ["--time-limit=0.3"]
+    return f"toolkit.{module}", [word for word in words if "\0" not in word]
+
+
+class Commands:
+    """Runs command lines one after another, and looks at what they say and leave."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder / "here"
+        environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+        server = [sys.executable, str(Path(__file__).with_name("fork_server.py"))]
+        self._server = subprocess.Popen(server, stdin=-1, stdout=-1, text=True, env=environment)
+
+    def close(self) -> None:
+        """End the server."""
+        self._server.communicate()
+
+    def check(self, module: str, arguments: list[str]) -> int:
+        """Run one, assert that it ended as it should, and return its exit code."""
+        make_surroundings(self.folder)
+        before = self._listing()
+        request = dict(module=module, arguments=arguments, folder=str(self.folder), limit=LIMIT)
+        assert self._server.stdin is not None and self._server.stdout is not None
+        self._server.stdin.write(json.dumps(request) + "\n")
+        self._server.stdin.flush()
+        code = json.loads(self._server.stdout.readline())
+        out, err = ((self.folder.parent / name).read_text("utf-8", "replace") for name in ("out", "err"))
+        what = f"{module} {arguments}\ncode {code}\n{err[-3000:]}\n{out[-500:]}"
+        assert code is not None, f"it hung: {what}"
+        assert code in (0, 1, 2) and "Traceback" not in err + out, what
+        lines = err.splitlines()
+        if code == 2 and module != "toolkit.robots":
+            assert len(lines) == 1 and lines[0].startswith("error: "), what
+        elif code == 1:
+            assert any(line.startswith(("error: ", "FAIL: ")) for line in [*lines, *out.splitlines()]), what
+        new = self._listing() - before
+        assert not [name for name in new if name.endswith(".tmp")], f"{new} {what}"
+        assert not (code == 2 and new), f"{new} {what}"
+        assert {name.split("/")[0] for name in new} <= {"runs"} | self._allowed(arguments), f"{new} {what}"
+        assert (self.folder / "taken").is_file() and (self.folder / "pipe").is_fifo(), what
+        assert (self.folder / "foreign" / "report.json").exists() and Path("/dev/null").is_char_device(), what
+        return code
+
+    def _listing(self) -> set[str]:
+        """Every path below the working directory."""
+        return {str(path.relative_to(self.folder)) for path in self.folder.rglob("*")}
+
+    def _allowed(self, arguments: list[str]) -> set[str]:
+        """First parts of the paths that the arguments name as outputs."""
+        named = {word.partition("=")[2] if word.startswith("--picture=") else word for word in arguments}
+        places = [Path(os.path.realpath(self.folder / name)) for name in named]
+        below = [place.relative_to(self.folder) for place in places if self.folder in place.parents]
+        return {place.parts[0] for place in below}
+
+
+@pytest.fixture
+def commands(tmp_path):
+    made = Commands(tmp_path)
+    yield made
+    made.close()
+
+
+def some_plan(folder: Path) -> dict:
+    write_plan(folder / "plan.json", make_sequence(), world="w", robot="r", initial_rest=0.2)
+    return json.loads((folder / "plan.json").read_text())
+
+
+ODD_JSON = [
+    None, True, 0, -1, 1.5, 10**400, -(10**400), 1e308, float("nan"), float("inf"), "", "x", "left_foot", "make", [],
+    {}, [[]], [1, 2, 3], [1, 2, 3, 4], [0, 0, 0, 0], [None] * 3, [10**400] * 4, {"a": 1}, 2**31, 2**63, 2**64,
+]  # fmt: skip
+
+
+def damaged(value, rng: np.random.Generator):
+    """A copy of a JSON value, in which one thing somewhere is another one, is missing, or is there twice."""
+    if isinstance(value, (dict, list)) and value and rng.random() < 0.85:
+        copy = dict(value) if isinstance(value, dict) else list(value)
+        key = list(copy)[int(rng.integers(len(copy)))] if isinstance(copy, dict) else int(rng.integers(len(copy)))
+        if rng.random() < 0.15:
+            del copy[key]
+        elif isinstance(copy, list) and rng.random() < 0.1:
+            copy.insert(key, copy[key])
+        else:
+            copy[key] = damaged(copy[key], rng)
+        return copy
+    return ODD_JSON[int(rng.integers(len(ODD_JSON)))]
+
+
+def check_plan(plan: dict, path: Path, rng: np.random.Generator) -> bool:
+    """Read a damaged plan; whether it was accepted."""
+    for _ in range(int(rng.integers(1, 4))):
+        plan = damaged(plan, rng)
+    text = json.dumps(plan).encode()
+    if rng.random() < 0.1:
+        place = int(rng.integers(len(text)))
+        text = text[:place] + bytes(rng.integers(0, 256, 3).tolist()) * int(rng.choice([0, 1, 50_000])) + text[place:]
+    path.write_bytes(text)
+    try:
+        sequence = read_plan(path)
+    except InputError as error:
+        assert str(path) in str(error) and "\n" not in str(error), str(error)
+        return False
+    for stance in sequence.stances:
+        for contact in stance.contacts:
+            assert np.isfinite(contact.pose.matrix).all() and 0 < contact.friction < np.inf
+    assert np.isfinite(sequence.duration)
+    return True
+
+
+def test_some_odd_command_lines(commands):
+    rng = np.random.default_rng(20)
+    lines = [command_line(rng) for _ in range(80)]
+    for module, arguments in [line for line in lines if line[0] in ("toolkit.terrain", "toolkit.surfaces")][:25]:
+        commands.check(module, arguments)
+
+
+def test_some_damaged_plans(tmp_path):
+    rng, plan = np.random.default_rng(SEED), some_plan(tmp_path)
+    taken = sum(check_plan(plan, tmp_path / "plan.json", rng) for _ in range(300))
+    assert 0 < taken < 300
+
+
+@pytest.mark.slow
+def test_odd_command_lines_for_long(commands):
+    counts: Counter = Counter()
+    end, number = time.monotonic() + SECONDS, 0
+    while time.monotonic() < end:
+        line = command_line(np.random.default_rng([SEED, number]))
+        try:
+            counts[line[0], commands.check(*line)] += 1
+        except AssertionError as error:
+            raise AssertionError(f"case {number} of seed {SEED}: {error}") from None
+        number += 1
+    sys.stdout.write(f"\n{number} command lines: {dict(counts)}\n")
+
+
+@pytest.mark.slow
+def test_damaged_plans_for_long(tmp_path):
+    plan = some_plan(tmp_path)
+    end, number, taken = time.monotonic() + SECONDS / 10, 0, 0
+    while time.monotonic() < end:
+        taken += check_plan(plan, tmp_path / "plan.json", np.random.default_rng([SEED, number]))
+        number += 1
+    sys.stdout.write(f"\n{number} plans, {taken} of them accepted\n")
