@@ -1,8 +1,8 @@
-"""The one door to the compiler: functions that numba compiles, and a cache on disk that knows their sources.
+"""Functions that numba compiles, with a cache on disk that depends on their sources.
 
 numba's own cache watches only the file of the compiled function. Here the entry on disk carries a digest of the
-function and of everything that it calls or reads, however far below and in whatever file. An edit anywhere in it makes
-the next call compile again; an edit of a comment, or of a function that is not called, does not.
+function and of everything that it calls or reads, directly or not and in any file. An edit of any of it makes the next
+call compile again; an edit of a comment, or of a function that is not called, does not.
 
 A function that only other compiled functions call is decorated with `@compiled`. One that Python calls is decorated
 with `@compiled(kept=True)`, and what was compiled is kept on disk: beside the source, or, where that folder cannot be
@@ -26,7 +26,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
 
 REORDERED = frozenset({"reassoc", "contract", "arcp", "nsz"})
-"""What LLVM may do to floating-point sums where a kernel allows it; nan and inf keep their meaning."""
+"""Changes that LLVM may make to floating-point sums where a kernel allows it; nan and inf keep their meaning."""
 
 
 def compiled(function: Callable | None = None, *, kept: bool = False, reordered: bool = False) -> Any:
@@ -62,13 +62,9 @@ def law(function: Callable) -> Callable:
 
 
 def digest(function: Callable) -> str:
-    """A digest of a function's code and of all code and constants that it reaches through global names.
+    """Hexadecimal digest of a plain or compiled function: of its code, and all code and constants that it reaches.
 
-    Args:
-        function: A plain function, or one that was compiled.
-
-    Returns:
-        Hexadecimal digits. They are the same in every process while nothing that the function reaches has changed.
+    It is the same in every process while nothing that the function reaches through global names has changed.
     """
     found: dict[str, str] = {}
     waiting: list[Any] = [function]
@@ -147,7 +143,7 @@ def _text(code: types.CodeType) -> str:
 
 
 def _constant(value: Any) -> str:
-    """A global value as text that is the same in every process."""
+    """A global value as a text that is the same in every process."""
     if isinstance(value, type) and issubclass(value, enum.Enum):
         return repr([(item.name, item.value) for item in value])
     if isinstance(value, type):
