@@ -1,14 +1,14 @@
-"""How far it is to the goal for a floating box on an SE(2) grid (paper, Sec. V).
+"""Distance to the goal for a floating box on an SE(2) grid (paper, Sec. V).
 
-Cells are 8-connected in XY with free turning in place. A cell counts where a sole finds a surface within half a stride
-(so that gaps up to the longest stride can be crossed, wider ones not) and the body fits above it. Since ground can
+Cells are 8-connected in XY with free turning in place. A cell counts where the body fits above it and a sole finds a
+surface within half a stride. So gaps up to the longest stride can be crossed, wider ones not. Since ground can
 lie above ground, a cell has one node for each height. Dijkstra runs once, from all cells in the goal region.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -29,17 +29,13 @@ _TURN = 1e-4  # m; cost of one yaw layer, only there to prefer straight ways
 _OCTILE = 1.0 / 1.0823923  # largest ratio of 8-connected to straight distance, inverted: keeps the estimate low
 
 
-class Distance(Protocol):
-    """Estimates the way to the goal."""
-
-    def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """(n,) m to the goal region from the mean of the feet (n, 3) m with heading (n,) rad; inf: no way."""
-        ...
+Distance = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""(n,) m to the goal region from the mean of the feet (n, 3) m with heading (n,) rad; inf where no way leads there."""
 
 
 @dataclass(frozen=True)
 class EuclideanDistance:
-    """The straight line in XY, which knows nothing of walls and gaps."""
+    """The straight line in XY, which ignores walls and gaps."""
 
     goal: Goal
 
@@ -52,15 +48,15 @@ class GridDistance:
     """Distance to the goal on the grid.
 
     Args:
-        projector: finds where soles have room.
-        occupancy: of the world.
-        box: the body.
-        goal: where to.
-        bounds: (xmin, ymin, xmax, ymax) m of the grid.
-        stride: m; longest step.
+        projector: Finds where soles have room.
+        occupancy: Occupied cells of the world.
+        box: The body.
+        goal: The goal.
+        bounds: (xmin, ymin, xmax, ymax) in m, of the grid.
+        stride: The longest step in m.
 
     Attributes:
-        supported: whether any cell in the goal region has a surface for a sole.
+        supported: Whether any cell in the goal region has a surface for a sole.
     """
 
     def __init__(
