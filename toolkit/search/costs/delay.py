@@ -15,8 +15,6 @@ Reference:
 
 from __future__ import annotations
 
-
-
 import numpy as np
 
 from toolkit.centroidal.problem import GRAVITY
@@ -24,7 +22,6 @@ from toolkit.geometry.heading import wrapped
 from toolkit.search.moves.candidates import Candidates
 from toolkit.search.moves.drift import Drift
 from toolkit.search.states.contact_table import ContactTable
-
 
 # Weights of haste, in the h of 1 m of way.
 _CAPTURE = 1.0  # per m that the capture point lies ahead of the foremost foot
@@ -54,7 +51,6 @@ class Haste:
 
     def delay(self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """(n,) delays of states with contact numbers (n, 4), CoM (n, 3) m and velocity (n, 3) m/s."""
-        """
         position, velocity = self._table.position[:, :2], velocity[:, :2]
         square = (velocity**2).sum(1)
         ahead = velocity / np.maximum(np.sqrt(square), 1e-9)[:, None]

@@ -27,7 +27,7 @@ def _add_level(levels, z, merge):
 
 @compiled(kept=True)
 def sole_levels(corner, cell, half, offsets, merge, table, result):
-    """Fill heights (nx, ny, 4) in m at which a sole has room in each cell, in any of four headings, slightly shifted."""
+    """Fill heights (nx, ny, 4) in m at which a slightly shifted sole has room in each cell, in any of four headings."""
     for a in range(result.shape[0]):
         for b in range(result.shape[1]):
             for k in range(len(offsets)):
