@@ -24,11 +24,7 @@ _REST = 0.6  # s on the final stance that are optimised with them
 class Arrival:
     """Judge of the last transition, for ANA*; the objective of the last edge becomes the cost of coming to rest.
 
-    Args:
-        evaluator: Judges one transition as the last one, and whether several come to rest.
-        reader: Reads the search's states.
-        cost: Costs of edges.
-        tally: Counts the rejections.
+    The evaluator judges one transition as the last one, and whether several come to rest; `tally` counts rejections.
     """
 
     def __init__(self, evaluator: TransitionEvaluator, reader: StateReader, cost: EdgeCost, tally: Tally):
@@ -42,7 +38,7 @@ class Arrival:
         if objective is None:
             self._tally.rejected[Reason.DYNAMICS] += 1
             return None
-        cost = edge.cost + self._cost.dynamics(objective - edge.payload[0])
+        cost = edge.cost + self._cost.dynamics * (objective - edge.payload[0])
         return edge._replace(cost=cost, payload=(objective, edge.payload[1]))
 
     def _together(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> float | None:

@@ -140,7 +140,7 @@ class ContactProblem:
             return []
         candidates, objective = candidates.select(kept), batch.objective[kept]
         com, velocity = batch.com[kept], batch.com_velocity[kept]
-        cost = self._parts.cost.dynamics(objective)
+        cost = self._parts.cost.dynamics * objective
         if not pending:
             cost = cost + self._parts.cost.known(candidates)
         states = pack(candidates.contacts, candidates.limb, com, velocity)

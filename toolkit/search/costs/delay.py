@@ -79,14 +79,9 @@ class Delay:
     def of_waiting(
         self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray, candidates: Candidates, *, doubted: bool
     ) -> np.ndarray:
-        """(n,) delays of transitions that are not judged yet.
+        """(n,) delays of transitions that are not judged yet; `doubted` ones were rejected by one judge already.
 
-        Args:
-            contacts: (4,) int; contact numbers of the state that they lead out of.
-            com: (3,) m; CoM of that state.
-            velocity: (3,) m/s; its velocity.
-            candidates: The n transitions.
-            doubted: Whether one judge has already rejected them.
+        The n candidates lead out of contact numbers (4,) with the CoM (3,) m and its velocity (3,) m/s.
         """
         miss = self._drift.miss(contacts, com, velocity, candidates)
         doubt = _DOUBT if doubted else 0.0

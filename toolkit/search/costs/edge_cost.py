@@ -7,7 +7,6 @@ may be added to `least_of_edge` and `to_go`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
 from toolkit.world.world import Goal
 
-_Number = TypeVar("_Number", float, np.ndarray)
 _LEAST_RESERVE = 0.02  # part of the friction; contacts that slide cost no more than those that barely hold
 _ARRIVAL = 0.01  # m; plans end this far inside the goal, as robots land a little beside their plans
 
@@ -57,6 +55,9 @@ class EdgeCost:
         goal: The goal.
         distance: Distance to the goal.
         longest: The farthest, in m, that the mean of the feet moves in one transition.
+
+    Attributes:
+        dynamics: Cost of a dynamics objective of 1.
     """
 
     def __init__(
@@ -71,6 +72,7 @@ class EdgeCost:
         self._config, self._table, self._goal, self._distance, self._longest = config, table, goal, distance, longest
         self._durations = np.array([timing.shift + timing.swing for timing in timings])
         self._radius = max(goal.radius - _ARRIVAL, 0.5 * goal.radius)
+        self.dynamics = config.dynamics
 
     def known(self, candidates: Candidates) -> np.ndarray:
         """(n,) cost of transitions without their dynamics."""
@@ -79,20 +81,15 @@ class EdgeCost:
             cost = cost + term(candidates)
         return cost
 
-    def dynamics(self, objective: _Number) -> _Number:
-        """Cost of dynamics objectives, one or (n,)."""
-        return self._config.dynamics * objective
 
     def least_of_edge(self, candidates: Candidates) -> np.ndarray:
         """(n,) least cost of transitions, which every one of them has."""
         return candidates.way + self._config.step
 
     def to_go(self, centre: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """(n,) least cost to the goal; Eq. 5 of the paper, with at least one transition where it is not reached.
+        """(n,) least cost to the goal for the mean of the feet (n, 3) m with headings (n,) rad, by Eq. 5 of the paper.
 
-        Args:
-            centre: (n, 3) m; mean of the feet.
-            yaw: (n,) rad; heading of the mean of the feet.
+        It counts at least one transition where the goal is not reached.
         """
         distance = self._distance(centre, yaw)
         return distance + self._config.step * np.maximum(distance / self._longest, ~self.at_goal(centre))

@@ -93,8 +93,7 @@ def number_nodes(levels, corner, cell, occupancy, box, nodes):
 def link_nodes(nodes, levels, cell, climb, turn, start, end, weight):
     """Compressed rows of the grid graph, whose edges all go both ways.
 
-    Fills start (count + 1,) and returns the number of edges. Where `end` and `weight` have room for the edges, their
-    ends and lengths are filled in as well.
+    Fills start (count + 1,) and returns the number of edges; fills their ends and lengths where there is room for them.
     """
     used = 0
     yaws = nodes.shape[3]

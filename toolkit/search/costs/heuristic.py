@@ -45,15 +45,7 @@ class EuclideanDistance:
 
 
 class GridDistance:
-    """Distance to the goal on the grid.
-
-    Args:
-        projector: Finds where soles have room.
-        occupancy: Occupied cells of the world.
-        box: The body.
-        goal: The goal.
-        bounds: (xmin, ymin, xmax, ymax) in m, of the grid.
-        stride: The longest step in m.
+    """Distance to the goal on a grid with bounds (xmin, ymin, xmax, ymax) m, with steps of at most `stride` m.
 
     Attributes:
         supported: Whether any cell in the goal region has a surface for a sole.

@@ -38,11 +38,6 @@ def resting_surfaces(surfaces: Sequence[Surface], friction: float | None) -> tup
 class TerrainDistance:
     """Builds grid distances for one robot in one world.
 
-    Args:
-        robot: The robot.
-        world: The world.
-        projector: Projects the robot's limbs onto the world's surfaces.
-
     Attributes:
         box: The body.
         occupancy: Cells that the body can hit, around start and goal.

@@ -42,11 +42,7 @@ class Drift:
     def miss(self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray, candidates: Candidates) -> np.ndarray:
         """(n,) m; distance of the mean of the feet afterwards from where the CoM can drift, and from its middle.
 
-        Args:
-            contacts: (4,) int; contact numbers before.
-            com: (3,) m; CoM before.
-            velocity: (3,) m/s; its velocity before.
-            candidates: The n transitions.
+        The n candidates lead out of contact numbers (4,) with the CoM (3,) m and its velocity (3,) m/s.
         """
         table, k = self._table, candidates.timing
         feet = table.position[contacts[:2], :2]

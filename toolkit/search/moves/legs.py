@@ -58,13 +58,8 @@ def legs_of(robot: RobotModel, margins: ReachMargins) -> Legs:
 def reach(legs, side, com, yaw, position, rotation):
     """The first limit that a leg breaks, as a `Reason`, and its hip, knee and ankle in m, zeros where it is too long.
 
-    Args:
-        legs: Both legs.
-        side: 0 left, 1 right.
-        com: Three numbers in m; CoM in the world.
-        yaw: Heading of the base in rad.
-        position: (3,) m; centre of the sole.
-        rotation: (3, 3); world_from_sole.
+    The leg of a side (0 left, 1 right) lies between the CoM com, three numbers in m in the world, and a sole with the
+    centre position (3,) m and the rotation (3, 3) world_from_sole. The heading of the base is yaw in rad.
     """
     heading, ranges = (np.cos(yaw), np.sin(yaw)), legs.ranges[side]
     hip, ankle = hip_at(com, heading, legs.hip[side]), ankle_at(position, rotation, legs.ankle[side])

@@ -17,14 +17,9 @@ _FACES = np.array(
 
 
 def world_triangles(model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Triangles (t, 3, 3) m in the world frame of all colliding geoms that come near a box.
+    """Triangles (t, 3, 3) m in the world frame of all colliding geoms that come near a box with corners (3,) m.
 
     Boxes around rounded geoms and prisms around cylinders stand for these.
-
-    Args:
-        model: The compiled world.
-        lower: (3,) m; lower corner of the box.
-        upper: (3,) m; upper corner of the box.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

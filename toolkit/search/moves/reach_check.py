@@ -39,13 +39,8 @@ class ReachCheck:
     ) -> np.ndarray:
         """Codes (n,) of candidates by what legs and arms reach with the CoM at lift-off and after touch-down.
 
-        Args:
-            contacts: (4,) int; contact numbers before.
-            com: (3,) m; CoM before.
-            velocity: (3,) m/s; its velocity before.
-            candidates: The n candidates.
-            end: (n, 3) m; CoM afterwards.
-            end_velocity: (n, 3) m/s; its velocity afterwards.
+        The candidates lead out of contact numbers (4,) with the CoM (3,) m and its velocity (3,) m/s, and end with
+        CoMs (n, 3) m and velocities (n, 3) m/s.
         """
         table, after = self._table, candidates.contacts
         n = len(candidates)

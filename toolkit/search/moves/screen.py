@@ -115,15 +115,9 @@ def _legs_code(body, limits, side, position, rotation, stand, heading):
 
 @compiled(kept=True)
 def screen_steps(soles, side, stand, limits, body, codes):
-    """Fill codes (n,) int of new soles beside a standing one, for all allowed CoMs.
+    """Fill codes (n,) int of new `Soles` beside a standing `Sole`, for all CoMs within `StepLimits`.
 
-    Args:
-        soles: n `Soles`.
-        side: Side of the new soles: 0 left, 1 right.
-        stand: The standing `Sole`.
-        limits: `StepLimits`.
-        body: `Body`.
-        codes: The array to fill.
+    The side is that of the new soles: 0 left, 1 right.
     """
     half, q = limits.half, stand.position
     for row in range(len(codes)):
@@ -145,18 +139,10 @@ def screen_steps(soles, side, stand, limits, body, codes):
 
 @compiled(kept=True)
 def screen_swings(position, yaw, old, stand, half, longest, still, still_yaw, codes):
-    """Fill codes (n,) int of swings of a foot from its old place past the standing one.
+    """Fill codes (n,) int of swings of a foot from the `Sole` `old` past the standing one `stand`.
 
-    Args:
-        position: (n, 3) m; new soles.
-        yaw: (n,) rad; their headings.
-        old: The `Sole` before.
-        stand: The standing `Sole`.
-        half: (2,) m; as in `StepLimits`.
-        longest: Longest way in XY in m.
-        still: A shorter way, in m, is no movement, unless the foot turns by more than `still_yaw` rad.
-        still_yaw: See `still`.
-        codes: The array to fill.
+    The new soles have centres position (n, 3) m and headings yaw (n,) rad; `half` is that of `StepLimits`. No way in XY
+    may be longer than `longest` m. A way shorter than `still` m with a turn below `still_yaw` rad is no movement.
     """
     p, q = old.position, stand.position
     for row in range(len(yaw)):

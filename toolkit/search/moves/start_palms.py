@@ -18,11 +18,6 @@ _SEARCH, _STEP = 0.1, 0.02  # m; farthest from the point nearest to its site tha
 def with_palms(world: World, feet: Stance, moves: MoveGenerator) -> Stance:
     """The start stance with the palms that the world's sites ask for, each as near to its site as it can be held.
 
-    Args:
-        world: The world.
-        feet: Stance of the feet.
-        moves: Projects and screens the palms.
-
     Raises:
         WorldError: The robot has no such arm, or it cannot hold its palm there.
     """
