@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class TransitionBatch:
     objective: np.ndarray
     com: np.ndarray
     com_velocity: np.ndarray
-    untrained: int = 0
+    untrained: int = field(default=0, kw_only=True)
 
 
 class TransitionEvaluator(ABC):
