@@ -35,7 +35,7 @@ _FRICTION = 0.9  # part of the friction coefficients that may be used
 _PATCH = 0.5  # part of a sole's half extents in which the centre of pressure may be
 _DROPS = (0.0, 0.06, 0.12, 0.18)  # parts of its height by which the CoM may be lower than at home
 _KEPT = 20_000  # linear programs that are remembered
-_PARTS = np.array([0.0, 0.5, 1.0])  # of the way from the middle of the support to its point nearest to the other foot
+_PARTS = np.array([0.0, 0.5, 1.0])  # parts of the way from the support's middle to its point nearest to the other foot
 
 
 class QuasiStaticEvaluator(TransitionEvaluator):

@@ -33,8 +33,8 @@ class OpenList:
 
     def __init__(self, g: Sequence[float], h: Sequence[float], layer: float):
         self._g, self._h, self._layer = g, h, layer
-        self._nodes: list[int] = []  # in no order, for random draws
-        self._place: dict[int, int] = {}  # of each node in _nodes
+        self._nodes: list[int] = []  # unsorted, for random draws
+        self._place: dict[int, int] = {}  # index of each node in _nodes
         self._heap: list[_Entry] = []
         self._layers: dict[int, list[_Entry]] = {}
         self._pushes = 0

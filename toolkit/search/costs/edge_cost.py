@@ -26,8 +26,8 @@ class CostConfig:
     """Weights of the terms of the edge cost.
 
     Attributes:
-        step: w_s of the paper.
-        dynamics: w_dyn of the paper.
+        step: Weight w_s of the paper.
+        dynamics: Weight w_dyn of the paper.
         time: Cost per s. It counts only where the planner may choose between timings; otherwise slower would always
             look better.
         steep: Weight of (`reserve` over the part of its friction that resting leaves) - 1 of a foot's new contact. A
@@ -80,7 +80,6 @@ class EdgeCost:
         for term in (self._time, self._steep, self._stagger):
             cost = cost + term(candidates)
         return cost
-
 
     def least_of_edge(self, candidates: Candidates) -> np.ndarray:
         """(n,) least cost of transitions, which every one of them has."""

@@ -21,7 +21,7 @@ from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.world import Goal
 
 _CELL = 0.1  # m; larger where the world would need more than _MAX_CELLS
-_MAX_CELLS = 200_000  # in XY
+_MAX_CELLS = 200_000  # cells in XY
 _YAWS = 8  # layers over half a turn (the box is the same both ways)
 CLIMB = 0.35  # m; largest change of height between neighbouring cells
 _MERGE = 0.3  # m; heights in one cell that differ by less are one

@@ -22,7 +22,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.moves.reasons import OF_LIMIT, Reason
 from toolkit.search.moves.shanks import legs_apart
 
-_FIELD = tuple(LegPosture._fields.index(limit.quantity) for limit in LIMITS)  # of each limit
+_FIELD = tuple(LegPosture._fields.index(limit.quantity) for limit in LIMITS)  # field of each limit's quantity
 _LENGTH = [limit.quantity for limit in LIMITS].index("length")
 
 

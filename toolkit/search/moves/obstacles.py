@@ -8,7 +8,7 @@ import numpy as np
 from toolkit.geometry.pose import Pose
 from toolkit.world.solids import height_field_triangles
 
-_SIDES = 16  # of a prism around a cylinder
+_SIDES = 16  # sides of a prism around a cylinder
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _FACES = np.array(
     [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]

@@ -20,8 +20,8 @@ class BodyBox(NamedTuple):
     """The body from the knees up as an upright box over the mean of the feet.
 
     Attributes:
-        half_depth, half_width: m; half extents along and across the heading.
-        bottom, top: m; heights above the soles.
+        half_depth, half_width: Half extents in m along and across the heading.
+        bottom, top: Heights in m above the soles.
     """
 
     half_depth: float
