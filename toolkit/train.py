@@ -26,14 +26,14 @@ DESCRIPTION = """\
 Make the networks with which the contact search judges transitions.
 
   collect    run the planner in random terrain and label every transition with the centroidal optimiser
-  enrich     label more transitions made of those of a data set, the costly ones most of all
+  enrich     label more transitions that are made of those of a data set, mostly of costly ones
   fit        train a classifier and a regressor per category (needs torch: pip install -e '.[train]')
   evaluate   score the trained networks on fresh transitions
 """
 
 
 def run_collect(args: argparse.Namespace, console: Console) -> int:
-    """`collect`."""
+    """Run `collect`."""
     robot = load_robot(args.robot, args.robots)
     config = CollectConfig(
         robot=robot.name,
@@ -52,15 +52,17 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
                 )
 
         summary = collect(args.out, robot, config, pool, tick)
+    rate = (summary.labelled - summary.resumed) / max(summary.seconds, 1e-9)
+    share = summary.feasible / max(summary.labelled, 1)
     console.print(
-        f"{summary.labelled} transitions in {summary.seconds:.0f} s ({summary.rate:.0f} per s, {summary.resumed} found "
-        f"from before), feasible: {summary.feasible_share:.0%}; fewest of a category: {summary.fewest}\n{args.out}"
+        f"{summary.labelled} transitions in {summary.seconds:.0f} s ({rate:.0f} per s, {summary.resumed} found "
+        f"from before), feasible: {share:.0%}; fewest of a category: {summary.fewest}\n{args.out}"
     )
     return 0
 
 
 def run_enrich(args: argparse.Namespace, console: Console) -> int:
-    """`enrich`."""
+    """Run `enrich`."""
     robot = load_robot(args.robot, args.robots)
     config = EnrichConfig(
         robot=robot.name,
@@ -82,7 +84,7 @@ def run_enrich(args: argparse.Namespace, console: Console) -> int:
 
 
 def run_fit(args: argparse.Namespace, console: Console) -> int:
-    """`fit`."""
+    """Run `fit`."""
     try:
         import torch
 
@@ -139,7 +141,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
 
 
 def run_evaluate(args: argparse.Namespace, console: Console) -> int:
-    """`evaluate`."""
+    """Run `evaluate`."""
     robot = load_robot(args.robot, args.robots)
     networks = load_networks(robot, args.networks)
     data = read_dataset(args.data, robot.fingerprint)
@@ -160,7 +162,7 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one of the sub-commands; returns the exit code."""
+    """Run one of the subcommands; returns the exit code."""
     parser = cli.parser("train", DESCRIPTION)
     commands = parser.add_subparsers(dest="command", required=True)
 

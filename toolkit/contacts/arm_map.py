@@ -74,10 +74,10 @@ class ArmMap:
         """
         return self._tree.query(self._scaled(positions, normals), distance_upper_bound=1.0)[0] < 1.0
 
-    def posture(self, position: np.ndarray, normal: np.ndarray, near: np.ndarray, count: int = 64) -> np.ndarray:
-        """(k,) rad; among the samples around a palm, the joint angles that are nearest to `near` (k,)."""
+    def posture(self, position: np.ndarray, normal: np.ndarray, near: np.ndarray) -> np.ndarray:
+        """(k,) rad; among 64 samples around a palm, the joint angles that are nearest to `near` (k,)."""
         scaled = self._scaled(position[None], normal[None])[0]
-        distance, rows = self._tree.query(scaled, count)
+        distance, rows = self._tree.query(scaled, 64)
         rows = rows[distance < max(1.0, 1.5 * distance[0])]
         return self.angles[rows[np.argmin(np.square(self.angles[rows] - near).sum(1))]]
 

@@ -64,6 +64,11 @@ class Projected:
         """(n,) bool; whether the patch fits on a surface."""
         return self.surface >= 0
 
+    @classmethod
+    def none(cls, count: int) -> Projected:
+        """Candidates whose patches fit nowhere yet."""
+        return cls(np.full(count, -1), np.zeros((count, 3)), np.zeros((count, 3, 3)))
+
     def select(self, rows: np.ndarray) -> Projected:
         """The candidates of these rows, by index or by mask."""
         return Projected(self.surface[rows], self.position[rows], self.rotation[rows])
@@ -120,20 +125,11 @@ class Projector:
         offsets = self.offsets if shift else self.offsets[:1]
         if outward < 0:
             offsets = offsets * [1.0, -1.0]
-        n = len(pose)
-        surface, position, rotation = np.empty(n, np.int64), np.zeros((n, 3)), np.zeros((n, 3, 3))
-        project_soles(
-            np.ascontiguousarray(pose, dtype=float),
-            float(low),
-            float(high),
-            self.half_sizes[limb],
-            np.ascontiguousarray(offsets),
-            self.table,
-            surface,
-            position,
-            rotation,
-        )
-        return Projected(surface, position, rotation)
+        soles, half = Projected.none(len(pose)), self.half_sizes[limb]
+        pose, offsets = np.ascontiguousarray(pose, dtype=float), np.ascontiguousarray(offsets)
+        found = soles.surface, soles.position, soles.rotation
+        project_soles(pose, float(low), float(high), half, offsets, self.table, *found)
+        return soles
 
     def project_palms(self, limb: Limb, shoulder: np.ndarray, rays: np.ndarray, yaw: float, reach: float) -> Projected:
         """Send palms along rays to the nearest surfaces that hold them; z along the surface's normal.
@@ -145,31 +141,18 @@ class Projector:
             yaw: Heading of the body, in rad.
             reach: Length of the rays, in m.
         """
-        n, table = len(rays), self.table
-        surface, position, rotation = np.empty(n, np.int64), np.zeros((n, 3)), np.zeros((n, 3, 3))
+        palms, table, half = Projected.none(len(rays)), self.table, self.half_sizes[limb]
         chosen = self._palm_surfaces
         chosen = chosen[np.linalg.norm(table.centre[chosen] - shoulder, axis=1) < table.radius[chosen] + reach]
         if not len(chosen):
-            surface[:] = -1
-            return Projected(surface, position, rotation)
-        distance = np.full(n, np.inf)
-        rays = np.ascontiguousarray(rays, dtype=float)
-        project_palms(
-            np.asarray(shoulder, float),
-            rays,
-            float(yaw),
-            float(reach),
-            self.half_sizes[limb],
-            chosen,
-            table,
-            surface,
-            distance,
-            position,
-            rotation,
-        )
-        if (surface >= 0).any():
-            surface[self._blocked(np.asarray(shoulder, float), rays, distance, reach)] = -1
-        return Projected(surface, position, rotation)
+            return palms
+        distance = np.full(len(rays), np.inf)
+        shoulder, rays = np.asarray(shoulder, float), np.ascontiguousarray(rays, dtype=float)
+        found = palms.surface, distance, palms.position, palms.rotation
+        project_palms(shoulder, rays, float(yaw), float(reach), half, chosen, table, *found)
+        if palms.found.any():
+            palms.surface[self._blocked(shoulder, rays, distance, reach)] = -1
+        return palms
 
     def _blocked(self, origin: np.ndarray, rays: np.ndarray, distance: np.ndarray, reach: float) -> np.ndarray:
         """(n,) bool; whether anything that collides lies before `distance` (n,) m on each ray."""

@@ -72,14 +72,5 @@ class TransitionRows(Sequence[ContactTransition]):
 
     def select(self, rows: np.ndarray) -> TransitionRows:
         """The transitions of these rows, by index."""
-        rows = np.asarray(rows)
-        return TransitionRows(
-            self.limb[rows],
-            self.makes[rows],
-            self.position[rows],
-            self.rotation[rows],
-            self.friction[rows],
-            self.shift[rows],
-            self.swing[rows],
-            lambda row: self.make(int(rows[row])),
-        )
+        arrays = self.limb, self.makes, self.position, self.rotation, self.friction, self.shift, self.swing
+        return TransitionRows(*(array[rows] for array in arrays), make=lambda row: self.make(int(rows[row])))
