@@ -45,11 +45,10 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
         task = progress.add_task("shards", total=config.shards)
 
         def tick(state: Collected) -> None:
-            progress.update(task, completed=state.shards, description=f"shards ({state.labelled} transitions)")
+            transitions = f"{state.labelled} transitions"
+            progress.update(task, completed=state.shards, description=f"shards ({transitions})")
             if not console.is_terminal:
-                console.print(
-                    f"{state.shards} of {config.shards} shards, {state.labelled} transitions, {state.seconds:.0f} s"
-                )
+                console.print(f"{state.shards} of {config.shards} shards, {transitions}, {state.seconds:.0f} s")
 
         summary = collect(args.out, robot, config, pool, tick)
     rate = (summary.labelled - summary.resumed) / max(summary.seconds, 1e-9)

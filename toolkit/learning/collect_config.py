@@ -78,8 +78,3 @@ class CollectConfig:
     def shards(self) -> int:
         """Number of shards."""
         return -(-self.samples_per_category // self.per_shard)
-
-    @property
-    def per_slope(self) -> int:
-        """Least number of samples on slopes in a shard."""
-        return round(self.slope_share * self.per_shard)

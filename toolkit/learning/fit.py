@@ -195,10 +195,10 @@ def fit_category(
 
 def _summary(samples: Samples, config: FitConfig, curves: dict[str, Curve], before: dict) -> dict:
     """Summary of the training for the network file; `before` is the summary of a network that was kept."""
-
-    def losses(values: np.ndarray) -> list[float]:
-        return [float(f"{value:.3g}") for value in values]
-
+    losses = {
+        name: [[float(f"{value:.3g}") for value in values] for values in (curve.training, curve.validation)]
+        for name, curve in curves.items()
+    }
     return {
         "samples": len(samples),
         "feasible": int(samples.feasible.sum()),
@@ -208,8 +208,7 @@ def _summary(samples: Samples, config: FitConfig, curves: dict[str, Curve], befo
         "epochs": before.get("epochs", {}) | {name: len(curve.training) for name, curve in curves.items()},
         "validation_loss": before.get("validation_loss", {})
         | {name: float(curve.validation.min()) for name, curve in curves.items()},
-        "curves": before.get("curves", {})
-        | {name: [losses(curve.training), losses(curve.validation)] for name, curve in curves.items()},
+        "curves": before.get("curves", {}) | losses,
         "torch": torch.__version__,
     }
 

@@ -46,7 +46,8 @@ def collect_shard(config: CollectConfig, index: int) -> dict[Category, Samples]:
     rng = np.random.default_rng([config.seed, index])
     robot = robot_of(config.robot, config.robots)
     balance = Balance(config.infeasible)
-    tilted, slopes = Quota(config.per_shard, categories_of(robot)), Quota(config.per_slope, [Category.MOVE_FOOT])
+    tilted = Quota(config.per_shard, categories_of(robot))
+    slopes = Quota(round(config.slope_share * config.per_shard), [Category.MOVE_FOOT])
     while not tilted.full:
         ground = Ground.DEFAULT if rng.random() < config.default_share else Ground.VARIED
         walls = 1 + int(rng.random() < config.two_walls)
@@ -67,11 +68,7 @@ def _walk(robot: RobotModel, text: str, recorder: Recorder, expansions: int, rng
     """Let the planner walk at random on one terrain."""
     world = replace(load_world("training.xml", mjcf=text), goal=_NOWHERE)
     search = AnaStarConfig(epsilon=0.9, max_expansions=expansions)
-    planner = ContactPlanner(
-        robot,
-        world,
-        recorder,
-        PlannerConfig(heuristic="euclidean", wide_steps="on", cost=CostConfig(steep=0.0), search=search),
-    )
+    config = PlannerConfig(heuristic="euclidean", wide_steps="on", cost=CostConfig(steep=0.0), search=search)
+    planner = ContactPlanner(robot, world, recorder, config)
     with suppress(PlanningError):  # the ground at the start is too steep to stand on
         planner.search(rng, np.inf)
