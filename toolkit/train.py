@@ -180,13 +180,13 @@ def main(argv: list[str] | None = None) -> int:
         metavar = f"{numbers[0]}..{numbers[-1]}"
         sub.add_argument("--categories", type=int, nargs="+", choices=numbers, metavar=metavar, help="only these")
 
-    sub = add("collect", "label transitions with the centroidal optimiser; goes on where it was stopped")
+    sub = add("collect", "label transitions with the centroidal optimiser; continues where it was stopped")
     sub.add_argument("--out", type=Path, required=True, help="data set folder, new or begun")
     sub.add_argument("--samples", type=cli.positive(int), default=100_000, help="per category (default: %(default)s)")
     add_executor(sub)
     sub.set_defaults(run=run_collect)
 
-    sub = add("enrich", "label transitions made of a data set's, costly ones above all; goes on where it was stopped")
+    sub = add("enrich", "label transitions made of a data set's, mostly costly ones; continues where it was stopped")
     sub.add_argument("--data", type=Path, required=True, help="data set folder")
     sub.add_argument("--out", type=Path, required=True, help="data set folder for the result, new or begun")
     sub.add_argument(
@@ -213,8 +213,12 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument(
         "--sensitivity-weight", type=float, default=20.0, help="of the derivatives' loss (default: %(default)s)"
     )
-    sub.add_argument("--refine", action="store_true", help="go on from the regressors in --out, classifiers kept")
-    sub.add_argument("--keep-classifiers", action="store_true", help="train the regressors alone, of networks in --out")
+    sub.add_argument(
+        "--refine", action="store_true", help="continue the training of the regressors in --out, keep classifiers"
+    )
+    sub.add_argument(
+        "--keep-classifiers", action="store_true", help="train only the regressors of the networks in --out"
+    )
     add_categories(sub)
     sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="threads (default: all cores)")
     sub.add_argument("--device", default="cpu", help="where torch computes, such as cuda (default: %(default)s)")

@@ -26,8 +26,8 @@ class Labels(TransitionBatch):
     """The optimiser's judgement of n transitions, and the derivatives of its objective.
 
     Attributes:
-        sensitivity: n derivatives in the world. None where a transition is infeasible, or where the CoM had to be moved
-            within reach, so that a slightly different problem was solved.
+        sensitivity: The n derivatives in the world. One is None where the transition is infeasible, or where the CoM
+            had to be moved within reach, so that a slightly different problem was solved.
     """
 
     sensitivity: tuple[fast.Sensitivity | None, ...]

@@ -29,7 +29,7 @@ _TO_GO_ON = 4  # transitions that are labelled per state where no category lacks
 
 @dataclass(eq=False)
 class Recorder(TransitionEvaluator):
-    """A judge that labels and keeps some of the transitions that it is asked about, and calls the others infeasible.
+    """A judge that labels and keeps some transitions that it is asked about, and calls the others infeasible.
 
     Attributes:
         robot: The robot.
@@ -62,7 +62,7 @@ class Recorder(TransitionEvaluator):
         categories = [Category(number) for _, number in groups]
         chosen = self._choose([np.array(rows) for rows in groups.values()], categories)
         friction = None if self.ground == Ground.DEFAULT else float(self.rng.uniform(*self.config.friction))
-        old = _with_friction(stance, friction)
+        old = stance if friction is None else Stance(tuple(replace(c, friction=friction) for c in stance.contacts))
         for rows, category in zip(chosen, categories, strict=True):
             if len(rows):
                 items = [self._vary(transitions[row], friction) for row in rows]
@@ -154,9 +154,3 @@ class Recorder(TransitionEvaluator):
             copies = np.repeat(rows, times)
             chosen.append(np.sort(rng.choice(copies, min(size, len(copies)), replace=False)))
         return chosen
-
-
-def _with_friction(stance: Stance, friction: float | None) -> Stance:
-    if friction is None:
-        return stance
-    return Stance(tuple(replace(contact, friction=friction) for contact in stance.contacts))
