@@ -213,12 +213,8 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument(
         "--sensitivity-weight", type=float, default=20.0, help="of the derivatives' loss (default: %(default)s)"
     )
-    sub.add_argument(
-        "--refine", action="store_true", help="continue the training of the regressors in --out, keep classifiers"
-    )
-    sub.add_argument(
-        "--keep-classifiers", action="store_true", help="train only the regressors of the networks in --out"
-    )
+    sub.add_argument("--refine", action="store_true", help="train the regressors in --out further, keep classifiers")
+    sub.add_argument("--keep-classifiers", action="store_true", help="keep the classifiers in --out, train regressors")
     add_categories(sub)
     sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="threads (default: all cores)")
     sub.add_argument("--device", default="cpu", help="where torch computes, such as cuda (default: %(default)s)")
