@@ -29,7 +29,7 @@ class TaskGains(NamedTuple):
 # These gains walked on flat ground, on stones, on stairs and with a palm on a wall.
 SWING, SWING_ROTATION = TaskGains(200.0, 400.0, 40.0), TaskGains(20.0, 400.0, 40.0)  # a foot in the air
 HAND = TaskGains(50.0, 200.0, 28.0)  # a palm that approaches or leaves its contact
-# Arms and trunk that followed the momentum rather than the planned joints would leave the way that was found clear.
+# The posture keeps arms and trunk on the way that was found clear; to follow the momentum they would leave it.
 COM, BASE, POSTURE = TaskGains(1000.0, 60.0, 14.0), TaskGains(50.0, 100.0, 20.0), TaskGains(4.0, 60.0, 15.0)
 SPIN = TaskGains(40.0, 5.0, 0.0)  # of the angular momentum in units of MOMENTUM_SCALE; kd is unused
 # A limb in contact is held still by its velocity only, because its resting place is a measured fact. The patch of a

@@ -43,9 +43,9 @@ def measure(
     times = reference.times[:count]
     intervals = []
     for limb, model in sorted(robot.limbs.items()):
-        parts = (recorder.normal_force, recorder.limb_position, recorder.limb_rotation)
-        samples = [part[:count, limb] for part in parts]
-        intervals += contact_intervals(limb, *samples, model.half_size, config.control_period)
+        force, position = recorder.normal_force[:count, limb], recorder.limb_position[:count, limb]
+        rotation = recorder.limb_rotation[:count, limb]
+        intervals += contact_intervals(limb, force, position, rotation, model.half_size, config.control_period)
     slip = _slip_by_stance(intervals, times, reference, len(plan.sequence.stances))
     touchdowns = _touchdowns(intervals, recorder, reference, config)
     missing = sum(swing.contact is not None for swing in reference.swings) - len(touchdowns)

@@ -90,7 +90,7 @@ class ReplanProblem:
         """
         if not situation.displaced:
             kept = self._solve(situation, {}, movable=0)
-            # Back at the plan when the next foot lands?
+            # This suffices if the motion is back at the plan when the next foot lands.
             if kept and kept.divergence[kept.next_landing] <= SETTLED and kept.excess <= EXCESS:
                 return kept
         swings = self._nominal.swings
