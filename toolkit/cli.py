@@ -165,7 +165,6 @@ def execution_config(args: argparse.Namespace) -> ExecutionConfig:
     """
     from toolkit.execution.config import ExecutionConfig
     from toolkit.execution.disturbance import Disturbance
-    from toolkit.replanning.config import ReplanConfig
 
     offset, tilt = args.terrain_error
     disturbance = Disturbance(
@@ -177,7 +176,7 @@ def execution_config(args: argparse.Namespace) -> ExecutionConfig:
         state_noise=args.state_noise,
         delay=args.delay,
     )
-    return ExecutionConfig(disturbance=disturbance, replanning=ReplanConfig(enabled=args.replanning))
+    return ExecutionConfig(disturbance=disturbance, replanning=args.replanning)
 
 
 def plain_options(args: argparse.Namespace) -> dict[str, Any]:
