@@ -154,7 +154,7 @@ class WholeBodyIK:
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     def _posture(self, time: float, angles: np.ndarray, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
-        """(n,) rad; posture that joints tend to: home, but for an arm that has or reaches a contact one that fits it."""
+        """(n,) rad; posture that joints tend to: home, or what fits the contact that an arm has or reaches."""
         posture = self.robot.home[7:].copy()
         for palm in self.palms:
             segment = paths.segment(palm, time)
@@ -309,7 +309,7 @@ def first_guess(robot: RobotModel, paths: LimbPaths, motion: CentroidalMotion) -
 
 
 def knee_range(robot: RobotModel, foot: Limb, least_flexion: float = weights.MIN_KNEE) -> tuple[int, float, float]:
-    """Index of a leg's knee joint, and its lower and upper limit (rad) that keep a least flexion (rad; 0 is straight)."""
+    """Index of a leg's knee joint, and its lower and upper limit in rad that keep a least flexion (0 is straight)."""
     joint = int(robot.joints_to(foot)[3])  # after the three of the hip, as in every leg that can be loaded
     model = robot.mujoco_model
     data = mujoco.MjData(model)

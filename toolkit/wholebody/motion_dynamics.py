@@ -54,8 +54,8 @@ def velocities(model: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray) -> np
 def inverse_dynamics(robot: RobotModel, motion: CentroidalMotion, times: np.ndarray, qpos: np.ndarray) -> np.ndarray:
     """(T, 6 + n) `M qacc + h - J^T w` with the planned wrenches w, by MuJoCo, at uniform times (T,) in s.
 
-    The first six are the residual at the base, zero if motion and wrenches agree exactly: force (N) in the world, moment
-    (N m) about the base in its frame. The others are the joint torques in N m.
+    The first six are the residual at the base, zero if motion and wrenches agree exactly: force (N) in the world, and
+    moment (N m) about the base in its frame. The others are the joint torques in N m.
     """
     model = copy.copy(robot.mujoco_model)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
@@ -87,9 +87,9 @@ def inverse_dynamics(robot: RobotModel, motion: CentroidalMotion, times: np.ndar
 def posture_momentum(model: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> tuple:
     """Angular momentum about the CoM along a motion, lightly smoothed, and its rate: (T, 3) kg m^2/s and (T, 3) N m.
 
-    Both are in the world, at times (T,) in s; `model` is the robot alone. Inverse kinematics follows the planned angular
-    momentum only as far as the postures allow. A controller that tracks both the postures and a momentum must therefore
-    take the momentum from the postures, or the two targets contradict each other.
+    Both are in the world, at times (T,) in s; `model` is the robot alone. Inverse kinematics follows the planned
+    angular momentum only as far as the postures allow. A controller that tracks both the postures and a momentum must
+    therefore take the momentum from the postures, or the two targets contradict each other.
     """
     data = mujoco.MjData(model)
     momentum = np.zeros((len(times), 3))

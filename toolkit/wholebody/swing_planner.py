@@ -12,7 +12,7 @@ from toolkit.wholebody.swing import Move, SwingPath, Window
 from toolkit.wholebody.swing_task import EASY, MARGIN, SAMPLES, STEEP, SwingTask, SwingTiming
 
 Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool: whether the box touches the world."""
+"""Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool, whether a box touches the world."""
 
 SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
 THICKNESS = 0.08  # m; height of the swept box above the patch, to hold the foot or the hand
