@@ -121,7 +121,7 @@ def limb_errors(execution: Execution, trajectory: WholeBodyTrajectory) -> dict[L
 
 
 def slip_steps(execution: Execution, schedule: ContactSchedule) -> tuple[np.ndarray, np.ndarray]:
-    """Slip of k stances: (k + 1,) s with the begin of each and the end of the run, and (k + 1,) m, the last one twice."""
+    """Slip of k stances: (k + 1,) s with the begin of each and the end of the run; (k + 1,) m, the last one twice."""
     end = float(execution.samples.tick_times[-1])
     edges = np.clip([*stance_times(schedule), end], 0.0, end)
     count = min(len(execution.slip), len(edges) - 1)
