@@ -145,7 +145,7 @@ def test_the_plan_s_scene_stays_as_it_is(walking):
 def test_the_controller_tracks_the_paths_of_the_plan(walking, flat):
     """Feet that are planned to swing higher do so in the run: the paths are not planned anew."""
     plan = whole_body(walking.whole, walking.whole.scene, foot_lift=0.09)
-    lift = [execute(each).limb_pose[:, Limb.LEFT_FOOT, 2].max() for each in (walking.whole, plan)]
+    lift = [execute(each).samples.limb_pose[:, Limb.LEFT_FOOT, 2].max() for each in (walking.whole, plan)]
     assert lift[1] > lift[0] + 0.02
 
 
