@@ -84,7 +84,7 @@ class PlanningOptions:
     """What `add_planning_options` understands, but for the seed.
 
     Attributes:
-        planner: Who judges transitions (`toolkit.pipeline.planner.PLANNERS`).
+        planner: Who judges transitions (see `toolkit.pipeline.planner.make_planner`).
         timing: Times that a transition may take; empty for the world's own.
         time_limit: s of the search.
         expansions: States that the search expands at most; None for any number.

@@ -1,4 +1,4 @@
-"""What was extracted from a world, as a table and as a recording."""
+"""The surfaces extracted from a world, as a table and as a recording."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from toolkit.world.world import World
 
 
 def surface_table(world: World) -> Table:
-    """A row per surface: index, geom, position, area, angle from up, friction, convex pieces, what it serves."""
+    """A row per surface: index, geom, position, area, angle from up, friction, convex pieces, feet or palms."""
     feet = sum(surface.serves_foot for surface in world.surfaces)
     palms = sum(surface.serves_palm for surface in world.surfaces)
     title = f"{escape(world.name)}: {len(world.surfaces)} surfaces, {feet} for feet, {palms} for palms"
@@ -41,20 +41,11 @@ def surface_table(world: World) -> Table:
 
 
 def write_surface_recording(path: Path, world: World) -> None:
-    """Write a recording of a world's geoms with its surfaces, their outlines and normals, the start and the goal.
-
-    Args:
-        path: file to write.
-        world: the world.
-    """
+    """Write a recording of a world's geoms, its surfaces with their normals, the start and the goal."""
     stream = start_recording(path, "contact surfaces", world.name)
     try:
-        scene = rrb.Spatial3DView(
-            origin="world",
-            name="Surfaces: blue for feet, amber for palms",
-            eye_controls=_eye(world),
-            line_grid=False,
-        )
+        name = "Surfaces: blue for feet, amber for palms"
+        scene = rrb.Spatial3DView(origin="world", name=name, eye_controls=_eye(world), line_grid=False)
         panels = (rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"))
         stream.send_blueprint(rrb.Blueprint(scene, *panels, rrb.TimePanel(state="hidden"), auto_views=False))
         draw_scene(stream, world.mujoco_model)
