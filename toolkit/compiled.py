@@ -5,8 +5,8 @@ function and of everything that it calls or reads, directly or not and in any fi
 call compile again; an edit of a comment, or of a function that is not called, does not.
 
 A function that only other compiled functions call is decorated with `@compiled`. One that Python calls is decorated
-with `@compiled(kept=True)`, and what was compiled is kept on disk: beside the source, or, where that folder cannot be
-written, in numba's folder of the user. Where neither can be written, it is compiled anew in each process.
+with `@compiled(kept=True)`, and its compiled code is kept on disk: beside the source or, where that folder cannot be
+written, in the user's numba folder. Where neither can be written, each process compiles it anew.
 
 A formula that Python, NumPy arrays, CasADi's symbols and compiled functions share is decorated with `@law`.
 """
@@ -74,7 +74,7 @@ def digest(function: Callable) -> str:
         name = f"{item.__module__}.{item.__qualname__}"
         if name in found:
             continue
-        found[name] = ""  # before what it calls, which may call it
+        found[name] = ""  # before its callees, which may call it
         text, called = _described(item)
         found[name] = text
         waiting += called
@@ -116,9 +116,9 @@ def _described(function: Callable) -> tuple[str, list[Callable]]:
     for name in sorted(names & known.keys()):
         value = known[name]
         if isinstance(value, types.ModuleType) and not value.__name__.startswith("toolkit."):
-            continue  # a library: its version is numba's concern
+            continue  # a library, whose version numba checks
         members = [value]
-        if isinstance(value, types.ModuleType):  # of a module, whatever the code may take from it
+        if isinstance(value, types.ModuleType):  # the attributes that the code may use
             members = [vars(value)[attribute] for attribute in sorted(names & vars(value).keys())]
         for member in members:
             if isinstance(member, (Dispatcher, types.FunctionType)):

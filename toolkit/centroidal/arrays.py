@@ -1,9 +1,9 @@
-"""A centroidal problem and its motion as compiled functions take them: named tuples of arrays of exact types."""
+"""A centroidal problem and its motion for compiled functions: named tuples of arrays of exact types."""
 
 from __future__ import annotations
 
 from dataclasses import astuple
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class ProblemArrays(NamedTuple):
         """The arrays of a problem."""
         p = problem
         landing = p.landing_limb >= 0
-        converted = {
+        values: dict[str, Any] = {
             "mass": float(p.mass),
             "active": _plain(p.active, bool),
             "min_height": float(p.min_height),
@@ -65,8 +65,8 @@ class ProblemArrays(NamedTuple):
             "landing_position": _plain(p.landing_position) if landing else np.zeros(3),
             "landing_rotation": _plain(p.landing_rotation) if landing else np.eye(3),
         }
-        arrays = {name: _plain(getattr(p, name)) for name in cls._fields if name not in converted}
-        return cls(**converted, **arrays)
+        values |= {name: _plain(getattr(p, name)) for name in cls._fields if name not in values}
+        return cls(**values)
 
     def copy(self) -> ProblemArrays:
         """The same with arrays of its own."""

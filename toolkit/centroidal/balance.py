@@ -26,7 +26,7 @@ from toolkit.physics.wrench import corner_rays
 from toolkit.robot.model import RobotModel
 
 SIDES = 16
-_CUTS = 12  # most rounds of cutting planes; each reduces what is left outside the spheres several times
+_CUTS = 12  # most rounds of cutting planes; each reduces the distance outside the spheres several times
 _TOLERANCE = 1e-7
 _TIE = 1e-3  # price of a metre between the CoM and the middle of the contacts, in units of the margin
 

@@ -23,7 +23,7 @@ CROSSING = (0.02, 0.95)  # part of a swing in which the foot moves horizontally 
 
 @dataclass(frozen=True)
 class BodyMargins(ReachMargins):
-    """How far inside the body's limits a plan stays; the defaults are what no plan may exceed.
+    """How far inside the body's limits a plan stays; the defaults are the limits themselves.
 
     Attributes:
         length: m; taken off both ends of the hip-ankle and shoulder-palm distances.

@@ -171,7 +171,7 @@ def _slack() -> Piece:
 
 
 def _initial() -> Piece:
-    """Given state; parameters: the state (12), its acceleration is what the first step is compared with."""
+    """Given state; parameters: the state (12), with the acceleration with which the first step is compared."""
     p = Parameters()
     x = ca.SX.sym("x", STATE)
     rows = x - p(STATE)
@@ -196,7 +196,7 @@ def _final(moving: bool) -> Piece:
 
 
 def _carry() -> Piece:
-    """What a pair of variables becomes at the next knot: rows b - a."""
+    """Change of a pair of variables to the next knot: rows b - a."""
     now, after = ca.SX.sym("a", 2), ca.SX.sym("b", 2)
     return Piece("carry", ca.vertcat(now, after), ca.SX(0, 1), rows=after - now)
 

@@ -36,7 +36,7 @@ _SILENT = {"print_level": 0, "sb": "yes"}
 
 @dataclass(frozen=True)
 class SequenceConfig:
-    """What a sequence is planned with.
+    """Settings of the optimisation of a sequence.
 
     Attributes:
         problem: Discretisation, final box, weights and the wanted margins of the contacts.
@@ -152,7 +152,7 @@ def _landings(problem: CentroidalProblem, schedule: ContactSchedule, room: np.nd
 
 
 def _landed(program: Program, x: np.ndarray) -> np.ndarray | None:
-    """(N, 4, 3) m; contacts where the variables have them; None where they cannot move."""
+    """(N, 4, 3) m; places of the contacts, moved by the variables; None where they cannot move."""
     p, layout = program.problem, program.layout
     if not layout.moving:
         return None

@@ -65,7 +65,7 @@ def _wider(motion: CentroidalMotion) -> list[Margins]:
 
 
 def _failure(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) -> Failure:
-    """Which constraint is violated most, by how much, and where."""
+    """The constraint that is violated most, by how much, and where."""
     times = motion.problem.times
     step = int(np.argmax(slack[:-1, 0]))
     excess = slack[step, 0]

@@ -8,9 +8,8 @@ roll and pitch, the ankle one of pitch and roll (the usual humanoid leg). With
 all six joint angles follow: the ankle rolls until h lies in the plane of the leg, the cosine rule gives the knee and
 the shin, and the thigh's frame seen from the base gives the hip.
 
-The laws are written once, for numbers in compiled code, for arrays and for CasADi's symbols. A vector is anything whose
-components are v[0], v[1], v[2], and a rotation has the components r[i, j]; each component is a number, an array (n,) or
-a symbol.
+The laws serve numbers in compiled code, arrays and CasADi's symbols. A vector is anything with components v[0], v[1]
+and v[2], and a rotation has components r[i, j]. Each component is a number, an array (n,) or a symbol.
 """
 
 from __future__ import annotations
@@ -78,7 +77,7 @@ class LegPosture(NamedTuple):
     """Joint angles in rad, signs as in `LegGeometry.ranges`, and points in m in the world, three components each.
 
     Attributes:
-        length: m; hip to ankle. Beyond what the two links can span the angles are those of a nearly straight leg.
+        length: m; hip to ankle. Where the two links are too short, the angles are those of a nearly straight leg.
         ankle_pitch, ankle_roll, hip_pitch, hip_roll, hip_yaw, knee: rad.
         pitch_axis: Unit vector; axis of hip pitch, knee and ankle pitch in the world.
         hip_point, knee_point, ankle_point: m.

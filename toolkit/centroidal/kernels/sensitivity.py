@@ -16,7 +16,7 @@ STEP = 1e-5
 NEW = 4
 """Row of the new contact, after those of the limbs."""
 PLACE, ROTATION, COM, VELOCITY, DURATION, FRICTION = 0, 1, 2, 3, 4, 5
-"""Kinds of what is varied."""
+"""Kinds of variations."""
 
 
 @compiled(reordered=True)
@@ -63,7 +63,7 @@ def restore(problem, varied):
 
 @compiled(reordered=True)
 def vary(kind, row, axis, step, p):
-    """Change one thing of a problem (`ProblemArrays`) by a step, and what follows from it.
+    """Change one thing of a problem (`ProblemArrays`) by a step, and all that depends on it.
 
     The kind is PLACE or ROTATION of the contact `row` (a limb or NEW) along a world axis, COM or VELOCITY along an
     axis, DURATION of the phase `axis`, or FRICTION.

@@ -21,7 +21,7 @@ from toolkit.physics.momentum import fill_wrench_map, spin
 from toolkit.physics.wrench import pressure, pressure_rows, yaw_row
 
 ROWS = 13
-"""Linear constraints of a contact."""
+"""Number of linear constraints of a contact."""
 SCALE = 1e-3
 """Factor on the paper's objective."""
 UNBOUNDED_FORCE = 1e3
