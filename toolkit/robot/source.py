@@ -128,8 +128,7 @@ def _prepare_urdf(path: Path, root: ElementTree.Element) -> None:
     for extension in root.findall("mujoco"):
         root.remove(extension)
     extension = ElementTree.SubElement(root, "mujoco")
-    options = dict.fromkeys(("strippath", "fusestatic", "discardvisual"), "false")
-    ElementTree.SubElement(extension, "compiler", options)
+    ElementTree.SubElement(extension, "compiler", strippath="false", fusestatic="false", discardvisual="false")
 
 
 def _resolve(path: Path, name: str) -> Path | None:
