@@ -55,9 +55,9 @@ def test_what_is_out_of_range_is_refused():
 
 
 def test_replanning_can_be_left_out():
-    assert config_of().replanning.enabled
+    assert config_of().replanning
     config = config_of("--no-replanning", "--push", "60")
-    assert not config.replanning.enabled and config.disturbance.push == 60.0
+    assert not config.replanning and config.disturbance.push == 60.0
 
 
 def test_planning_options_reach_the_planner():

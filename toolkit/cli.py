@@ -107,7 +107,7 @@ class PlanningOptions:
     """What `add_planning_options` understands, but for the seed.
 
     Attributes:
-        planner: Who judges transitions (`toolkit.pipeline.planner.PLANNERS`).
+        planner: Who judges transitions (see `toolkit.pipeline.planner.make_planner`).
         timing: Times that a transition may take; empty for the world's own.
         time_limit: s of the search.
         expansions: States that the search expands at most; None for any number.
@@ -188,7 +188,6 @@ def execution_config(args: argparse.Namespace) -> ExecutionConfig:
     """
     from toolkit.execution.config import ExecutionConfig
     from toolkit.execution.disturbance import Disturbance
-    from toolkit.replanning.config import ReplanConfig
 
     offset, tilt = args.terrain_error
     disturbance = Disturbance(
@@ -200,7 +199,7 @@ def execution_config(args: argparse.Namespace) -> ExecutionConfig:
         state_noise=args.state_noise,
         delay=args.delay,
     )
-    return ExecutionConfig(disturbance=disturbance, replanning=ReplanConfig(enabled=args.replanning))
+    return ExecutionConfig(disturbance=disturbance, replanning=args.replanning)
 
 
 def plain_options(args: argparse.Namespace) -> dict[str, Any]:

@@ -1,12 +1,12 @@
-"""The one door to the compiler: functions that numba compiles, and a cache on disk that knows their sources.
+"""Functions that numba compiles, with a cache on disk that depends on their sources.
 
 numba's own cache watches only the file of the compiled function. Here the entry on disk carries a digest of the
-function and of everything that it calls or reads, however far below and in whatever file. An edit anywhere in it makes
-the next call compile again; an edit of a comment, or of a function that is not called, does not.
+function and of everything that it calls or reads, directly or not and in any file. An edit of any of it makes the next
+call compile again; an edit of a comment, or of a function that is not called, does not.
 
 A function that only other compiled functions call is decorated with `@compiled`. One that Python calls is decorated
-with `@compiled(kept=True)`, and what was compiled is kept on disk: beside the source, or, where that folder cannot be
-written, in numba's folder of the user. Where neither can be written, it is compiled anew in each process.
+with `@compiled(kept=True)`, and its compiled code is kept on disk: beside the source or, where that folder cannot be
+written, in the user's numba folder. Where neither can be written, each process compiles it anew.
 
 A formula that Python, NumPy arrays, CasADi's symbols and compiled functions share is decorated with `@law`.
 """
@@ -27,7 +27,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
 
 REORDERED = frozenset({"reassoc", "contract", "arcp", "nsz"})
-"""What LLVM may do to floating-point sums where a kernel allows it; nan and inf keep their meaning."""
+"""Changes that LLVM may make to floating-point sums where a kernel allows it; nan and inf keep their meaning."""
 
 
 def compiled(function: Callable | None = None, *, kept: bool = False, reordered: bool = False) -> Any:
@@ -63,13 +63,9 @@ def law(function: Callable) -> Callable:
 
 
 def digest(function: Callable) -> str:
-    """A digest of a function's code and of all code and constants that it reaches through global names.
+    """Hexadecimal digest of a plain or compiled function: of its code, and all code and constants that it reaches.
 
-    Args:
-        function: A plain function, or one that was compiled.
-
-    Returns:
-        Hexadecimal digits. They are the same in every process while nothing that the function reaches has changed.
+    It is the same in every process while nothing that the function reaches through global names has changed.
     """
     found: dict[str, str] = {}
     waiting: list[Any] = [function]
@@ -79,7 +75,7 @@ def digest(function: Callable) -> str:
         name = f"{item.__module__}.{item.__qualname__}"
         if name in found:
             continue
-        found[name] = ""  # before what it calls, which may call it
+        found[name] = ""  # before its callees, which may call it
         text, called = _described(item)
         found[name] = text
         waiting += called
@@ -122,9 +118,9 @@ def _described(function: Callable) -> tuple[str, list[Callable]]:
     for name in sorted(names & known.keys()):
         value = known[name]
         if isinstance(value, types.ModuleType) and not value.__name__.startswith("toolkit."):
-            continue  # a library: its version is numba's concern
+            continue  # a library, whose version numba checks
         members = [value]
-        if isinstance(value, types.ModuleType):  # of a module, whatever the code may take from it
+        if isinstance(value, types.ModuleType):  # the attributes that the code may use
             members = [vars(value)[attribute] for attribute in sorted(names & vars(value).keys())]
         for member in members:
             if isinstance(member, (Dispatcher, types.FunctionType)):
@@ -149,7 +145,7 @@ def _text(code: types.CodeType) -> str:
 
 
 def _constant(value: Any) -> str:
-    """A global value as text that is the same in every process."""
+    """A global value as a text that is the same in every process."""
     if isinstance(value, type) and issubclass(value, enum.Enum):
         return repr([(item.name, item.value) for item in value])
     if isinstance(value, type):

@@ -1,12 +1,12 @@
-"""Errors of the toolkit: one base class, typed children.
+"""Errors of the toolkit: one base class and a subclass for each kind.
 
-A message names the file or thing at fault, the offending value and the remedy in one line. Command lines print
-that line and exit with `exit_code`.
+A message names the file or the element at fault, its value and the remedy in one line. Command lines print that line
+and exit with `exit_code`.
 """
 
 
 class ToolkitError(Exception):
-    """Base of every error that a user can cause or can do something about."""
+    """Base of every error that a user can cause or remedy."""
 
     exit_code = 2
 
@@ -32,7 +32,7 @@ class NetworkError(InputError):
 
 
 class PlanningError(ToolkitError):
-    """Planning honestly ended without a result."""
+    """Planning ended without a result."""
 
     exit_code = 1
 

@@ -1,4 +1,4 @@
-"""Reading a model file once: its text, its includes and its assets, with MuJoCo's warnings caught."""
+"""Read a model file once, with its includes and assets, and catch MuJoCo's warnings."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ import numpy as np
 from toolkit.errors import InputError
 
 LARGEST = 1e4
-"""m; nothing in a world or a robot is larger or farther away."""
+"""Largest length or distance in a world or a robot, m."""
 SIZES = ("memory", "nemax", "njmax", "nconmax", "nstack")
-"""Of MuJoCo's buffers; -1 leaves them to MuJoCo."""
+"""Sizes of MuJoCo's buffers; for -1 MuJoCo chooses them."""
 
 _NAN = re.compile(r"""=\s*["'][^"']*(?<![^\s"'])[+-]?nan(?![^\s"'])""", re.IGNORECASE)
-_MOST_CELLS = 4_000_000  # points of a height field, or pixels of a texture
+_MOST_CELLS = 4_000_000  # most points of a height field, or pixels of a texture
 
 
 def one_line(message: object) -> str:
@@ -30,18 +30,13 @@ def one_line(message: object) -> str:
 
 
 def read_spec(path: Path, text: str | None = None) -> mujoco.MjSpec:
-    """Read an MJCF file, or MJCF or URDF text, with everything that it names, into memory.
+    """Read an MJCF file, or MJCF or URDF text in place of the file's content, with all files that it names.
 
-    Args:
-        path: the file.
-        text: its content where that is not what is to be read.
-
-    Returns:
-        The spec; its files are in `spec.assets`, so that what happens to them on the disk does not matter any more.
+    The content of the files is in `spec.assets`, so that later changes on the disk have no effect.
 
     Raises:
         ValueError: MuJoCo cannot read it, or a file is missing.
-        InputError: in one line without the path, a number is NaN, or something is too large.
+        InputError: A number is NaN, or something is too large. The message is one line without the path.
     """
     try:
         str(path).encode()
@@ -67,17 +62,11 @@ def read_spec(path: Path, text: str | None = None) -> mujoco.MjSpec:
 
 
 def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Compile a spec.
-
-    Args:
-        spec: of `read_spec`, or made from such.
-
-    Returns:
-        The model, every number of which is finite, and every length at most `LARGEST`.
+    """Compile a spec and check that every number is finite and every length at most `LARGEST`.
 
     Raises:
         ValueError: MuJoCo cannot compile it.
-        InputError: in one line without the path, a number cannot be used.
+        InputError: A number cannot be used. The message is one line without the path.
     """
     with _caught() as found:
         model = spec.compile()
@@ -99,7 +88,7 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 def _check(model: mujoco.MjModel, name: str, good: np.ndarray, what: str) -> None:
-    """Raise, naming the thing, where a number of an array of the model is not good."""
+    """Raise an InputError that names the element of the model whose numbers in an array are not good."""
     if good.all():
         return
     row = int(np.argmin(good.reshape(len(good), -1).all(axis=1)))
@@ -110,7 +99,7 @@ def _check(model: mujoco.MjModel, name: str, good: np.ndarray, what: str) -> Non
 
 
 def _named(model: mujoco.MjModel, name: str) -> bool:
-    """Whether an array of the model has a row for each thing of a kind that has names."""
+    """Whether an array of the model has a row for each element of a kind that has names."""
     kind, values = name.partition("_")[0], getattr(model, name)
     return hasattr(model, kind) and isinstance(values, np.ndarray) and getattr(model, f"n{kind}", -1) == len(values)
 
@@ -134,7 +123,7 @@ def copy_fields(source: Any, target: Any) -> None:
 
 @contextmanager
 def _caught() -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings, which else go to the terminal and to a log file, and make its errors ValueErrors."""
+    """Collect MuJoCo's warnings instead of printing and logging them, and turn its errors into ValueErrors."""
     found: list[str] = []
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(found.append)
@@ -150,7 +139,7 @@ def _caught() -> Iterator[list[str]]:
 
 
 def _take_assets(spec: mujoco.MjSpec, folder: Path) -> None:
-    """Read a spec's files under short unique names; those of an attached model are left to MuJoCo."""
+    """Read a spec's files under short unique names; MuJoCo reads those of an attached model."""
     assets: dict[str, bytes] = {}
     names: dict[Path, str] = {}
 

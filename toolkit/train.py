@@ -26,14 +26,14 @@ DESCRIPTION = """\
 Make the networks with which the contact search judges transitions.
 
   collect    run the planner in random terrain and label every transition with the centroidal optimiser
-  enrich     label more transitions made of those of a data set, the costly ones most of all
+  enrich     label more transitions that are made of those of a data set, mostly of costly ones
   fit        train a classifier and a regressor per category (needs torch: pip install -e '.[train]')
   evaluate   score the trained networks on fresh transitions
 """
 
 
 def run_collect(args: argparse.Namespace, console: Console) -> int:
-    """`collect`."""
+    """Run `collect`."""
     robot = load_robot(args.robot, args.robots)
     config = CollectConfig(
         robot=robot.name,
@@ -45,22 +45,23 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
         task = progress.add_task("shards", total=config.shards)
 
         def tick(state: Collected) -> None:
-            progress.update(task, completed=state.shards, description=f"shards ({state.labelled} transitions)")
+            transitions = f"{state.labelled} transitions"
+            progress.update(task, completed=state.shards, description=f"shards ({transitions})")
             if not console.is_terminal:
-                console.print(
-                    f"{state.shards} of {config.shards} shards, {state.labelled} transitions, {state.seconds:.0f} s"
-                )
+                console.print(f"{state.shards} of {config.shards} shards, {transitions}, {state.seconds:.0f} s")
 
         summary = collect(args.out, robot, config, pool, tick)
+    rate = (summary.labelled - summary.resumed) / max(summary.seconds, 1e-9)
+    share = summary.feasible / max(summary.labelled, 1)
     console.print(
-        f"{summary.labelled} transitions in {summary.seconds:.0f} s ({summary.rate:.0f} per s, {summary.resumed} found "
-        f"from before), feasible: {summary.feasible_share:.0%}; fewest of a category: {summary.fewest}\n{args.out}"
+        f"{summary.labelled} transitions in {summary.seconds:.0f} s ({rate:.0f} per s, {summary.resumed} found "
+        f"from before), feasible: {share:.0%}; fewest of a category: {summary.fewest}\n{args.out}"
     )
     return 0
 
 
 def run_enrich(args: argparse.Namespace, console: Console) -> int:
-    """`enrich`."""
+    """Run `enrich`."""
     robot = load_robot(args.robot, args.robots)
     config = EnrichConfig(
         robot=robot.name,
@@ -82,7 +83,7 @@ def run_enrich(args: argparse.Namespace, console: Console) -> int:
 
 
 def run_fit(args: argparse.Namespace, console: Console) -> int:
-    """`fit`."""
+    """Run `fit`."""
     try:
         import torch
 
@@ -139,7 +140,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
 
 
 def run_evaluate(args: argparse.Namespace, console: Console) -> int:
-    """`evaluate`."""
+    """Run `evaluate`."""
     robot = load_robot(args.robot, args.robots)
     networks = load_networks(robot, args.networks)
     data = read_dataset(args.data, robot.fingerprint)
@@ -160,7 +161,7 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one of the sub-commands; returns the exit code."""
+    """Run one of the subcommands; returns the exit code."""
     parser = cli.parser("train", DESCRIPTION)
     commands = parser.add_subparsers(dest="command", required=True)
 
@@ -179,13 +180,13 @@ def main(argv: list[str] | None = None) -> int:
         metavar = f"{numbers[0]}..{numbers[-1]}"
         sub.add_argument("--categories", type=int, nargs="+", choices=numbers, metavar=metavar, help="only these")
 
-    sub = add("collect", "label transitions with the centroidal optimiser; goes on where it was stopped")
+    sub = add("collect", "label transitions with the centroidal optimiser; continues where it was stopped")
     sub.add_argument("--out", type=Path, required=True, help="data set folder, new or begun")
     sub.add_argument("--samples", type=cli.positive(int), default=100_000, help="per category (default: %(default)s)")
     add_executor(sub)
     sub.set_defaults(run=run_collect)
 
-    sub = add("enrich", "label transitions made of a data set's, costly ones above all; goes on where it was stopped")
+    sub = add("enrich", "label transitions made of a data set's, mostly costly ones; continues where it was stopped")
     sub.add_argument("--data", type=Path, required=True, help="data set folder")
     sub.add_argument("--out", type=Path, required=True, help="data set folder for the result, new or begun")
     sub.add_argument(
@@ -212,8 +213,8 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument(
         "--sensitivity-weight", type=float, default=20.0, help="of the derivatives' loss (default: %(default)s)"
     )
-    sub.add_argument("--refine", action="store_true", help="go on from the regressors in --out, classifiers kept")
-    sub.add_argument("--keep-classifiers", action="store_true", help="train the regressors alone, of networks in --out")
+    sub.add_argument("--refine", action="store_true", help="train the regressors in --out further, keep classifiers")
+    sub.add_argument("--keep-classifiers", action="store_true", help="keep the classifiers in --out, train regressors")
     add_categories(sub)
     sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="threads (default: all cores)")
     sub.add_argument("--device", default="cpu", help="where torch computes, such as cuda (default: %(default)s)")

@@ -12,7 +12,6 @@ from toolkit import cli
 from toolkit.execution.config import ExecutionConfig
 from toolkit.pipeline import planner_kind
 from toolkit.prediction.networks import load_networks
-from toolkit.replanning.config import ReplanConfig
 from toolkit.robot.loader import load_robot
 from validation.jobs import PoolOptions
 from validation.machine import ROOT, code_fingerprint, folder_fingerprint
@@ -90,7 +89,7 @@ class TrialSettings:
     @property
     def execution(self) -> ExecutionConfig:
         """How plans are carried out."""
-        return ExecutionConfig(replanning=ReplanConfig(enabled=self.replanning))
+        return ExecutionConfig(replanning=self.replanning)
 
     def described(self) -> dict[str, Any]:
         """As JSON can hold it, for results: what decides them."""

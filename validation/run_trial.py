@@ -30,18 +30,12 @@ WORLD_FILE = "world.xml"  # in a run's folder, to run it again
 PALM_FORCE = 5.0  # N; planned palm forces below it are ramps and count nowhere
 
 
-class StageLog:
+class StageLog(pipeline.Observer):
     """An observer that remembers how each stage of each sequence ended."""
 
     def __init__(self):
         """Start empty."""
         self.entries: list[dict[str, Any]] = []
-
-    def started(self, stage: str, detail: str = "") -> None:
-        """Ignore."""
-
-    def progress(self, stage: str, fraction: float | None, detail: str = "") -> None:
-        """Ignore."""
 
     def finished(self, stage: str, passed: bool, seconds: float, detail: str = "") -> None:
         """Remember."""

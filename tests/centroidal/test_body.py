@@ -79,7 +79,7 @@ def test_casadi_and_numpy_agree_about_a_leg(walker):
             ankle = position + rotation @ leg.ankle_in_sole
             posture = [leg.hip_in_com, ankle, rotation.ravel(), [leg.thigh, leg.shin]]
             parameters = np.concatenate([*posture, leg_limits(leg, wanted)])
-            rows = np.array(pieces().leg.value(ca.vertcat(com, 0.0), parameters)).reshape(-1, 2).min(1)
+            rows = np.array(pieces()["leg"].value(ca.vertcat(com, 0.0), parameters)).reshape(-1, 2).min(1)
             found = leg_posture(leg, com[None], np.zeros(1), position[None], rotation[None])
             clearances = leg_clearances(leg, found, wanted)
             expected = [clearances[item.name][0] * (5 if item.quantity == "length" else 1) for item in PLANNED]
@@ -109,7 +109,7 @@ def test_casadi_and_numpy_agree_about_torques(walker):
             ]
         )
         variables = np.concatenate([com, velocity, rotation.T @ force, rotation.T @ moment, [0.5]])
-        rows = np.array(pieces().torque.value(variables, parameters)).ravel()
+        rows = np.array(pieces()["torque"].value(variables, parameters)).ravel()
         ratio = np.array([ours[role][0] for role in TORQUE_ROLES]) / limits
         np.testing.assert_allclose(rows, np.concatenate([0.9 - ratio, 0.9 + ratio]), atol=1e-9)
 

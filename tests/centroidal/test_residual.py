@@ -8,7 +8,7 @@ import pytest
 from toolkit.centroidal import fast, residual
 from toolkit.centroidal.build import ProblemConfig, initial_com, transition_problem
 from toolkit.centroidal.problem import CentroidalMotion, Margins
-from toolkit.centroidal.residual import Residuals, check, confirmed, objective
+from toolkit.centroidal.residual import Residuals, check, confirmed
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
@@ -40,7 +40,7 @@ def test_standing_still_has_no_residual(standing):
 
 def test_objective_of_standing_still(standing):
     # 2 s in units of 0.2 s, two feet, |f| = half the weight: 10 * 2 * 0.01 / 4.
-    np.testing.assert_allclose(objective(standing), 0.05, rtol=1e-12)
+    np.testing.assert_allclose(confirmed(standing).objective, 0.05, rtol=1e-12)
 
 
 def broken(standing, group):
@@ -157,7 +157,7 @@ def test_the_objective_is_the_sum_of_its_terms(standing):
             cost += w.force * local @ local + w.lateral_force * local[:2] @ local[:2]
             cost += w.torque * motion.yaw_torque[t, i] ** 2 + w.cop * z @ z
         total += p.dt[t] / 0.2 * cost
-    np.testing.assert_allclose(objective(motion), total, rtol=1e-12)
+    np.testing.assert_allclose(confirmed(motion).objective, total, rtol=1e-12)
 
 
 def test_feasible_solutions_pass_only_with_their_own_problem(robot, feet):

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from toolkit.centroidal import fast
-from toolkit.centroidal.arrays import ProblemArrays
+from toolkit.centroidal.arrays import MotionArrays
 from toolkit.centroidal.build import transition_problem
-from toolkit.centroidal.residual import evaluate
 from toolkit.contacts.category import Category
 from toolkit.contacts.stance import Stance
 from toolkit.robot.loader import load_robot
@@ -30,9 +29,7 @@ def problem_of(robot, case):
 
 
 def objective(robot, case):
-    problem = problem_of(robot, case)
-    motion = fast.wrenches(problem, config=EXACT)
-    return np.nan if motion is None else evaluate(ProblemArrays.of(problem), motion)[1]
+    return fast.solve(problem_of(robot, case), config=EXACT).objective
 
 
 def moved(contact, axis, step):
@@ -100,7 +97,8 @@ def test_an_exact_solution_has_exact_derivatives(robot):
     expected = np.diff(pairs)[:, 0] / (2 * STEP)
     np.testing.assert_allclose(found.others, expected, rtol=1e-3, atol=1e-3 * np.linalg.norm(expected))
     np.testing.assert_array_equal(found.contacts[2:4][~np.isin([2, 3], sample.stance.limbs)], 0.0)
-    for one, other in zip(motion, fast.wrenches(problem_of(robot, case), config=EXACT), strict=True):
+    solved = MotionArrays.of(fast.solve(problem_of(robot, case), config=EXACT))
+    for one, other in zip(motion, solved, strict=True):
         np.testing.assert_array_equal(one, other)
 
 

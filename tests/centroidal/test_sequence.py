@@ -11,7 +11,7 @@ from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_proble
 from toolkit.centroidal.pieces import pieces
 from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.program import Landing, Program, Regularisers, wanted_friction
-from toolkit.centroidal.residual import check, cop_margin, objective
+from toolkit.centroidal.residual import check, confirmed, cop_margin
 from toolkit.centroidal.sequence import WANTED, WANTED_BODY, SequenceConfig, optimise
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
@@ -43,7 +43,7 @@ def test_flat_walking_keeps_the_wanted_margins(walker, timing, stride):
     # the wanted margins of the body are kept as well; the solver's own accuracy aside
     assert body_residuals(motion, walker, WANTED_BODY).largest < 1e-5
     assert cop_margin(motion) >= (walker.limbs[FEET[0]].half_size / 2).min() - 1e-6
-    assert motion.objective == pytest.approx(objective(motion))
+    assert motion.objective == pytest.approx(confirmed(motion).objective)
     # at rest at both ends, over the feet
     np.testing.assert_allclose(motion.linear_momentum[-1], 0.0, atol=1e-4)
     assert np.linalg.norm(motion.com[-1, :2] - motion.problem.final_center[:2]) < 0.03
@@ -240,7 +240,7 @@ def test_landing_points_move_where_that_helps(walker):
 
 
 def test_an_active_upper_bound_on_a_length_brings_its_whole_curvature():
-    piece = pieces(moving=False).distance
+    piece = pieces()["distance"]
     rng = np.random.default_rng(10)
     v, p = rng.normal(size=piece.size), rng.normal(size=piece.parameters)
     multiplier = np.array([0.0, -2.0])
@@ -260,7 +260,7 @@ def test_an_active_upper_bound_on_a_length_brings_its_whole_curvature():
 
 
 def test_a_lightly_loaded_contact_is_as_curved_along_its_load_as_its_objective():
-    piece = pieces(moving=False).contact
+    piece = pieces()["contact"]
     rng = np.random.default_rng(11)
     p = rng.uniform(0.1, 0.5, piece.parameters)
     v = np.concatenate([[0.001, 0.002, 0.02, 0.004, -0.003, 0.0], np.zeros(3)])

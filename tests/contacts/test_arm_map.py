@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from toolkit.contacts.arm_map import ArmMap, ArmMapConfig
+from toolkit.contacts.arm_map import MARGIN, ArmMap
 from toolkit.robot.chain import arm_joints
 from toolkit.robot.loader import find_robots, load_robot
 
@@ -38,7 +38,7 @@ def test_samples_are_where_the_kinematics_put_them(robot, maps):
 def test_angles_keep_off_the_ends_of_the_ranges(robot, maps):
     for limb, arm in maps.items():
         low, high = robot.mujoco_model.jnt_range[arm_joints(robot.mujoco_model, limb)].T
-        margin = np.minimum(ArmMapConfig().margin, 0.2 * (high - low)) - 1e-9
+        margin = np.minimum(MARGIN, 0.2 * (high - low)) - 1e-9
         assert (arm.angles >= low + margin).all() and (arm.angles <= high - margin).all()
 
 

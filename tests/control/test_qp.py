@@ -15,7 +15,7 @@ def posed(robot):
     dynamics = RobotDynamics(robot)
     dynamics.update(robot.home, np.zeros(dynamics.nv))
     qp = ContactQP(FEET, dynamics.nv)
-    qp.set_dynamics(dynamics.mass_matrix, dynamics.bias, dynamics.jacobian, dynamics.limb_rotation, robot.torque_limit)
+    qp.set_dynamics(dynamics, robot.torque_limit)
     for limb in FEET:
         qp.set_cone(limb, 0.5, robot.half_sizes[limb], 0.7)
         qp.set_normal_force(limb, 10.0, 2000.0)
@@ -34,7 +34,7 @@ def test_solution_obeys_the_equation_of_motion_and_every_bound(posed):
     assert x is not None
     left = dynamics.mass_matrix @ x[: qp.nv] + dynamics.bias
     for limb in FEET:
-        wrench = qp.wrench(x, limb)
+        wrench = FORCE_UNIT * x[qp.slots[limb]]
         rotation = dynamics.limb_rotation[limb]
         left -= dynamics.jacobian[limb].T @ np.r_[rotation @ wrench[:3], rotation @ wrench[3:]]
         assert np.hypot(*wrench[:2]) <= 0.5 * wrench[2] + 1e-3

@@ -8,13 +8,9 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.wholebody.motion_dynamics import planned_wrench
 
 
-def sampled(plan, times):
-    return sample_reference(times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, plan.paths, plan.robot)
-
-
 def test_com_velocity_and_acceleration_are_derivatives(walking):
     times = np.arange(0.0, walking.schedule.duration, 0.002)
-    reference = sampled(walking, times)
+    reference = sample_reference(times, walking)
     # Piecewise quadratic: central differences of neighbours are exact but where the acceleration jumps.
     velocity = (reference.com[2:] - reference.com[:-2]) / 0.004
     np.testing.assert_allclose(velocity, reference.com_velocity[1:-1], atol=5e-3)
@@ -23,7 +19,7 @@ def test_com_velocity_and_acceleration_are_derivatives(walking):
 
 def test_swings_and_contacts_follow_the_schedule(walking):
     times = np.arange(0.0, walking.schedule.duration + 0.3, 0.002)
-    reference = sampled(walking, times)
+    reference = sample_reference(times, walking)
     assert [swing.limb for swing in reference.swings] == [t.limb for t in walking.sequence.transitions]
     for swing in reference.swings:
         assert swing.breaks and swing.contact is not None
@@ -35,7 +31,7 @@ def test_swings_and_contacts_follow_the_schedule(walking):
 
 def test_the_plan_rests_after_its_end(walking):
     end = walking.schedule.duration
-    reference = sampled(walking, np.array([end + 0.1, end + 0.2]))
+    reference = sample_reference(np.array([end + 0.1, end + 0.2]), walking)
     for rate in ("com_velocity", "com_acceleration", "angular_momentum_rate", "joint_velocity", "joint_acceleration"):
         assert not getattr(reference, rate).any(), rate
     np.testing.assert_array_equal(reference.com[0], reference.com[1])
@@ -44,7 +40,7 @@ def test_the_plan_rests_after_its_end(walking):
 def test_angular_momentum_is_that_of_the_postures(walking):
     """By the equation of motion, which shares nothing with the sampled sum over the bodies; smoothed over 0.1 s."""
     trajectory, dynamics = walking.trajectory, RobotDynamics(walking.robot)
-    reference = sampled(walking, trajectory.times)
+    reference = sample_reference(trajectory.times, walking)
     exact = np.zeros((len(trajectory.times), 3))
     for index, state in enumerate(zip(trajectory.qpos, trajectory.qvel, strict=True)):
         dynamics.update(*state)
@@ -73,7 +69,7 @@ def test_planned_wrenches_balance_the_planned_momentum(walking):
 
 
 def test_palms_without_contact_are_free(walking):
-    reference = sampled(walking, np.array([0.0, 1.0]))
+    reference = sample_reference(np.array([0.0, 1.0]), walking)
     for limb in walking.robot.limbs:
         free = limb not in FEET
         assert (reference.authority[:, limb] == (0.0 if free else 1.0)).all()

@@ -14,7 +14,7 @@ import time
 PRELOADED = (
     "toolkit.cli toolkit.pipeline toolkit.report.run toolkit.report.recording toolkit.report.surfaces "
     "toolkit.report.console toolkit.report.top_view toolkit.robot.loader toolkit.robot.picture toolkit.world.loader "
-    "toolkit.world.generators toolkit.prediction.optimiser toolkit.search.quasi_static toolkit.execution.options"
+    "toolkit.world.generators toolkit.prediction.optimiser toolkit.search.quasi_static"
 ).split()
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.report.conftest import make_sequence
+from tests.report.conftest import make_run
 from toolkit.errors import InputError
 from toolkit.report.plan_file import read_plan, write_plan
 from toolkit.robot.loader import find_robots
@@ -165,7 +165,8 @@ def commands(tmp_path):
 
 
 def some_plan(folder: Path) -> dict:
-    write_plan(folder / "plan.json", make_sequence(), world="w", robot="r", initial_rest=0.2)
+    run = make_run()
+    write_plan(folder / "plan.json", run.plan, run.solution)
     return json.loads((folder / "plan.json").read_text())
 
 

@@ -27,7 +27,7 @@ def robot():
 @pytest.mark.parametrize("mirror", [False, True])
 def test_what_changes_in_the_world_is_what_changes_in_the_features(category, mirror):
     torch = pytest.importorskip("torch")
-    from toolkit.learning.tangent import TangentSpace
+    from toolkit.learning.tasks import TangentSpace
 
     rng = np.random.default_rng(int(category))
     case = moved(random_case(category, rng), Pose(rotation_about_z(0.8), rng.normal(size=3)))

@@ -11,7 +11,7 @@ from toolkit.learning.quota import Quota
 from toolkit.learning.samples import Samples
 from toolkit.learning.sensitivity import sensitivity_size
 from toolkit.learning.shard import collect_shard
-from toolkit.learning.terrain import TerrainConfig, random_terrain
+from toolkit.learning.terrain import random_terrain
 from toolkit.prediction.features import CONTACT, feature_size
 from toolkit.robot.loader import load_robot
 from toolkit.world.loader import load_world
@@ -78,7 +78,7 @@ def test_a_quota_counts():
 
 @pytest.mark.parametrize("walls", [1, 2])
 def test_terrain_loads_and_has_what_it_says(walls):
-    text = random_terrain(np.random.default_rng(0), TerrainConfig(walls=walls, tilt=20.0))
+    text = random_terrain(np.random.default_rng(0), walls)
     world = load_world("terrain.xml", mjcf=text)
     assert {surface.geom for surface in world.surfaces if surface.serves_palm} == {
         f"wall_{number}" for number in range(walls)

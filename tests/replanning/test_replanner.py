@@ -1,6 +1,5 @@
 """Replanning: the program about a plan, and runs with it."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,29 +10,23 @@ from toolkit.control.sampled_plan import sample_reference
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.geometry.limb import Limb
-from toolkit.replanning.config import ReplanConfig
 from toolkit.replanning.linear_motion import G
-from toolkit.replanning.nominal import MAX_DT, Nominal
+from toolkit.replanning.nominal import HORIZON, MAX_DT, Nominal
 from toolkit.replanning.replan import ReplanProblem
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.replanning.situation import Situation
-
-CONFIG = ReplanConfig()
 
 
 @pytest.fixture(scope="module")
 def nominal(walking):
     plan = walking
     times = np.arange(0.0, plan.schedule.duration, 0.01)
-    reference = sample_reference(
-        times, plan.sequence, plan.schedule, plan.motion, plan.trajectory, plan.paths, plan.robot
-    )
-    return Nominal.of(plan.motion, reference, plan.robot, CONFIG.horizon)
+    return Nominal.of(plan.motion, sample_reference(times, plan), plan.robot)
 
 
 @pytest.fixture(scope="module")
 def problem(walking, nominal):
-    return ReplanProblem(nominal, walking.robot, walking.world.surfaces, CONFIG)
+    return ReplanProblem(nominal, walking.robot, walking.world.surfaces)
 
 
 def situation(walking, nominal, time, com=(0, 0, 0), velocity=(0, 0, 0), **options):
@@ -156,12 +149,12 @@ def test_a_small_push_moves_no_landing(walking, nominal, problem):
 @pytest.fixture(scope="module")
 def without(walking):
     """The walk without replanning; `walked` has it."""
-    return walking.run(config=ExecutionConfig(replanning=replace(CONFIG, enabled=False)))
+    return walking.run(config=ExecutionConfig(replanning=False))
 
 
 def test_an_undisturbed_run_is_the_same_with_replanning(walked, without):
     counts = walked.replanning
-    assert counts.replans >= 20 * (walked.simulated_seconds - CONFIG.horizon)
+    assert counts.replans >= 20 * (walked.simulated_seconds - HORIZON)
     assert counts.replan_landings == counts.replan_failures == 0
     assert all(check.result.value == "PASS" for check in walked.checks if check.name != "goal")
     if not counts.replan_departures:

@@ -1,6 +1,7 @@
 """The terminal display: rows where there is no terminal, a live line where there is one, the verdict at the end."""
 
 import io
+from pathlib import Path
 
 import pytest
 from rich.console import Console
@@ -26,7 +27,7 @@ def show(**options):
 
 def test_without_a_terminal_only_rows_are_printed():
     display, stream = show()
-    display.verdict(CHECKS, False, "slip is\n0.03 m", None)
+    display.verdict(CHECKS, False, "slip is\n0.03 m", Path("runs/one"), 14.0)
     lines = [line.rstrip() for line in stream.getvalue().splitlines()]
     assert "\x1b" not in stream.getvalue() and "expansions" not in stream.getvalue()
     assert lines[1:4] == [
@@ -34,7 +35,7 @@ def test_without_a_terminal_only_rows_are_printed():
         "planning   PASS       1.25 s  2 sequences [a] next line",
         "execution  FAIL      12.00 s  it slipped",
     ]
-    assert lines[-1] == "FAIL: slip is 0.03 m"
+    assert lines[-2:] == ["FAIL: slip is 0.03 m", "written to runs/one, 14.0 s in all"]
     table = [line.split() for line in lines]
     assert ["slip", "0.03", "0.02", "m", "FAIL"] in table
     assert ["friction", "-", "0", "NOT_CHECKED"] in table

@@ -284,7 +284,7 @@ def test_a_report_of_a_run_without_a_search_has_every_figure(run):
     report = RunReport.without_search(run.plan.world, "r", 0, "nothing leads there", {})
     for stage, names in STAGES.items():
         assert list(report.stages[stage]) == list(names)
-    assert report.stages["surfaces"]["count"] == 3 and not report.passed
+    assert report.stages["surfaces"]["count"] == 3 and report.verdict == "FAIL"
     assert report.stages["planning"]["found"] is False and report.stages["execution"]["completed"] is False
     assert report.stages["execution"]["max_slip"] is None
 
@@ -325,12 +325,15 @@ def test_a_plan_that_is_no_plan_gets_one_line(tmp_path, text, message):
 
 
 def test_equal_arrays_make_equal_files_whatever_the_clock_said(run, tmp_path):
-    write_motion(tmp_path / "motion.npz", run.motion, run.trajectory)
-    write_execution(tmp_path / "execution.npz", run.execution)
+    motion, trajectory, execution = run.plan.motion, run.plan.trajectory, run.execution
+    write_motion(tmp_path / "motion.npz", motion, trajectory)
+    write_execution(tmp_path / "execution.npz", execution)
     before = [(tmp_path / name).read_bytes() for name in ("motion.npz", "execution.npz")]
-    slower = dict(tick_seconds=2 * run.execution.tick_seconds, real_time_factor=0.1, replan_seconds=9.0)
-    write_motion(tmp_path / "motion.npz", replace(run.motion, seconds=9.0), replace(run.trajectory, seconds=9.0))
-    write_execution(tmp_path / "execution.npz", replace(run.execution, **slower))
+    samples = replace(execution.samples, tick_seconds=2 * execution.samples.tick_seconds)
+    counts = replace(execution.replanning, replan_seconds=9.0)
+    slower = replace(execution, samples=samples, replanning=counts, real_time_factor=0.1)
+    write_motion(tmp_path / "motion.npz", replace(motion, seconds=9.0), replace(trajectory, seconds=9.0))
+    write_execution(tmp_path / "execution.npz", slower)
     assert before == [(tmp_path / name).read_bytes() for name in ("motion.npz", "execution.npz")]
     with zipfile.ZipFile(tmp_path / "motion.npz") as archive:
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}

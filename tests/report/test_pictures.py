@@ -111,7 +111,7 @@ def test_the_camera_avoids_a_wall(run):
     sides = []
     for y in (1.0, -1.0):
         scene = mujoco.MjModel.from_xml_string(scene_of.format(wall.format(y)))
-        view = follow(scene, qpos, times)
+        view = follow(scene, qpos, times)[0]
         sides.append(-np.sin(np.radians(view.azimuth)))  # y of the camera from the robot
     assert sides[0] < 0 < sides[1]
 

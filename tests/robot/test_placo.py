@@ -44,8 +44,6 @@ def test_there_and_back(robot: RobotModel, order: PinocchioMap) -> None:
     v = order.v_from_qvel(qpos, qvel)
     np.testing.assert_allclose(order.qvel_from_v(qpos, v), qvel, atol=1e-14)
     a = order.a_from_qacc(qpos, qvel, qacc)
-    np.testing.assert_allclose(order.qacc_from_a(qpos, v, a), qacc, atol=1e-13)
-    np.testing.assert_array_equal(order.joints_of_v(v), qvel[:, 6:])
     one = order.a_from_qacc(qpos[3], qvel[3], qacc[3])
     np.testing.assert_array_equal(one, a[3])
 
@@ -53,11 +51,8 @@ def test_there_and_back(robot: RobotModel, order: PinocchioMap) -> None:
 def test_inputs_stay_as_they_are(robot: RobotModel, order: PinocchioMap) -> None:
     arrays = states(robot)
     copies = [array.copy() for array in arrays]
-    v = order.v_from_qvel(*arrays[:2])
-    a = order.a_from_qacc(*arrays)
-    before = a.copy()
-    order.qacc_from_a(arrays[0], v, a)
-    np.testing.assert_array_equal(a, before)
+    order.v_from_qvel(*arrays[:2])
+    order.a_from_qacc(*arrays)
     for array, copy in zip(arrays, copies, strict=True):
         np.testing.assert_array_equal(array, copy)
 

@@ -141,13 +141,14 @@ def test_limits_and_observer(monkeypatch):
             return [False] * len(states)
 
     seen = []
-    config = AnaStarConfig(report_interval=0.01)
-    result = AnaStar(Line(), np.random.default_rng(0), config).run(0.2, seen.append)
+    monkeypatch.setattr("toolkit.search.anytime.ana_star._REPORT_INTERVAL", 0.01)
+    result = AnaStar(Line(), np.random.default_rng(0)).run(0.2, seen.append)
     assert result.stopped_by == "time" and not result.paths
     assert 0.2 <= result.seconds < 0.21  # kept within 5 %
     assert len(seen) > 3 and "none yet" in str(seen[0])
-    assert AnaStar(Line(), np.random.default_rng(0), AnaStarConfig(max_states=50)).run().stopped_by == "memory"
     assert AnaStar(Line(), np.random.default_rng(0), AnaStarConfig(max_expansions=7)).run().expansions == 7
+    monkeypatch.setattr("toolkit.search.anytime.ana_star._MAX_STATES", 50)
+    assert AnaStar(Line(), np.random.default_rng(0)).run().stopped_by == "memory"
 
 
 def test_start_at_the_goal_is_a_path_without_edges():

@@ -7,7 +7,7 @@ from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.search.anytime.open_list import OpenList
-from toolkit.search.costs.delay import Haste, HasteConfig
+from toolkit.search.costs.delay import Haste
 from toolkit.search.states.contact_table import ContactTable
 
 
@@ -21,9 +21,9 @@ def standing() -> tuple[ContactTable, np.ndarray]:
     return table, np.array([[*numbers, -1, -1]])
 
 
-def delay(standing, com, velocity, *, forced=0.5, config=None):
+def delay(standing, com, velocity, *, forced=0.5):
     table, contacts = standing
-    haste = Haste(table, 0.9, forced, 5.0, config or HasteConfig())
+    haste = Haste(table, 0.9, forced, 5.0)
     return haste.delay(contacts, np.array([com]), np.array([velocity]))[0]
 
 
@@ -38,18 +38,17 @@ def test_faster_waits_longer_whichever_way_it_goes(standing):
 
 
 def test_capture_point_counts_from_the_foremost_foot(standing):
-    config, w = HasteConfig(capture=1.0, early=0.0), np.sqrt(9.81 / 0.9)
+    w = np.sqrt(9.81 / 0.9)
     ahead = 0.25 + 0.6 / w - 0.3
     expected = 5.0 * ahead
-    assert delay(standing, [0.25, 0.0, 0.9], [0.6, 0.0, 0.0], config=config) == pytest.approx(expected, rel=1e-12)
-    assert delay(standing, [0.0, 0.0, 0.9], [0.6, 0.0, 0.0], config=config) == 0.0
+    assert delay(standing, [0.25, 0.0, 0.9], [0.6, 0.0, 0.0], forced=0.0) == pytest.approx(expected, rel=1e-12)
+    assert delay(standing, [0.0, 0.0, 0.9], [0.6, 0.0, 0.0], forced=0.0) == 0.0
 
 
 def test_going_on_at_the_forced_acceleration_pays(standing):
     """A metre further on v^2 is larger by 2 a: less delay than the h that the metre is worth."""
-    config = HasteConfig(capture=0.0)
-    before = delay(standing, [0.0, 0.0, 0.9], [1.0, 0.0, 0.0], forced=0.7, config=config)
-    after = delay(standing, [0.0, 0.0, 0.9], [np.sqrt(1.0 + 2 * 0.7), 0.0, 0.0], forced=0.7, config=config)
+    before = delay(standing, [0.0, 0.0, 0.9], [1.0, 0.0, 0.0], forced=0.7)
+    after = delay(standing, [0.0, 0.0, 0.9], [np.sqrt(1.0 + 2 * 0.7), 0.0, 0.0], forced=0.7)
     assert 0.0 < after - before < 5.0
 
 
@@ -63,8 +62,7 @@ def test_turn_between_the_feet_waits_whichever_way(left, right):
     feet = ((Limb.LEFT_FOOT, 0.1, left), (Limb.RIGHT_FOOT, -0.1, right))
     numbers = [table.add_contact(Contact(i, Pose.from_yaw(np.array([0.0, y, 0.0]), yaw), 0.5, 0)) for i, y, yaw in feet]
     standing = table, np.array([[*numbers, -1, -1]])
-    config = HasteConfig(turn=0.5)
-    assert delay(standing, [0.0, 0.0, 0.9], [0.0, 0.0, 0.0], config=config) == pytest.approx(5.0 * 0.5 * 0.4, rel=1e-9)
+    assert delay(standing, [0.0, 0.0, 0.9], [0.0, 0.0, 0.0]) == pytest.approx(5.0 * 0.5 * 0.4, rel=1e-9)
 
 
 def test_layers_share_the_random_draws():

@@ -14,7 +14,8 @@ def reached(robot, world, limb):
     """Positions and headings of all moves of a limb out of the start stance."""
     planner = ContactPlanner(robot, world, KinematicEvaluator(robot))
     stance = planner.ground.start_stance()
-    moves, table = planner.ground.moves(wide=True)
+    moves = planner.ground.moves(wide=True)
+    table = moves.table
     left, right = (table.add_contact(stance[foot]) for foot in (Limb.LEFT_FOOT, Limb.RIGHT_FOOT))
     found = moves.steps(limb, right if limb.is_left else left) if limb.is_foot else moves.palms(limb, left, right)
     numbers = found.numbers

@@ -9,7 +9,6 @@ from toolkit.geometry.pose import rotation_about_z
 from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig
-from toolkit.search.moves.reach_check import ReachConfig
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.world.timing import Timing
 
@@ -188,10 +187,11 @@ def test_all_ten_categories_occur_and_palms_are_chosen_where_they_help(robot):
     assert not any(stance.palms for solution in without.solutions for stance in solution.sequence.stances)
 
 
-def test_held_palms_stay_in_reach_while_the_body_is_over_the_standing_foot(robot):
+def test_held_palms_stay_in_reach_while_the_body_is_over_the_standing_foot(robot, monkeypatch):
     def longest(sway):
+        monkeypatch.setattr("toolkit.search.moves.reach_check._ARM_SWAY", sway)
         evaluator = KinematicEvaluator(robot, KinematicConfig(palm_relief=0.3, stride=300.0, spread=50.0))
-        config = PlannerConfig(search=AnaStarConfig(max_expansions=300), reach=ReachConfig(arm_sway=sway))
+        config = PlannerConfig(search=AnaStarConfig(max_expansions=300))
         found = ContactPlanner(robot, corridor(2), evaluator, config).search(np.random.default_rng(0), 20.0).solutions
         stretch = []
         for solution in found:

@@ -7,7 +7,6 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
 from toolkit.search.anytime.ana_star import AnaStarConfig
-from toolkit.search.moves.moves import MoveConfig
 from toolkit.search.planner import PlannerConfig
 from toolkit.search.quasi_static import QuasiStaticEvaluator, quasi_static_planner
 
@@ -57,7 +56,7 @@ def test_long_strides_are_not_quasi_static(robot):
     world = make_world(FLOOR, goal=(2.0, 0, 0))
     planner = quasi_static_planner(robot, world, QUICK)
     stance = planner.ground.start_stance()
-    evaluator = QuasiStaticEvaluator(robot, MoveConfig())
+    evaluator = QuasiStaticEvaluator(robot)
 
     def judged(x):
         contact = stance[Limb.LEFT_FOOT]
@@ -71,7 +70,7 @@ def test_long_strides_are_not_quasi_static(robot):
 
 def test_a_palm_holds_the_robot_where_a_foot_cannot(robot):
     """The linear program decides where feet are beyond their friction angle."""
-    evaluator = QuasiStaticEvaluator(robot, MoveConfig())
+    evaluator = QuasiStaticEvaluator(robot)
     world = slope(30, 0.5)
     on_slope = [surface for surface in world.surfaces if surface.serves_foot and surface.normal[2] < 0.9][0]
     planner = quasi_static_planner(robot, make_world(FLOOR), QUICK)

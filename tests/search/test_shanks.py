@@ -22,7 +22,7 @@ ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml")
 @pytest.mark.parametrize("name", ROBOTS)
 def test_points_and_radii_of_the_legs(name):
     robot = load_robot(name)
-    radius = shanks_of(robot).radius
+    radius = shanks_of(robot)
     assert ((radius > 0.01) & (radius < 0.15)).all()
     rng = np.random.default_rng(0)
     legs = legs_of(robot, ReachMargins(ankle=-9.0, hip=-9.0))
@@ -64,9 +64,9 @@ def test_ball_on_the_grid():
 
 def codes(robot, world, poses, standing):
     """Screen codes of left soles (x, y, yaw in degrees) beside a standing right one on level ground."""
-    moves, table = ContactPlanner(robot, world, KinematicEvaluator(robot)).ground.moves(wide=False)
+    moves = ContactPlanner(robot, world, KinematicEvaluator(robot)).ground.moves(wide=False)
     stand = Pose.from_yaw(np.array([*standing[:2], 0.0]), np.radians(standing[2]))
-    number = table.add_contact(Contact(Limb.RIGHT_FOOT, stand, 0.7, 0))
+    number = moves.table.add_contact(Contact(Limb.RIGHT_FOOT, stand, 0.7, 0))
     poses = np.array(poses, float)
     yaw = np.radians(poses[:, 2])
     rotation = np.array([Pose.from_yaw(np.zeros(3), angle).rotation for angle in yaw])

@@ -38,7 +38,7 @@ def quick(robot):
 
 def test_an_ordinary_search_judges_at_once_and_doubts_nothing(quick):
     strategy = strategy_of(CONFIG, quick, 3.0, slides=False)
-    assert (strategy.at_once, strategy.waiting, strategy.hasty, strategy.haste) == (quick, None, None, None)
+    assert (strategy.at_once, strategy.waiting, strategy.hasty) == (quick, None, None)
     assert strategy.cost == CONFIG.cost
     assert strategy.patient == replace(CONFIG.search, initial_cost=3.0 * CONFIG.acceptable_cost)
 
@@ -47,7 +47,7 @@ def test_an_ordinary_search_judges_at_once_and_doubts_nothing(quick):
 def test_a_lazy_search_lets_everything_wait_and_may_look_at_more(robot, slides):
     judge = Slow(robot)
     strategy = strategy_of(CONFIG, judge, 0.5, slides=slides)
-    assert (strategy.at_once, strategy.waiting, strategy.hasty, strategy.haste) == (None, judge, None, None)
+    assert (strategy.at_once, strategy.waiting, strategy.hasty) == (None, judge, None)
     assert strategy.patient.max_expansions == 2000
     assert strategy.patient.initial_cost == CONFIG.acceptable_cost
     assert strategy.patient.patience == CONFIG.search.patience * (10 if slides else 1)
@@ -58,7 +58,7 @@ def test_a_lazy_search_lets_everything_wait_and_may_look_at_more(robot, slides):
 def test_a_sliding_search_begins_in_haste_and_asks_the_stand_in(quick, limit, patient, hasty):
     config = replace(CONFIG, search=replace(CONFIG.search, max_expansions=limit))
     strategy = strategy_of(config, quick, 3.0, slides=True)
-    assert (strategy.at_once, strategy.waiting, strategy.haste) == (quick, quick.stand_in, config.haste)
+    assert (strategy.at_once, strategy.waiting) == (quick, quick.stand_in)
     assert strategy.hasty is not None and strategy.hasty.first_only and not strategy.patient.first_only
     assert (strategy.patient.max_expansions, strategy.hasty.max_expansions) == (patient, hasty)
     assert strategy.patient.initial_cost == np.inf  # the cost so far would lead back

@@ -132,7 +132,7 @@ def palm_walk(robot) -> MotionPlan:
     """A palm is put on a side wall, moved along it, and taken back."""
     if Limb.LEFT_PALM not in robot.arms:
         pytest.skip("a robot without palms")
-    hang = free_palm(robot, Limb.LEFT_PALM, Pose.identity()).position
+    hang = free_palm(robot, Limb.LEFT_PALM, Pose.identity(), np.array([0.0, 0.0, robot.com_height])).position
     wall = hang + np.array([0.0, 0.25, 0.2]) * robot.com_height
     normal, up = np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     rotation = np.stack([up, np.cross(normal, up), normal], 1)

@@ -6,7 +6,6 @@ from tests.wholebody.conftest import world_of
 from toolkit.geometry.limb import PALMS, Limb
 from toolkit.wholebody.avoidance import NOTICE, TIME, ArmAvoidance
 from toolkit.wholebody.collision import first_collision
-from toolkit.wholebody.ik_config import IKConfig
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import solve_ik
 from toolkit.world.scene import compose_scene
@@ -70,12 +69,12 @@ def test_arms_are_drawn_in_beside_a_wall(robot, flat_walk, hand):
     """A wall that the home posture would touch: with dampers the walk is free, without them it collides."""
     paths = limb_paths(robot, flat_walk.world, flat_walk.schedule, flat_walk.motion)
     times = np.linspace(0.0, flat_walk.schedule.duration, int(50 * flat_walk.schedule.duration) + 1)
-    free = solve_ik(robot, paths, flat_walk.motion, times, IKConfig())
+    free = solve_ik(robot, paths, flat_walk.motion, times)
     world = side_wall(max(outermost(robot, qpos) for qpos in free) + 0.02)
     scene = compose_scene(robot, world)
     hit = first_collision(robot, scene, times, free)
     assert hit is not None and "world/wall" in hit.reason
-    drawn_in = solve_ik(robot, paths, flat_walk.motion, times, IKConfig(), scene)
+    drawn_in = solve_ik(robot, paths, flat_walk.motion, times, scene)
     assert first_collision(robot, scene, times, drawn_in) is None
 
 

@@ -25,7 +25,7 @@ def reasons(robot, walk, good, *, world=None, qpos=None, paths=None):
     kept, times, states = good
     scene = compose_scene(robot, world or walk.world)
     report = check(robot, scene, paths or kept, walk.motion, times, states if qpos is None else qpos)
-    return report, "; ".join(report.reasons)
+    return report, "; ".join(finding.reason for finding in report.findings)
 
 
 def test_good_walk_passes(robot, flat_walk, good):
@@ -123,7 +123,7 @@ def test_a_blocked_swing_is_reported(robot, flat_walk):
 def test_planned_forces_carry_the_weight(robot, flat_walk, good):
     """No force is left at the base where the posture follows the planned CoM."""
     _, times, states = good
-    _, residual = inverse_dynamics(robot, flat_walk.motion, times, states)
+    residual = inverse_dynamics(robot, flat_walk.motion, times, states)
     weight = robot.mass * 9.81
     middle = len(times) - 10  # within the last rest
     np.testing.assert_allclose(residual[middle, :3], 0.0, atol=1e-3 * weight)

@@ -4,7 +4,7 @@ import pytest
 from tests.robot.samples import TOML, biped_mjcf, write_robot
 from toolkit.geometry.limb import FEET
 from toolkit.robot.loader import load_robot
-from toolkit.wholebody.knee import knee_range
+from toolkit.wholebody.ik import knee_range
 
 KNEE = 'axis="0 1 0" range="0.0 2.4"'
 

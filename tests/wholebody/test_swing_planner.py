@@ -6,10 +6,9 @@ from toolkit.geometry.pose import Pose, rotation_on_surface
 from toolkit.wholebody.detour import corners, gaps
 from toolkit.wholebody.limb_paths import box_collide
 from toolkit.wholebody.swing_planner import FAST_ACROSS, plan_swing
-from toolkit.wholebody.swing_task import EASY, SwingConfig, SwingTask
+from toolkit.wholebody.swing_task import EASY, GAP, LIFT, MARGIN, SwingTask
 
 HALF = np.array([0.11, 0.065])
-CONFIG = SwingConfig()
 
 
 def task_of(start, end, **options):
@@ -32,44 +31,44 @@ def free(collide_box):
 
 
 def test_flat_ground_needs_no_raise():
-    path = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), box_collide(world_of("")), CONFIG)
+    path = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), box_collide(world_of("")))
     assert path.clear
     heights = path.positions(np.linspace(0, 1, 101))[:, 2]
-    assert heights.max() == pytest.approx(CONFIG.foot_lift, rel=0.05)
+    assert heights.max() == pytest.approx(LIFT, rel=0.05)
     assert path.sample(0.4).velocity[0] > 0
 
 
 def test_path_clears_the_edge_of_a_step():
     """Straight over, the toes would hit the riser; the chosen path passes above the edge by the margin."""
     task = task_of([FIRST - 0.13, 0.1, 0.0], [FIRST + 0.17, 0.1, RISE])
-    path = plan_swing(task, box_collide(world_of(stairs(1))), CONFIG)
+    path = plan_swing(task, box_collide(world_of(stairs(1))))
     assert path.clear
-    blind = plan_swing(task, free(None), CONFIG)
+    blind = plan_swing(task, free(None))
     assert lowest_over(blind, HALF, (FIRST, FIRST + 0.02)) < RISE
-    assert lowest_over(path, HALF, (FIRST, FIRST + 0.02)) > RISE + 0.5 * CONFIG.margin
+    assert lowest_over(path, HALF, (FIRST, FIRST + 0.02)) > RISE + 0.5 * MARGIN
     down = task_of([FIRST + 0.17, 0.1, RISE], [FIRST - 0.13, 0.1, 0.0])
-    path = plan_swing(down, box_collide(world_of(stairs(1))), CONFIG)
+    path = plan_swing(down, box_collide(world_of(stairs(1))))
     assert path.clear
-    assert lowest_over(path, HALF, (FIRST, FIRST + 0.02)) > RISE + 0.5 * CONFIG.margin
+    assert lowest_over(path, HALF, (FIRST, FIRST + 0.02)) > RISE + 0.5 * MARGIN
 
 
 def test_path_rises_over_a_wall_in_the_way():
     wall = '<geom type="box" size="0.02 1 0.1" pos="0.25 0 0.1"/>'
-    path = plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), box_collide(world_of(wall)), CONFIG)
+    path = plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), box_collide(world_of(wall)))
     assert path.clear
     assert lowest_over(path, HALF, (0.23, 0.27)) > 0.2
 
 
 def test_a_wall_too_high_leaves_no_clear_path():
     wall = '<geom type="box" size="0.02 1 1.0" pos="0.25 0 1.0"/>'
-    path = plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), box_collide(world_of(wall)), CONFIG)
+    path = plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), box_collide(world_of(wall)))
     assert not path.clear
 
 
 def test_a_contact_beside_a_riser_is_not_a_collision():
     """A sole may rest against a wall; it leaves it and comes back."""
     wall = '<geom type="box" size="0.1 1 0.5" pos="0.2101 0 0.5"/>'
-    path = plan_swing(task_of([-0.3, 0.1, 0], [0.0, 0.1, 0]), box_collide(world_of(wall)), CONFIG)
+    path = plan_swing(task_of([-0.3, 0.1, 0], [0.0, 0.1, 0]), box_collide(world_of(wall)))
     assert path.clear
 
 
@@ -77,15 +76,15 @@ def test_tilted_contacts_are_left_and_reached_along_their_normals():
     normal = np.array([0.25, 0.1, 1.0]) / np.linalg.norm([0.25, 0.1, 1.0])
     start = Pose(rotation_on_surface(normal, 0.2), np.zeros(3))
     end = Pose(rotation_on_surface(normal * [-1, 1, 1], -0.3), np.array([0.3, 0.0, 0.05]))
-    path = plan_swing(SwingTask(0.0, 0.8, start, end, HALF, True), free(None), CONFIG)
+    path = plan_swing(SwingTask(0.0, 0.8, start, end, HALF, True), free(None))
     early, late = path.positions(np.array([0.06]))[0], path.positions(np.array([0.97]))[0]
     assert (early - start.position) @ start.normal > 0.95 * np.linalg.norm(early - start.position)
     assert (late - end.position) @ end.normal > 0.95 * np.linalg.norm(late - end.position)
 
 
 def test_fast_swings_cross_over_the_full_time():
-    slow = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), free(None), CONFIG)
-    fast = plan_swing(task_of([0, 0.1, 0], [2.4, 0.1, 0]), free(None), CONFIG)
+    slow = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), free(None))
+    fast = plan_swing(task_of([0, 0.1, 0], [2.4, 0.1, 0]), free(None))
     assert slow.turn == EASY.across
     assert fast.turn == FAST_ACROSS
 
@@ -94,14 +93,14 @@ def test_foot_goes_around_the_standing_foot():
     """Between two places on either side of the standing sole the straight way would run through it."""
     other = (Pose.from_yaw(np.array([0.2, -0.08, 0.0]), 0.0), HALF)
     start, end = [-0.05, 0.09, 0.0], [0.5, 0.03, 0.0]
-    blocked = plan_swing(task_of(start, end), free(None), CONFIG)
-    path = plan_swing(task_of(start, end, other=other), free(None), CONFIG)
+    blocked = plan_swing(task_of(start, end), free(None))
+    path = plan_swing(task_of(start, end, other=other), free(None))
     standing = corners(other[0].position[None], other[0].rotation[None], HALF)[0]
     u = np.linspace(0, 1, 101)
     gap = {name: gaps(corners(p.positions(u), p.rotations(u), HALF), standing).min() for name, p in
            (("straight", blocked), ("around", path))}  # fmt: skip
     assert gap["straight"] < 0.01
-    assert gap["around"] > CONFIG.gap - 2e-3
+    assert gap["around"] > GAP - 2e-3
     np.testing.assert_allclose(path.sample(0.8).pose.position, end, atol=1e-12)
 
 
@@ -111,10 +110,10 @@ def test_palm_retracts_and_approaches_along_the_normal():
     start, end = Pose(rotation, np.array([0.2, 0.6, 1.1])), Pose(rotation, np.array([0.5, 0.6, 1.2]))
     wall = '<geom type="box" size="2 0.05 1" pos="0 0.65 1"/>'
     task = SwingTask(0.0, 1.0, start, end, np.array([0.04, 0.04]), False)
-    path = plan_swing(task, box_collide(world_of(wall)), CONFIG)
+    path = plan_swing(task, box_collide(world_of(wall)))
     assert path.clear
     away = (path.positions(np.linspace(0, 1, 101)) - start.position) @ normal
-    assert away.max() == pytest.approx(CONFIG.palm_lift, rel=0.05)
+    assert away.max() == pytest.approx(LIFT, rel=0.05)
     # The last stretch runs along the normal only, and slowly.
     late = path.sample(0.9)
     assert abs(late.velocity[0]) < 1e-9 and late.velocity[1] > 0
@@ -122,5 +121,5 @@ def test_palm_retracts_and_approaches_along_the_normal():
 
 
 def test_swept_box_that_always_hits_is_reported():
-    path = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), lambda c, r, h: np.ones(len(c), bool), CONFIG)
+    path = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), lambda c, r, h: np.ones(len(c), bool))
     assert not path.clear

@@ -7,10 +7,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.physics.leg import leg_posture
 from toolkit.wholebody.swing_planner import plan_swing
-from toolkit.wholebody.swing_task import SwingConfig, SwingTask
-from toolkit.wholebody.toe_pitch import SwingingLeg
-
-CONFIG = SwingConfig()
+from toolkit.wholebody.swing_task import SwingingLeg, SwingTask
 
 
 def nothing(centers, rotations, halves):
@@ -39,16 +36,16 @@ def ankle(stride, path):
 def test_ankle_stays_in_its_range(stride):
     """Level, the sole would ask for more than the ankle has; pitched, it does not."""
     lower = stride.leg.leg.ranges["ankle_pitch"][0]
-    tight = max(lower, ankle(stride, plan_swing(dataclasses.replace(stride, leg=None), nothing, CONFIG)).min() + 0.1)
+    tight = max(lower, ankle(stride, plan_swing(dataclasses.replace(stride, leg=None), nothing)).min() + 0.1)
     ranges = {**stride.leg.leg.ranges, "ankle_pitch": (tight, stride.leg.leg.ranges["ankle_pitch"][1])}
     leg = dataclasses.replace(stride.leg, leg=dataclasses.replace(stride.leg.leg, ranges=ranges))
-    path = plan_swing(dataclasses.replace(stride, leg=leg), nothing, CONFIG)
+    path = plan_swing(dataclasses.replace(stride, leg=leg), nothing)
     assert path.pitch > 0.1
     assert ankle(stride, path).min() > tight
 
 
 def test_toes_do_not_dip_below_a_level_path(stride):
-    path = plan_swing(stride, nothing, CONFIG)
+    path = plan_swing(stride, nothing)
     level = dataclasses.replace(path, pitch=0.0, moves=tuple(move for move in path.moves if not move.returns))
     u = np.linspace(0, 1, 101)
     toes = np.array([stride.half_size[0], 0.0, 0.0])
@@ -60,5 +57,5 @@ def test_toes_do_not_dip_below_a_level_path(stride):
 
 def test_a_foot_ahead_is_not_pitched(stride):
     other = (Pose.from_yaw(stride.start.position - [0.2, 0.3, 0.0], 0.0), stride.half_size)
-    path = plan_swing(dataclasses.replace(stride, other=other, leg=None), nothing, CONFIG)
+    path = plan_swing(dataclasses.replace(stride, other=other, leg=None), nothing)
     assert path.pitch == 0.0

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from toolkit.world.generators import KINDS
 from toolkit.world.loader import load_world
 
-RANDOM = [kind for kind in KINDS if "rng: not used" not in inspect.getdoc(KINDS[kind])]
+RANDOM = [kind for kind in KINDS if "rng: Not used" not in inspect.getdoc(KINDS[kind])]
 
 
 def made(kind, seed, path, **options):

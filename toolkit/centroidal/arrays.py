@@ -1,9 +1,9 @@
-"""A centroidal problem and its motion as compiled functions take them: named tuples of arrays of exact types."""
+"""A centroidal problem and its motion for compiled functions: named tuples of arrays of exact types."""
 
 from __future__ import annotations
 
 from dataclasses import astuple
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -53,34 +53,20 @@ class ProblemArrays(NamedTuple):
         """The arrays of a problem."""
         p = problem
         landing = p.landing_limb >= 0
-        return cls(
-            mass=float(p.mass),
-            dt=_plain(p.dt),
-            active=_plain(p.active, bool),
-            position=_plain(p.position),
-            rotation=_plain(p.rotation),
-            friction=_plain(p.friction),
-            half_size=_plain(p.half_size),
-            reduced_half_size=_plain(p.reduced_half_size),
-            max_normal_force=_plain(p.max_normal_force),
-            yaw=_plain(p.yaw),
-            com=_plain(p.com),
-            com_velocity=_plain(p.com_velocity),
-            angular_momentum=_plain(p.angular_momentum),
-            root_in_com=_plain(p.root_in_com),
-            tip_in_contact=_plain(p.tip_in_contact),
-            max_reach=_plain(p.max_reach),
-            min_height=float(p.min_height),
-            final_center=_plain(p.final_center),
-            final_half_size=_plain(p.final_half_size),
-            final_at_rest=bool(p.final_at_rest),
-            weights=np.array(astuple(p.weights), float),
-            friction_margin=float(p.margins.friction),
-            yaw_margin=float(p.margins.yaw),
-            landing_limb=int(p.landing_limb),
-            landing_position=_plain(p.landing_position) if landing else np.zeros(3),
-            landing_rotation=_plain(p.landing_rotation) if landing else np.eye(3),
-        )
+        values: dict[str, Any] = {
+            "mass": float(p.mass),
+            "active": _plain(p.active, bool),
+            "min_height": float(p.min_height),
+            "final_at_rest": bool(p.final_at_rest),
+            "weights": np.array(astuple(p.weights), float),
+            "friction_margin": float(p.margins.friction),
+            "yaw_margin": float(p.margins.yaw),
+            "landing_limb": int(p.landing_limb),
+            "landing_position": _plain(p.landing_position) if landing else np.zeros(3),
+            "landing_rotation": _plain(p.landing_rotation) if landing else np.eye(3),
+        }
+        values |= {name: _plain(getattr(p, name)) for name in cls._fields if name not in values}
+        return cls(**values)
 
     def copy(self) -> ProblemArrays:
         """The same with arrays of its own."""
@@ -104,6 +90,6 @@ class MotionArrays(NamedTuple):
 
 
 def _plain(array: np.ndarray | None, dtype: type = float) -> np.ndarray:
-    """The array, contiguous and writable: any other kind would be compiled for anew."""
+    """The array, contiguous and writable; for any other kind the kernels would be compiled anew."""
     array = np.ascontiguousarray(array, dtype)
     return array if array.flags.writeable else array.copy()

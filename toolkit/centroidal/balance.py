@@ -1,13 +1,12 @@
-"""Static balance of contacts: can they bear the robot's weight at rest, and with its CoM where?
+"""Static balance: whether contacts can bear the robot's weight at rest, and at which CoM.
 
-Each patch pushes at its four corners with forces in friction cones, inscribed 16-gons, so whatever is called balanced
-is balanced under the exact cones too, yaw moments included. With corner forces lambda_j d_j at p_j the robot is at rest
-where
+Each patch pushes at its four corners with forces in 16-gons inscribed in the friction cones. So what is found balanced
+is so under the exact cones too, yaw moments included. With corner forces lambda_j d_j at p_j the robot is at rest where
 
     sum lambda_j d_j + m g = 0,    sum lambda_j p_j x d_j + c x m g = 0,    lambda_j >= s m |g| / n
 
-and the linear program looks for the largest s: 1 if all n forces were equal, 0 on the verge, negative where forces
-would have to pull. The CoM is given, or free within the limbs' reach, whose spheres are cut in as they are touched.
+and the linear program looks for the largest s: 1 if all n forces are equal, 0 at the limit, negative where forces
+would have to pull. The CoM is given, or free within the limbs' reach: spheres, to which cutting planes are added.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from toolkit.physics.wrench import corner_rays
 from toolkit.robot.model import RobotModel
 
 SIDES = 16
-_CUTS = 12  # rounds of reach; each halves what is left several times over
+_CUTS = 12  # most rounds of cutting planes; each reduces the distance outside the spheres several times
 _TOLERANCE = 1e-7
 _TIE = 1e-3  # price of a metre between the CoM and the middle of the contacts, in units of the margin
 
@@ -37,9 +36,9 @@ class BalanceResult:
     """Verdict on static balance.
 
     Attributes:
-        balanced: the contacts can hold the robot at rest.
-        com: (3,) m; the CoM given, or the best one within reach; its height matters to reach only.
-        margin: the s above; negative where not balanced, -inf where no CoM is within reach.
+        balanced: Whether the contacts can hold the robot at rest.
+        com: (3,) m; the given CoM, or the best one within reach. Its height only matters for the reach.
+        margin: The s above; negative where not balanced, -inf where no CoM is within reach.
     """
 
     balanced: bool
@@ -53,20 +52,18 @@ def statically_balanced(
     com: np.ndarray | None = None,
     *,
     margins: Margins | None = None,
-    yaw: float | None = None,
 ) -> BalanceResult:
     """Static balance of a robot on contacts.
 
     Args:
-        robot: mass, patches, legs and arms.
-        contacts: at least one.
+        robot: The robot, with its mass, patches, legs and arms.
+        contacts: At least one contact. The base has the mean heading of the feet.
         com: (3,) m; None to look for the best one within reach.
-        margins: kept off friction and patches; none by default. The yaw factor is not used: yaw moments follow from the
-            corner forces.
-        yaw: rad; heading of the base, the mean of the feet's where None.
+        margins: Margins of friction and patches; none by default. The yaw factor is not used: yaw moments follow from
+            the corner forces.
 
     Raises:
-        ValueError: no contacts.
+        ValueError: There is no contact.
     """
     if not contacts:
         raise ValueError("static balance needs at least one contact")
@@ -95,8 +92,8 @@ def statically_balanced(
     limits = [(0.0, None)] * count + [(None, 1.0)]
     if com is not None:
         return _solved(cost, upper, bound, equality, right, limits, np.asarray(com, float), None)
-    centers, radii, floor = _reach(robot, contacts, yaw)
-    # Ties go to a CoM near the middle at home height: away from it the margin counts a thousandth less a metre.
+    centers, radii, floor = _reach(robot, contacts)
+    # Of equal margins, the CoM nearest to the middle at home height wins: a metre costs a thousandth of the margin.
     cost[count + 1 : count + 4] = _TIE
     deviation = np.zeros((6, columns))
     deviation[:, count + 1 : count + 4] = -np.concatenate([np.eye(3), np.eye(3)])
@@ -131,13 +128,11 @@ def _normal_bounds(robot: RobotModel, contacts: Sequence[Contact], patches: list
     return np.array(rows).reshape(-1, columns), np.array(bounds)
 
 
-def _reach(robot: RobotModel, contacts: Sequence[Contact], yaw: float | None) -> tuple[np.ndarray, np.ndarray, float]:
+def _reach(robot: RobotModel, contacts: Sequence[Contact]) -> tuple[np.ndarray, np.ndarray, float]:
     """(n, 3) centres and (n,) radii of spheres that hold the CoM, and its least height."""
     feet = [contact for contact in contacts if contact.limb.is_foot]
-    if yaw is None:
-        headings = [contact.pose.yaw for contact in feet or contacts]
-        yaw = float(mean_heading(headings[0], headings[-1]))
-    base = rotation_about_z(yaw)
+    headings = [contact.pose.yaw for contact in feet or contacts]
+    base = rotation_about_z(float(mean_heading(headings[0], headings[-1])))
     centers, radii = [], []
     for contact in contacts:
         if contact.limb.is_foot:

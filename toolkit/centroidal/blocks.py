@@ -1,12 +1,12 @@
-"""A nonlinear program as a sum of small functions, each applied many times: quick to build, whatever its length.
+"""A nonlinear program as a sum of small functions, each applied many times: quick to build, however long it is.
 
 A `Piece` is one small CasADi function with its derivatives; a `Block` applies it n times to variables and rows given by
-index arrays. `Assembly` gathers, maps and scatters, so that building a program of any size takes a handful of graph
-nodes, and hands the solvers ready-made derivatives instead of letting them differentiate the whole program.
+index arrays. `Assembly` gathers, maps and scatters. So a program of any size has only a few graph nodes, and the solver
+receives its derivatives instead of differentiating the whole program.
 
 The Hessian is Gauss-Newton in the objective: sum_i rho_i(v)^2 + linear(v) has the Hessian 2 Jrho^T Jrho. Objective and
-rows add more curvature only where a piece knows a convex part of it, so the Hessian is positive semidefinite whatever
-the point and the multipliers: the solver needs no regularisation.
+rows add more curvature only where a piece knows a convex part of it. So the Hessian is positive semidefinite at any
+point and any multipliers, and the solver needs no regularisation.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ class Piece:
     """A small function (v, p) -> (objective, rows) with derivatives.
 
     Args:
-        name: for messages.
+        name: Name of the piece.
         v: (nv,) variables.
         p: (np,) parameters.
         rho: (nr,) terms whose squares add to the objective, or None.
-        linear: scalar added to the objective, linear in v, or None.
+        linear: Scalar added to the objective, linear in v, or None.
         rows: (ng,) constraint rows, or None.
-        bend: positive semidefinite (nv, nv) part of the objective's Hessian beyond Gauss-Newton; None to leave it out.
-        curvature: maps the rows' multipliers (not positive where a row's lower bound is active) to a positive
+        bend: Positive semidefinite (nv, nv) part of the objective's Hessian beyond Gauss-Newton; None to leave it out.
+        curvature: Function from the rows' multipliers (not positive where a row's lower bound is active) to a positive
             semidefinite (nv, nv) part of the Hessian; None to leave the rows' curvature out.
-        jacobian: (ng, nv) of the rows where the caller knows a shorter expression.
+        jacobian: (ng, nv) Jacobian of the rows where the caller knows a shorter expression.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Block:
     """A piece applied n times.
 
     Attributes:
-        piece: the function.
+        piece: The function.
         variables: (n, piece.size) indices into the program's variables.
         rows: (n, piece.rows) indices into the program's rows; several may add to one row.
         parameters: (n, piece.parameters).
@@ -119,9 +119,9 @@ class Assembly:
     """A program of blocks.
 
     Args:
-        blocks: its parts.
-        size: number of variables.
-        rows: number of constraint rows.
+        blocks: Parts of the program.
+        size: Number of variables.
+        rows: Number of constraint rows.
     """
 
     def __init__(self, blocks: list[Block], size: int, rows: int):
@@ -134,7 +134,7 @@ class Assembly:
         return np.concatenate([block.parameters.ravel() for block in self.blocks])
 
     def functions(self) -> dict[str, ca.Function]:
-        """Functions by the names by which CasADi hands them to Ipopt."""
+        """Functions under the names under which CasADi passes them to Ipopt."""
         x = ca.MX.sym("x", self.size)
         p = ca.MX.sym("p", sum(block.parameters.size for block in self.blocks))
         weight, multiplier = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
@@ -164,8 +164,13 @@ class Assembly:
 
         to_x = self._scatter([block.variables for block in self.blocks], self.size)
         to_g = self._scatter([block.rows for block in self.blocks], self.rows)
-        jac_pattern, to_jac = self._jacobian()
-        hess_pattern, to_hess = self._hessian()
+        row, column = self._entries(
+            [(block.rows, block.variables, block.piece.jacobian_pattern) for block in self.blocks]
+        )
+        jac_pattern, to_jac = _gathered(row, column, self.rows, self.size)
+        pairs = [(block.variables, block.variables, block.piece.hessian_pattern) for block in self.blocks]
+        row, column = self._entries(pairs)
+        hess_pattern, to_hess = _gathered(row, column, self.size, self.size, row <= column)
         cost, value = mapped("cost"), mapped("value")
         gradient, first = mapped("gradient"), mapped("first")
         second = mapped("second", ca.MX(weight), lam)
@@ -191,24 +196,12 @@ class Assembly:
         row = np.concatenate([index.ravel() for index in indices])
         return _ones(ca.Sparsity(size, len(row), list(range(len(row) + 1)), row.tolist()))
 
-    def _jacobian(self) -> tuple[ca.Sparsity, ca.MX]:
-        """Pattern of the Jacobian, and the matrix from stacked entries to its nonzeros."""
-        row, column = [], []
-        for block in self.blocks:
-            r, c = block.piece.jacobian_pattern
-            row.append(block.rows[:, r].ravel())
-            column.append(block.variables[:, c].ravel())
-        return _gathered(np.concatenate(row), np.concatenate(column), self.rows, self.size)
-
-    def _hessian(self) -> tuple[ca.Sparsity, ca.MX]:
-        """Pattern of the Hessian's upper triangle, and the matrix from stacked entries to its nonzeros."""
-        row, column = [], []
-        for block in self.blocks:
-            r, c = block.piece.hessian_pattern
-            row.append(block.variables[:, r].ravel())
-            column.append(block.variables[:, c].ravel())
-        row, column = np.concatenate(row), np.concatenate(column)
-        return _gathered(row, column, self.size, self.size, row <= column)
+    @staticmethod
+    def _entries(parts: list) -> tuple[np.ndarray, np.ndarray]:
+        """Row and column of each stacked entry, of blocks' (rows, columns, pattern within a piece)."""
+        row = [rows[:, pattern[0]].ravel() for rows, _, pattern in parts]
+        column = [columns[:, pattern[1]].ravel() for _, columns, pattern in parts]
+        return np.concatenate(row), np.concatenate(column)
 
 
 def _gathered(

@@ -1,8 +1,8 @@
-"""What the body can do: limits of the legs and arms along a centroidal motion, checked in plain NumPy.
+"""Limits of the legs and arms along a centroidal motion, checked in NumPy.
 
-Joint angles of the stance legs follow from the CoM in closed form, joint torques from the wrench under the sole
-(`toolkit.physics.leg`), the leg's own weight and inertia left out. A foot in the air is taken on a smooth path between
-its two contacts; its hip keeps within a leg's length of it.
+Joint angles of the stance legs follow from the CoM in closed form, and joint torques from the wrench under the sole
+(`toolkit.physics.leg`); the leg's own weight and inertia are left out. A foot in the air is assumed on a smooth path
+between its two contacts, and its hip must stay within a leg's length of it.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from toolkit.physics.leg import PLANNED, ReachMargins, leg_clearances, leg_postu
 from toolkit.robot.model import RobotModel
 
 SWING_LIFT = 0.06  # m; height of the assumed path of a foot in the air above the line between its contacts
-CROSSING = (0.02, 0.95)  # of a swing, in which the foot crosses from contact to contact
+CROSSING = (0.02, 0.95)  # part of a swing in which the foot moves horizontally from contact to contact
 
 
 @dataclass(frozen=True)
 class BodyMargins(ReachMargins):
-    """How far inside the body's limits a plan stays; the defaults are what no plan may exceed.
+    """How far inside the body's limits a plan stays; the defaults are the limits themselves.
 
     Attributes:
-        length: m, off both ends of the hip-ankle and shoulder-palm distances.
-        ankle: rad, off both ends of ankle pitch and roll.
-        hip: rad, off both ends of hip roll and pitch.
-        height: m, above the least CoM height.
-        torque: part of each leg joint's torque that may be used.
+        length: m; taken off both ends of the hip-ankle and shoulder-palm distances.
+        ankle: rad; taken off both ends of ankle pitch and roll.
+        hip: rad; taken off both ends of hip roll and pitch.
+        height: m; added to the least CoM height.
+        torque: Part of each leg joint's torque that may be used.
     """
 
     ankle: float = 0.0
@@ -43,8 +43,8 @@ class BodyResiduals:
     """By how much a motion exceeds the body's limits.
 
     Attributes:
-        violation: name of the limit -> (N + 1, 4) by knot and limb; negative or -inf where kept. m and rad; torques and
-            what happens during a step stand at the step's first knot, torques as a part of the limit.
+        violation: Name of the limit -> (N + 1, 4) by knot and limb in m or rad, torques as a part of the limit;
+            negative or -inf where the limit is kept. What happens during a step is entered at its first knot.
     """
 
     violation: dict[str, np.ndarray]
@@ -84,19 +84,17 @@ def knot_contacts(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, n
     return knot, limb, position, rotation
 
 
-def swing_ankles(
-    problem: CentroidalProblem,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def swing_ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Where the ankle of a foot in the air is, on a smooth path from the contact it left to the one it will make.
 
-    Looked at are the knots strictly inside swings, and the middle of a swing's first and last step: that is where legs
-    are stretched the most.
+    The times are the knots strictly inside swings, and the middle of a swing's first and last step, where legs are
+    stretched the most.
 
     Returns:
         (n,) knots, (n,) s from the knot, (n,) limbs, (n, 3) ankles in the world, and (n, 3, 4) how they follow
         displacements of the contact made (2) and of the contact left (2) along their own axes.
     """
-    knots, delays, limbs, ankles, tangents = [], [], [], [], []
+    parts = []
     times = problem.times
     for limb in FEET:
         tip = problem.position[:, limb] + problem.rotation[:, limb] @ problem.tip_in_contact[limb]
@@ -120,32 +118,17 @@ def swing_ankles(
             along = crossed * crossed * (3 - 2 * crossed)
             path = tip[lift - 1] + along * (end - tip[lift - 1])
             path[:, 2] += SWING_LIFT * (4 * s * (1 - s))[:, 0]
-            knots.append(inside)
-            delays.append(delay)
-            limbs.append(np.full(len(inside), int(limb)))
-            ankles.append(path)
             share, left = along[..., None], problem.rotation[lift - 1, limb]
-            tangents.append(np.concatenate([share * turn[:, :2], (1 - share) * left[:, :2]], 2))
-    if not knots:
+            tangent = np.concatenate([share * turn[:, :2], (1 - share) * left[:, :2]], 2)
+            parts.append((inside, delay, np.full(len(inside), int(limb)), path, tangent))
+    if not parts:
         return np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros((0, 3)), np.zeros((0, 3, 4))
-    knot, delay, limb = np.concatenate(knots), np.concatenate(delays), np.concatenate(limbs)
-    return knot, delay, limb, np.concatenate(ankles), np.concatenate(tangents)
-
-
-def middle_com(motion: CentroidalMotion) -> np.ndarray:
-    """(N, 3) m; CoM where the torques of each step are judged: half a step on at the first knot's velocity."""
-    half = motion.problem.dt[:, None] / 2
-    return motion.com[:-1] + half * motion.linear_momentum[:-1] / motion.problem.mass
+    knots, delays, limbs, ankles, tangents = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return knots, delays, limbs, ankles, tangents
 
 
 def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins = BodyMargins()) -> BodyResiduals:
-    """How far a motion exceeds the body's limits, less `margins`.
-
-    Args:
-        motion: any motion of the robot, feasible or not.
-        robot: its limbs.
-        margins: kept off each limit.
-    """
+    """How far a motion, feasible or not, exceeds the limits of the robot's legs and arms less the margins."""
     p, n = motion.solved, motion.problem.steps
     violation: dict[str, np.ndarray] = {}
 
@@ -192,8 +175,18 @@ def lowest_foot(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
     return np.where(np.isfinite(lowest), lowest, -np.inf), height.argmin(1)
 
 
+def mean_feet(problem: CentroidalProblem) -> np.ndarray:
+    """(N + 1, 3) m; mean of the feet in contact around each knot; zero without one."""
+    knots, limbs, positions, _ = knot_contacts(problem)
+    feet = limbs < 2
+    total, count = np.zeros((problem.steps + 1, 3)), np.zeros(problem.steps + 1)
+    np.add.at(total, knots[feet], positions[feet])
+    np.add.at(count, knots[feet], 1.0)
+    return total / np.maximum(count, 1.0)[:, None]
+
+
 def _enter_torques(motion: CentroidalMotion, robot: RobotModel, limb: Limb, part: float, enter) -> None:
-    """Enter how far the torques of a leg exceed `part` of their limits."""
+    """Enter how far the torques of a leg in the middle of each step exceed `part` of their limits."""
     p, leg = motion.solved, robot.legs[limb]
     step = np.flatnonzero(p.active[:, limb])
     if not len(step):
@@ -202,6 +195,7 @@ def _enter_torques(motion: CentroidalMotion, robot: RobotModel, limb: Limb, part
     arm = np.einsum("nij,nj->ni", rotation[:, :, :2], motion.cop[step, limb])
     moment = np.cross(arm, force) + motion.yaw_torque[step, limb, None] * rotation[:, :, 2]
     yaw = (p.yaw[step] + p.yaw[step + 1]) / 2
-    posture = leg_posture(leg, middle_com(motion)[step], yaw, sole, rotation)
+    middle = motion.com[step] + p.dt[step, None] / 2 * motion.linear_momentum[step] / p.mass
+    posture = leg_posture(leg, middle, yaw, sole, rotation)
     for role, torque in leg_torques(posture, sole, rotation, force, moment).items():
         enter(role.replace("_", " ") + " torque", step, limb, np.abs(torque) / leg.torques[role] - part)

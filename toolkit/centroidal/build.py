@@ -20,25 +20,26 @@ from toolkit.geometry.heading import joint_heading, wrapped
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 
+MAX_SPEED = 20.0  # m/s; of the initial CoM, as a guard against wrong units
+
 
 @dataclass(frozen=True)
 class ProblemConfig:
     """What a problem assumes beyond robot, contacts and timing.
 
     Attributes:
-        steps: intervals per phase (the paper: 1 s in steps of 0.2 s).
+        steps: Number of steps per phase (the paper: 1 s in steps of 0.2 s).
         max_dt: s; long phases of a schedule get more steps than `steps` to stay below this.
         min_dt: s; short phases of a schedule get fewer steps than `steps` to stay above this.
         final_half_size: (3,) m; half sizes of the box for the last CoM, around the home height above the mean feet,
-            where the robot is to rest.
+            where the motion ends at rest.
         moving_half_size: (3,) m; the same after a transition that others follow: long strides leave the CoM before or
             behind the middle of the feet, and lower.
-        min_height: the CoM stays this part of the home height above the lowest foot in contact.
-        max_normal_force: bound on the normal force of each limb in multiples of the robot's weight, applied on top of
-            the limb's own limit: legs do not push with arbitrary force, however short the step.
-        max_velocity: m/s; the initial CoM velocity may not be faster (a guard against wrong units).
-        weights: of the objective.
-        margins: of the constraints.
+        min_height: Least height of the CoM above the lowest foot in contact, as a part of the home height.
+        max_normal_force: Bound on the normal force of each limb in multiples of the robot's weight, beside the limb's
+            own limit: legs do not push with arbitrary force, however short the step.
+        weights: Weights of the objective.
+        margins: Margins of the constraints.
     """
 
     steps: int = 5
@@ -48,7 +49,6 @@ class ProblemConfig:
     moving_half_size: tuple[float, float, float] = (0.25, 0.12, 0.15)
     min_height: float = 0.7
     max_normal_force: float = 3.0
-    max_velocity: float = 20.0
     weights: Weights = field(default_factory=Weights)
     margins: Margins = field(default_factory=Margins)
 
@@ -73,13 +73,13 @@ def transition_problem(
     The last knot must be within reach of the new contact too.
 
     Args:
-        robot: mass, patches and reach.
-        stance: contacts before the transition.
-        com: (3,) m initial CoM in the world.
+        robot: The robot, with its mass, patches and reach.
+        stance: The contacts before the transition.
+        com: (3,) m; initial CoM in the world.
         com_velocity: (3,) m/s.
-        transition: the limb that moves, its new contact and the timing.
-        config: see the class; its defaults where None.
-        final_at_rest: whether the CoM must be at rest at the end.
+        transition: The limb that moves, its new contact and the timing.
+        config: Settings; the defaults where None.
+        final_at_rest: Whether the CoM must be at rest at the end.
 
     Raises:
         InputError: CoM or velocity are not finite, a duration is not positive, or the robot has no such limb.
@@ -99,8 +99,7 @@ def transition_problem(
     yaw[n + 1 :] = start + wrapped(end - start) / n * np.arange(1, n + 1)
     arrays = _contact_arrays(2 * n)
     for contact in before:
-        moves = contact.limb == transition.limb
-        _put(arrays, contact, 0, n if moves else 2 * n, 2 * n)
+        _put(arrays, contact, 0, n if contact.limb == transition.limb else 2 * n)
     return _problem(robot, config, arrays, dt, yaw, com, com_velocity, after, final_at_rest, landing=transition.contact)
 
 
@@ -112,19 +111,17 @@ def sequence_problem(
     *,
     config: ProblemConfig | None = None,
 ) -> CentroidalProblem:
-    """Problem of a whole schedule, which ends at rest.
-
-    Every phase gets `config.steps` equal steps, or more where they would be longer than `config.max_dt`.
+    """Problem of a whole schedule, which ends at rest; the steps of a phase are equally long.
 
     Args:
-        robot: mass, patches and reach.
-        schedule: phases; the last one has both feet in contact.
-        com: (3,) m initial CoM in the world.
+        robot: The robot.
+        schedule: The phases; the last one has both feet in contact.
+        com: (3,) m; initial CoM in the world.
         com_velocity: (3,) m/s.
-        config: see the class; its defaults where None.
+        config: Settings; the defaults where None.
 
     Raises:
-        InputError: the schedule ends with a foot in the air, or as in `transition_problem`.
+        InputError: The schedule ends with a foot in the air, or as in `transition_problem`.
     """
     config = config or ProblemConfig()
     phases = schedule.phases
@@ -150,7 +147,7 @@ def sequence_problem(
         yaw[begin + 1 : end + 1] = heading + wrapped(target - heading) / count * np.arange(1, count + 1)
         heading = float(yaw[end])
         for contact in phase.contacts:
-            _put(arrays, contact, begin, end, total)
+            _put(arrays, contact, begin, end)
         begin = end
     return _problem(robot, config, arrays, dt, yaw, com, com_velocity, last, True, landing=None)
 
@@ -162,13 +159,13 @@ def _contact_arrays(steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     return np.zeros((steps, 4), bool), np.zeros((steps, 4, 3)), rotation, np.zeros((steps, 4))
 
 
-def _put(arrays: tuple[np.ndarray, ...], contact: Contact, begin: int, end: int, total: int) -> None:
+def _put(arrays: tuple[np.ndarray, ...], contact: Contact, begin: int, end: int) -> None:
     """Enter a contact that holds in steps [begin, end); its place stays known afterwards."""
     active, position, rotation, friction = arrays
     active[begin:end, contact.limb] = True
-    position[begin:total, contact.limb] = contact.pose.position
-    rotation[begin:total, contact.limb] = contact.pose.rotation
-    friction[begin:total, contact.limb] = contact.friction
+    position[begin:, contact.limb] = contact.pose.position
+    rotation[begin:, contact.limb] = contact.pose.rotation
+    friction[begin:, contact.limb] = contact.friction
 
 
 def _problem(
@@ -187,9 +184,9 @@ def _problem(
     com, com_velocity = np.array(com, float), np.array(com_velocity, float)
     x, y, z = com.tolist()
     vx, vy, vz = com_velocity.tolist()
-    if not (math.isfinite(x + y + z) and math.hypot(vx, vy, vz) <= config.max_velocity):
+    if not (math.isfinite(x + y + z) and math.hypot(vx, vy, vz) <= MAX_SPEED):
         raise InputError(
-            f"CoM {com} m and velocity {com_velocity} m/s must be finite, the speed at most {config.max_velocity} m/s"
+            f"CoM {com} m and velocity {com_velocity} m/s must be finite, the speed at most {MAX_SPEED} m/s"
         )
     active = arrays[0]
     root, tip, reach = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(4)

@@ -19,7 +19,7 @@ from toolkit.centroidal.residual import confirmed
 from toolkit.compiled import compiled
 
 FIRST_KNOT_TOLERANCE = 1e-7
-"""m; how far the given first knot may violate reach or height."""
+"""Most that the given first knot may violate reach or height, in m."""
 MOTION = (interior_point.SOLVED, interior_point.UNDECIDED)  # the codes that come with a motion
 STATUS = {
     interior_point.SOLVED: "solved",
@@ -34,8 +34,8 @@ class FastConfig:
     """Settings of the fast solver.
 
     Attributes:
-        tolerance: accepted suboptimality relative to the objective, to first order.
-        max_iterations: of the interior-point method.
+        tolerance: Accepted suboptimality relative to the objective, to first order.
+        max_iterations: Most iterations of the interior-point method.
     """
 
     tolerance: float = 1e-4
@@ -55,22 +55,10 @@ def solve(problem: CentroidalProblem, *, config: FastConfig | None = None) -> Ce
         feasible=False,
         status=STATUS[code],
         **arrays._asdict(),
-        objective=np.inf,
-        seconds=0.0,
         iterations=iterations,
     )
     motion = confirmed(motion) if code in MOTION else motion
     return replace(motion, seconds=perf_counter() - start)
-
-
-def wrenches(problem: CentroidalProblem, *, config: FastConfig | None = None) -> MotionArrays | None:
-    """The motion of a problem as bare arrays, for labelling in bulk; nothing is checked.
-
-    Returns:
-        The arrays; None where the solver says infeasible.
-    """
-    code, _, motion, _ = _run(problem, config)
-    return motion if code in MOTION else None
 
 
 @dataclass(frozen=True)
@@ -78,9 +66,10 @@ class Sensitivity:
     """Derivatives of the least objective of one transition (envelope theorem), world frame.
 
     Attributes:
-        contacts: (5, 6) with the place (1/m) and a rotation vector (1/rad) of the contacts before, by limb, and of the
-            new contact (last); zero where there is none. A foot takes the final box and the heading along.
-        others: (9,) with the CoM (1/m), its velocity (s/m), shift and swing (1/s), and the friction of all contacts.
+        contacts: (5, 6); with respect to the place (1/m) and a rotation vector (1/rad) of the contacts before, by limb,
+            and of the new contact (last). Zero where there is none. A foot takes the final box and the heading along.
+        others: (9,); with respect to the CoM (1/m), its velocity (s/m), the durations of shift and swing (1/s), and the
+            friction of all contacts.
     """
 
     contacts: np.ndarray
@@ -90,12 +79,17 @@ class Sensitivity:
 def sensitive_wrenches(
     problem: CentroidalProblem, *, config: FastConfig | None = None
 ) -> tuple[MotionArrays, Sensitivity] | None:
-    """As `wrenches`, with the derivatives of the objective; for half as much time again.
+    """The motion of a problem as bare, unchecked arrays, with the derivatives of its objective; for labelling in bulk.
+
+    The derivatives take half as much time again. They err by about the square root of `FastConfig.tolerance` in
+    directions that hardly matter, and by a tenth of that as a whole.
 
     Args:
-        problem: of one transition, from `build.transition_problem`, not at rest at its end.
-        config: the derivatives err by about the square root of `tolerance` in directions that hardly matter, by a tenth
-            of that as a whole.
+        problem: Problem of one transition, from `build.transition_problem`, not at rest at its end.
+        config: Settings; the defaults where None.
+
+    Returns:
+        The motion and the derivatives; None where the solver says infeasible.
     """
     code, _, motion, derivatives = _run(problem, config, differentiate=True)
     return (motion, derivatives) if code in MOTION else None
@@ -104,7 +98,7 @@ def sensitive_wrenches(
 def _run(
     problem: CentroidalProblem, config: FastConfig | None, *, differentiate: bool = False
 ) -> tuple[int, int, MotionArrays, Sensitivity]:
-    """Status, iterations, the arrays of the motion, and its derivatives, zero where they are not asked for."""
+    """Status, iterations, the arrays of the motion, and its derivatives, which are zero unless `differentiate`."""
     config, arrays = config or FastConfig(), ProblemArrays.of(problem)
     varied = arrays.copy() if differentiate else arrays
     tolerance, most = float(config.tolerance), int(config.max_iterations)

@@ -1,4 +1,4 @@
-"""What a leg can do as CasADi pieces: the laws of `toolkit.physics.leg` on symbols."""
+"""Limits of a leg as CasADi pieces: the laws of `toolkit.physics.leg` on symbols."""
 
 from __future__ import annotations
 
@@ -24,20 +24,15 @@ def displacement(rotation: ca.SX, offset: ca.SX) -> ca.SX:
 def stretched(multiplier: ca.SX, reach: ca.SX, length: ca.SX, v: ca.SX) -> ca.SX:
     """Curvature of an upper bound on a length, which is convex: the Hessian of |reach| wherever the bound is active.
 
-    Without it, the solvers' steps along a bow that a leg's length allows would swing ever farther around the solution.
-
-    Args:
-        multiplier: of the row `upper - length`, not positive where it is active.
-        reach: (3,) linear in `v`.
-        length: of `reach`.
-        v: (nv,) variables.
+    Without it, the solver's steps along the sphere that a leg's length allows would oscillate around the solution. The
+    multiplier is that of the row `upper - length`; `reach` (3,) is linear in the variables `v`.
     """
     across = ca.jacobian(reach, v) - (reach / length) @ ca.jacobian(length, v)
     return ca.fmax(-multiplier, 0) / length * (across.T @ across)
 
 
 def _posture(com: ca.SX, p: Parameters, offset: ca.SX) -> tuple[LegPosture, ca.SX]:
-    """Posture of a leg, its hip's yaw apart, and world_from_sole.
+    """Posture of a leg, whose hip yaw is not meaningful, and world_from_sole.
 
     Parameters: hip relative to the CoM in the world (3), ankle in the world (3), R of the sole (9, row-major), thigh,
     shin. The sole is displaced by `offset` (2 or none) along its own axes.
@@ -52,7 +47,7 @@ def _posture(com: ca.SX, p: Parameters, offset: ca.SX) -> tuple[LegPosture, ca.S
 def leg(moving: bool) -> Piece:
     """Limits of a leg that motions keep.
 
-    Parameters: of the posture; then those of `leg_limits`.
+    Parameters: those of `_posture`; then those of `leg_limits`.
     """
     p = Parameters()
     com, slack, offset = ca.SX.sym("c", 3), ca.SX.sym("s"), ca.SX.sym("d", 2 * moving)
@@ -80,8 +75,8 @@ def leg_limits(leg: LegGeometry, margins: ReachMargins) -> np.ndarray:
 def torque(moving: bool) -> Piece:
     """Joint torques of a stance leg in the middle of a step.
 
-    Parameters: half of dt; of the posture; sole position (3); (5) torque limits of knee, hip pitch, hip roll, ankle
-    pitch, ankle roll in weights times 1 m; wanted part of the limits.
+    Parameters: half of dt; those of `_posture`; sole position (3); (5) torque limits of knee, hip pitch, hip roll,
+    ankle pitch, ankle roll in weights times 1 m; wanted part of the limits.
     """
     p = Parameters()
     com, velocity, wrench = ca.SX.sym("c", 3), ca.SX.sym("v", 3), ca.SX.sym("w", WRENCH)

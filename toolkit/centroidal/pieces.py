@@ -5,14 +5,13 @@ Scaled variables of a stage: x = [CoM r (m), velocity v (m/s), kappa = k / m (m^
 times 1 m), slacks of friction and CoP (weights); per step: excess (weights) and the body's slack]. The angular momentum
 is about the CoM. The dynamics are those of `toolkit.physics.momentum`, the cones those of `toolkit.physics.wrench`.
 
-Slacks take back the wanted margins, at a price and down to the least margins; what goes beyond those and beyond the
-physical limit, the excess of a step, costs much more, and so does a body's slack above 1. So the program always has a
-solution, and says where it had to cheat.
+Slacks take back the wanted margins, at a price and down to the least margins. The excess of a step goes beyond those
+and beyond the physical limit, and costs much more, as does a body's slack above 1. So the program always has a
+solution, and the excess says where it is not physical.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import casadi as ca
@@ -26,64 +25,17 @@ from toolkit.physics.wrench import SIGNS, pressure, pressure_rows, yaw_row
 STATE = 12
 CONTACT = WRENCH + 2
 SLACKS = 2
-EVEN = 0.1  # part of a slack's price on its square: shared out evenly where the linear price is indifferent
+EVEN = 0.1  # part of a slack's price that is on its square, so that slacks are shared evenly
 G = STANDARD_GRAVITY
 
 
-@dataclass(frozen=True)
-class Pieces:
-    """All pieces.
-
-    Attributes:
-        stage: number of contacts -> dynamics and momentum objective of a step.
-        contact: cone, patch and yaw moment of a contact in a step, and its objective.
-        leg: joint ranges of a stance leg at a knot.
-        torque: joint torques of a stance leg in the middle of a step.
-        distance: hip or shoulder to tip, between two bounds, at a knot.
-        height: CoM above the lowest foot at a knot.
-        slack: price of the excess and the body's slack of a step.
-        initial: the given state.
-        final: rest, box and centring at the end.
-        carry: what a pair of variables becomes at the next knot.
-        anchor: a pair of variables that is zero.
-        landing: price of moving a landing point.
-    """
-
-    stage: dict[int, Piece]
-    contact: Piece
-    leg: Piece
-    torque: Piece
-    distance: Piece
-    height: Piece
-    slack: Piece
-    initial: Piece
-    final: Piece
-    carry: Piece
-    anchor: Piece
-    landing: Piece
-
-
 @lru_cache(maxsize=2)
-def pieces(moving: bool = False) -> Pieces:
-    """The pieces; building them takes tens of milliseconds once.
-
-    Args:
-        moving: whether contacts are displaced by variables.
-    """
-    return Pieces(
-        stage={n: _stage(n, moving) for n in range(1, 5)},
-        contact=_contact(),
-        leg=leg(moving),
-        torque=torque(moving),
-        distance=_distance(moving),
-        height=_height(moving),
-        slack=_slack(),
-        initial=_initial(),
-        final=_final(moving),
-        carry=_carry(),
-        anchor=_anchor(),
-        landing=_landing(),
-    )
+def pieces(moving: bool = False) -> dict[str, Piece]:
+    """All pieces by their names; contacts are displaced by variables where `moving`. Building takes tens of ms once."""
+    made = [_stage(contacts, moving) for contacts in range(1, 5)]
+    made += [_contact(), leg(moving), torque(moving), _distance(moving), _height(moving), _slack(), _initial()]
+    made += [_final(moving), _carry(), _anchor(), _landing()]
+    return {piece.name: piece for piece in made}
 
 
 def _stage(contacts: int, moving: bool) -> Piece:
@@ -219,7 +171,7 @@ def _slack() -> Piece:
 
 
 def _initial() -> Piece:
-    """Given state; parameters: the state (12), its acceleration is what the first step is compared with."""
+    """Given state; parameters: the state (12), with the acceleration with which the first step is compared."""
     p = Parameters()
     x = ca.SX.sym("x", STATE)
     rows = x - p(STATE)
@@ -244,7 +196,7 @@ def _final(moving: bool) -> Piece:
 
 
 def _carry() -> Piece:
-    """What a pair of variables becomes at the next knot: rows b - a."""
+    """Change of a pair of variables to the next knot: rows b - a."""
     now, after = ca.SX.sym("a", 2), ca.SX.sym("b", 2)
     return Piece("carry", ca.vertcat(now, after), ca.SX(0, 1), rows=after - now)
 

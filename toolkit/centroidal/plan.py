@@ -15,19 +15,19 @@ from toolkit.contacts.sequence import ContactSequence
 from toolkit.robot.model import RobotModel
 from toolkit.world.world import World
 
-FRICTION_ROUNDING = 0.01  # of a friction factor: no reason to prefer one motion to another
+FRICTION_ROUNDING = 0.01  # smaller differences of the friction factor do not decide between motions
 
 
 @dataclass(frozen=True)
 class MotionPlan:
-    """What a robot is to do in a world, as far as the centroidal stage knows it.
+    """Contacts and centroidal motion of a robot in a world.
 
     Attributes:
         robot: The robot.
         world: The world.
-        sequence: The contacts, where the motion has them.
-        schedule: When they hold.
-        motion: The motion of CoM, momentum and contact forces; it says itself whether it is feasible.
+        sequence: The contacts, as in the motion.
+        schedule: The times of the contacts.
+        motion: The motion of CoM, momentum and contact forces, with its verdict.
     """
 
     robot: RobotModel

@@ -1,9 +1,9 @@
 """The centroidal momentum problem of a contact sequence, as plain arrays.
 
-Both solvers, the residual check and the training data speak of a motion in these terms. Time is cut into N intervals
+Both solvers, the residual check and the training data use these arrays. Time is cut into N intervals
 ("steps") with constant contact wrenches; knots 0..N bound them. Since the wrench is constant on an interval, the
-paper's Eq. 3 integrates without discretisation error: see `toolkit.physics.momentum`. At a contact act a force f at the
-centre of pressure z, and a torque tau_n about the normal there; `toolkit.physics.wrench` says within which bounds.
+paper's Eq. 3 integrates without discretisation error: see `toolkit.physics.momentum`. A contact transmits a force f
+at its centre of pressure z and a torque tau_n about the normal there; `toolkit.physics.wrench` gives their bounds.
 
 The objective is the paper's weighted sum of squares (Sec. IV), each step weighted by dt / 0.2 s, so that it is an
 integral over time and equals the paper's sum at the paper's step:
@@ -69,28 +69,27 @@ class CentroidalProblem:
     Attributes:
         mass: kg.
         dt: (N,) s.
-        active: (N, 4) bool; limb in contact during the step.
-        position: (N, 4, 3) m; centre of the patch (last known or zero where not active).
-        rotation: (N, 4, 3, 3); world_from_contact, z the surface normal.
-        friction: (N, 4); the surface's coefficient, margins not applied.
-        half_size: (4, 2) m; patch half extents, margins not applied.
+        active: (N, 4) bool; whether the limb is in contact during the step.
+        position: (N, 4, 3) m; centre of the patch. Where not active, it is the last known one or zero.
+        rotation: (N, 4, 3, 3); world_from_contact, whose z axis is the surface's normal.
+        friction: (N, 4); coefficient of the surface, without margins.
+        half_size: (4, 2) m; half extents of the patches, without margins.
         max_normal_force: (4,) N.
-        yaw: (N + 1,) rad; heading of the base assumed at each knot (mean of the feet in contact or just left).
-        com: (3,) m initial CoM.
-        com_velocity: (3,) m/s initial.
-        angular_momentum: (3,) kg m^2/s initial, about the CoM.
+        yaw: (N + 1,) rad; assumed heading of the base at each knot: the mean of the feet in contact or just left.
+        com: (3,) m; initial CoM.
+        com_velocity: (3,) m/s; initial velocity of the CoM.
+        angular_momentum: (3,) kg m^2/s; initial angular momentum about the CoM.
         root_in_com: (4, 3) m; hip / shoulder centre relative to the CoM, in the yaw frame.
         tip_in_contact: (4, 3) m; ankle centre / palm patch in the contact frame.
         max_reach: (4,) m; bound on |root - tip| at every knot for each limb in contact in a step that touches the knot.
         min_height: m; the CoM stays at least this much above the lowest foot in contact at every knot.
-        final_center: (3,) m and
-        final_half_size: (3,) m: box in the world for the last CoM position, axes of the final yaw frame.
-        final_at_rest: whether the last CoM velocity must be zero.
-        weights, margins: see the classes.
-        landing_limb: limb that makes contact at the last knot, -1 for none. Its contact bears no force in any step, but
-            the last knot respects its reach (and, for a foot, the least height above it).
-        landing_position: (3,) m and
-        landing_rotation: (3, 3): that contact, as in `position` and `rotation`; None without one.
+        final_center, final_half_size: (3,) m; box in the world for the last CoM, along the axes of the last heading.
+        final_at_rest: Whether the last CoM velocity must be zero.
+        weights, margins: See the classes.
+        landing_limb: Limb that makes contact at the last knot, -1 for none. Its contact bears no force in any step, but
+            the last knot respects its reach and, for a foot, the least height above it.
+        landing_position, landing_rotation: (3,) m and (3, 3); that contact, as in `position` and `rotation`. None
+            without one.
     """
 
     mass: float
@@ -139,19 +138,19 @@ class CentroidalMotion:
     """Result of an optimisation; meaningless where `feasible` is False except for `status` and `failure`.
 
     Attributes:
-        problem: what was asked.
-        feasible: the residual check passed, not merely the solver's flag.
-        status: the solver's word.
+        problem: The problem that was posed.
+        feasible: Whether the residual check passed; the solver's own flag is not enough.
+        status: What the solver says.
         com: (N + 1, 3) m.
         linear_momentum: (N + 1, 3) kg m/s.
         angular_momentum: (N + 1, 3) kg m^2/s about the CoM.
         force: (N, 4, 3) N in the world, zero where not active.
         cop: (N, 4, 2) m in the contact frame.
         yaw_torque: (N, 4) N m about the contact's normal, at the CoP.
-        objective: value of the paper's objective, recomputed in NumPy.
-        seconds: wall-clock time, everything counted.
-        iterations: of the solver.
-        failure: The constraint that is violated most; None where feasible, or where nobody looked for it.
+        objective: Value of the paper's objective, recomputed by the residual check; inf where it was not.
+        seconds: Wall-clock time of the whole solution.
+        iterations: Number of the solver's iterations.
+        failure: The constraint that is violated most; None where feasible or not determined.
         kept: The margins that the motion keeps; None where they are those of the problem.
         landed: (N, 4, 3) m; centres of the patches where the optimiser moved them; None where they are the problem's.
     """
@@ -165,9 +164,9 @@ class CentroidalMotion:
     force: np.ndarray
     cop: np.ndarray
     yaw_torque: np.ndarray
-    objective: float
-    seconds: float
-    iterations: int
+    objective: float = np.inf
+    seconds: float = 0.0
+    iterations: int = 0
     failure: Failure | None = None
     kept: Margins | None = None
     landed: np.ndarray | None = None
@@ -183,7 +182,7 @@ class CentroidalMotion:
 
     @property
     def outcome(self) -> str:
-        """The solver's word and, where the motion failed, why: for messages."""
+        """What the solver says and, where the motion failed, why; for messages."""
         return self.status if self.failure is None else f"{self.status}; {self.failure.reason}"
 
     def sample(self, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,8 +1,8 @@
 """The whole-sequence problem as an optimal-control program: stages of states and controls.
 
-Stage t holds the state at knot t, the wrench and two slacks of each contact of step t, the excess and the body's slack
-of the step; the last one a state and the body's slack. Rows of stage t are the dynamics to knot t + 1, then its
-inequalities.
+Stage t has the state at knot t, the wrench and two slacks of each contact of step t, and the excess and the body's
+slack of the step. The last stage has a state and the body's slack. The rows of stage t are the dynamics to knot t + 1,
+then its other constraints.
 """
 
 from __future__ import annotations
@@ -13,15 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.centroidal.blocks import Assembly, Block, Piece
-from toolkit.centroidal.body import (
-    BodyMargins,
-    knot_contacts,
-    lowest_foot,
-    swing_ankles,
-)
-from toolkit.centroidal.layout import Layout, indices
+from toolkit.centroidal.body import BodyMargins, knot_contacts, lowest_foot, mean_feet, swing_ankles
 from toolkit.centroidal.leg_pieces import leg_limits
-from toolkit.centroidal.pieces import CONTACT, STATE, WRENCH, G, pieces
+from toolkit.centroidal.pieces import CONTACT, SLACKS, STATE, WRENCH, G, pieces
 from toolkit.centroidal.problem import CentroidalProblem, Margins
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z, steepness
@@ -29,12 +23,13 @@ from toolkit.physics.leg import TORQUE_ROLES
 from toolkit.robot.model import RobotModel
 
 OPEN = 1e3  # bound of rows that are left free
-# What plans keep but where nothing else is feasible: a slide or a tilt cannot be undone without it.
+# Margins that plans keep unless nothing else is feasible: without them, slides and tilts cannot be corrected.
 LEAST = Margins(friction=0.96, cop=(0.01, 0.01), yaw=0.95)
-SCALE = 1e-2  # of the objective inside the program
-# A foot whose rest takes more of its friction than the wanted margin leaves is wanted to keep what resting takes and
-# `RESERVE`, at most `FULL`: else the motion would lean and run to spare friction, and be the less safe for it.
+SCALE = 1e-2  # factor on the objective inside the program
+# Where a foot at rest already uses more of its friction than the wanted margin leaves, it may use `RESERVE` more than
+# at rest, at most `FULL`. Otherwise the motion would lean and run to spare friction, which is less safe.
 RESERVE, FULL = 0.1, 0.9
+PAIRS = len(FEET) + 1  # one for each foot's contact, and one for the contact that the foot in the air has left
 
 
 @dataclass(frozen=True)
@@ -42,21 +37,20 @@ class Regularisers:
     """Small terms beside the paper's objective that make a plan easy to execute; each an integral like the objective's.
 
     Attributes:
-        jerk: weight of (change of CoM acceleration from step to step / dt)^2.
-        height: weight of the CoM's distance from home height above the feet, m^2.
-        cop: weight of the CoP's distance from the middle of the patch over the patch's size, times the load over what
-            the limb is there to bear: the weight, or `palm_force`; decides in slow gaits, whose momenta cost little:
-            slow single support does not forgive a CoP near the edge, nor does a palm.
-        load: weight of the normal force (in weights) of a foot in the step after it lands or before it lifts.
-        palm: weight of the distance (in weights) of a palm's normal force from `palm_force`.
-        palm_force: in weights; a palm that only touches is neither of use nor easy to control.
-        final_center: weight of the distance of the last CoM from the mean of the feet, m^2.
-        final_acceleration: weight of the last CoM acceleration, m^2/s^4.
-        final_spin: weight of the last angular momentum per mass, m^4/s^2.
-        landing: weight of the displacement of a landing point, m^2.
-        slack: price of a margin of a fully loaded contact, or of the body, taken back for 0.2 s.
-        excess: price of going beyond the least margins, and beyond a physical limit, by as much, in multiples of
-            `slack`.
+        jerk: Weight of (change of CoM acceleration from step to step / dt)^2.
+        height: Weight of the CoM's distance from home height above the feet, m^2.
+        cop: Weight of the CoP's distance from the middle of the patch over the patch's size, times the load over the
+            usual load of the limb: the weight, or `palm_force`. It matters in slow gaits, whose momenta cost little and
+            where a CoP near the edge is risky, and for palms.
+        load: Weight of the normal force (in weights) of a foot in the step after it lands or before it lifts.
+        palm: Weight of the distance (in weights) of a palm's normal force from `palm_force`.
+        palm_force: Wanted normal force of a palm in weights; a palm that only touches is useless and hard to control.
+        final_center: Weight of the distance of the last CoM from the mean of the feet, m^2.
+        final_acceleration: Weight of the last CoM acceleration, m^2/s^4.
+        final_spin: Weight of the last angular momentum per mass, m^4/s^2.
+        landing: Weight of the displacement of a landing point, m^2.
+        slack: Price of taking back a margin of a fully loaded contact, or of the body, for 0.2 s.
+        excess: Price of going as far beyond the least margins, or a physical limit, in multiples of `slack`.
     """
 
     jerk: float = 0.02
@@ -78,8 +72,8 @@ class Landing:
     """Room for a foot's next contact.
 
     Attributes:
-        limb: the foot.
-        step: the first one in which it is in the air.
+        limb: The foot.
+        step: The first step in which the foot is in the air.
         lower, upper: (2,) m; range of the contact's displacement along its own axes.
     """
 
@@ -89,15 +83,65 @@ class Landing:
     upper: np.ndarray
 
 
+@dataclass(frozen=True)
+class Layout:
+    """Where things are in the vector of variables.
+
+    Attributes:
+        offset: (N + 1,) first variable of each stage.
+        wrench: (N, 4) first variable of a limb's wrench; -1 where not active.
+        slack: (N + 1, 2) variables of the excess and of the body's slack; at the last knot both are the body's.
+        landing: (N,) first variable of a landing point that is chosen in a step; -1 where none is.
+        states: (N + 1,) numbers of state variables.
+        size: Number of variables.
+        moving: Whether contacts are displaced by variables.
+    """
+
+    offset: np.ndarray
+    wrench: np.ndarray
+    slack: np.ndarray
+    landing: np.ndarray
+    states: np.ndarray
+    size: int
+    moving: bool
+
+    @classmethod
+    def of(cls, active: np.ndarray, landings: Sequence[int] | None = None) -> Layout:
+        """Layout for (N, 4) active contacts; `landings` are the steps that choose a landing point, None for none."""
+        moving = landings is not None
+        count = active.sum(1)
+        chooses = np.zeros(len(active), bool)
+        chooses[list(landings or ())] = True
+        controls = np.append(CONTACT * count + SLACKS + 2 * chooses, 1)
+        states = np.full(len(controls), STATE + 2 * PAIRS * moving)
+        offset = np.concatenate([[0], np.cumsum(states + controls)[:-1]])
+        rank = np.cumsum(active, 1) - 1
+        first = offset + states
+        wrench = np.where(active, first[:-1, None] + CONTACT * rank, -1)
+        slack = (first[:-1] + CONTACT * count)[:, None] + np.arange(SLACKS)
+        slack = np.concatenate([slack, np.full((1, SLACKS), first[-1])])
+        landing = np.where(chooses, first[:-1] + CONTACT * count + SLACKS, -1)
+        return cls(offset, wrench, slack, landing, states, int((states + controls).sum()), moving)
+
+    def pair(self, knot: np.ndarray, which: int | np.ndarray) -> np.ndarray:
+        """(n, 2) variables at (n,) knots of the displacement of a foot's contact, or of the one left (len(FEET))."""
+        return indices(self.offset[knot] + STATE + 2 * np.asarray(which), 2)
+
+
+def indices(first: np.ndarray, size: int) -> np.ndarray:
+    """(n, size) consecutive indices from (n,) first ones."""
+    return first[:, None] + np.arange(size)
+
+
 class Program:
     """Blocks, bounds and structure of one problem.
 
     Args:
-        problem: the motion wanted; its margins are the wanted ones.
-        robot: for the limits of the body.
-        body: wanted margins of the body.
-        regularisers: weights.
-        landings: where contacts may move; they stay where None.
+        problem: The problem, with the wanted margins.
+        robot: The robot, for the limits of the body.
+        body: Wanted margins of the body.
+        regularisers: Weights of the regularisers.
+        landings: Where contacts may move; None where they stay.
     """
 
     def __init__(
@@ -109,7 +153,6 @@ class Program:
         landings: Sequence[Landing] | None = None,
     ):
         self.problem, self.robot, self.body, self.regularisers = problem, robot, body, regularisers
-        self.least = LEAST
         self.landings = landings
         self.layout = Layout.of(problem.active, None if landings is None else [item.step for item in landings])
         self._pieces = pieces(self.layout.moving)
@@ -147,7 +190,7 @@ class Program:
         n = p.steps
         first, last = np.array([0]), np.array([n])
         initial = np.concatenate([p.com, p.com_velocity, p.angular_momentum / p.mass, np.zeros(3)])
-        rows = self._add(self._pieces.initial, first, self._state(first), initial[None])
+        rows = self._add(self._pieces["initial"], first, self._state(first), initial[None])
         self._bounds.append((first, rows, np.zeros((STATE, 2))))
         weights = np.sqrt(SCALE * np.array([reg.final_center, reg.final_acceleration, reg.final_spin]))
         yaw = p.yaw[-1]
@@ -156,7 +199,7 @@ class Program:
         if self.layout.moving:
             variables = np.concatenate([variables, *(self.layout.pair(last, foot) for foot in FEET)], 1)
             tangents = np.concatenate([p.rotation[-1, foot, :, :2] / 2 for foot in FEET], 1).reshape(1, 12)
-        rows = self._add(self._pieces.final, last, variables, columns[None], tangents)
+        rows = self._add(self._pieces["final"], last, variables, columns[None], tangents)
         speed = 0.0 if p.final_at_rest else OPEN
         bound = np.concatenate([np.full(3, speed), p.final_half_size])
         self._bounds.append((last, rows, np.stack([-bound, bound], 1)))
@@ -183,17 +226,23 @@ class Program:
             squares += [np.full(len(step), w.cop), np.full(len(step), reg.cop / usual**2), press]
             weights = np.sqrt(duration[step, None] * np.stack(squares, 1))
             wanted = np.array([p.margins.friction, *cop_margin[limb], p.margins.yaw])
-            least = np.array([self.least.friction, *np.minimum(self.least.cop, cop_margin[limb]), self.least.yaw])
+            least = np.array([LEAST.friction, *np.minimum(LEAST.cop, cop_margin[limb]), LEAST.yaw])
             least[[0, 3]] = np.maximum(least[[0, 3]], wanted[[0, 3]])
-            variables = np.concatenate(
-                [indices(self.layout.wrench[step, limb], CONTACT), self.layout.slack[step, :1]], 1
-            )
+            wrench = indices(self.layout.wrench[step, limb], CONTACT)
+            variables = np.concatenate([wrench, self.layout.slack[step, :1]], 1)
             fixed = np.tile(np.concatenate([p.half_size[limb], wanted, least]), (len(step), 1))
             if Limb(limb).is_foot:
                 fixed[:, 2] = wanted_friction(p, step, limb)
             wanted_force = np.full(len(step), force)
             self._add(
-                self._pieces.contact, step, variables, p.friction[step, limb], fixed, weights, wanted_force, price[step]
+                self._pieces["contact"],
+                step,
+                variables,
+                p.friction[step, limb],
+                fixed,
+                weights,
+                wanted_force,
+                price[step],
             )
 
     def _add_body(self) -> None:
@@ -213,7 +262,7 @@ class Program:
             ankle = positions[here] + rotation @ leg.ankle_in_sole
             links = np.tile([leg.thigh, leg.shin], (len(at), 1))
             posture = (hip[at], ankle, rotation, links)
-            self._add(self._pieces.leg, at, variables, *posture, np.tile(leg_limits(leg, body), (len(at), 1)))
+            self._add(self._pieces["leg"], at, variables, *posture, np.tile(leg_limits(leg, body), (len(at), 1)))
 
             step = np.flatnonzero(p.active[:, limb])
             wrench = indices(layout.wrench[step, limb], WRENCH)
@@ -225,9 +274,9 @@ class Program:
             fixed = np.tile(np.append(limits, body.torque), (len(step), 1))
             links = np.tile([leg.thigh, leg.shin], (len(step), 1))
             # order of the piece: half of dt, posture, sole, limits
-            self._add(self._pieces.torque, step, variables, p.dt[step] / 2, *posture, links, sole, fixed)
+            self._add(self._pieces["torque"], step, variables, p.dt[step] / 2, *posture, links, sole, fixed)
 
-            for late in (False, True):  # a piece stands at a stage once
+            for late in (False, True):  # `_add` takes each stage once
                 here = (swing_limbs == limb) & ((delays > 0.0) == late)
                 at, ends = swing_knots[here], tangents[here]
                 self._add_distance(at, delays[here], hip[at], tips[here], 0.0, leg.max_length, limb, ends)
@@ -244,7 +293,7 @@ class Program:
         least, rises = floor[at] + p.min_height, np.zeros((len(at), 0))
         if layout.moving:
             rises = p.rotation[np.minimum(at, p.steps - 1), lowest[at], 2, :2]
-        self._add(self._pieces.height, at, variables, least, np.full(len(at), body.height), rises)
+        self._add(self._pieces["height"], at, variables, least, np.full(len(at), body.height), rises)
 
     def _moved(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
         """(n, 2) variables that displace a foot's contact at knots; (n, 0) where contacts stay."""
@@ -269,10 +318,10 @@ class Program:
         if self.layout.moving:
             variables += [self._moved(knot, foot), self.layout.pair(knot, len(FEET))]
             columns.append(np.zeros((len(knot), 12)) if tangents is None else tangents)
-        self._add(self._pieces.distance, knot, np.concatenate(variables, 1), *columns)
+        self._add(self._pieces["distance"], knot, np.concatenate(variables, 1), *columns)
 
     def _add_landings(self) -> None:
-        """How displacements of contacts go from knot to knot, and what choosing them costs."""
+        """Propagation of contacts' displacements from knot to knot, and the price of landing points."""
         layout, landings = self.layout, self.landings
         if landings is None:
             return
@@ -286,23 +335,23 @@ class Program:
             variables = np.concatenate([source, layout.pair(step + 1, which)], 1)
             self._carried.append((which, variables))
         for which in range(air + 1):
-            rows = self._add(self._pieces.anchor, np.array([0]), layout.pair(np.array([0]), which), np.zeros((1, 0)))
+            rows = self._add(self._pieces["anchor"], np.array([0]), layout.pair(np.array([0]), which), np.zeros((1, 0)))
             self._bounds.append((np.array([0]), rows, np.zeros((2, 2))))
         at = np.array([item.step for item in landings], int)
         if len(at):
             price = np.full(len(at), np.sqrt(SCALE * self.regularisers.landing))
-            self._add(self._pieces.landing, at, indices(layout.landing[at], 2), price)
+            self._add(self._pieces["landing"], at, indices(layout.landing[at], 2), price)
 
     def _price(self) -> np.ndarray:
         """(N,) price of a slack in each step."""
         return SCALE * self.regularisers.slack * self.problem.dt / 0.2
 
     def _add_slacks(self) -> None:
-        """Prices of what the steps take beyond their contacts' margins."""
+        """Prices of the excess and of the body's slack."""
         slack, price = self.layout.slack, self._price()
         step, last = np.arange(self.problem.steps), np.array([self.problem.steps])
-        self._add(self._pieces.slack, step, slack[:-1], self.regularisers.excess * price, price)
-        self._add(self._pieces.slack, last, slack[-1:], price[-1:] / 2, price[-1:] / 2)
+        self._add(self._pieces["slack"], step, slack[:-1], self.regularisers.excess * price, price)
+        self._add(self._pieces["slack"], last, slack[-1:], price[-1:] / 2, price[-1:] / 2)
 
     def _finish(self) -> None:
         """Dynamics, bounds and the assembly."""
@@ -317,19 +366,11 @@ class Program:
         ]
         duration = p.dt / 0.2
         at_rest = not np.any(p.com_velocity)
-        squares = np.stack(
-            [
-                w.linear_momentum * p.mass**2 * duration,
-                w.linear_momentum_rate * p.mass**2 * duration,
-                w.angular_momentum * p.mass**2 * duration,
-                w.angular_momentum_rate * p.mass**2 * duration,
-                reg.jerk / (0.2 * np.maximum(p.dt, 0.02)),
-                reg.height * duration,
-            ],
-            1,
-        )
+        momenta = w.linear_momentum, w.linear_momentum_rate, w.angular_momentum, w.angular_momentum_rate
+        squares = [weight * p.mass**2 * duration for weight in momenta]
+        squares = np.stack([*squares, reg.jerk / (0.2 * np.maximum(p.dt, 0.02)), reg.height * duration], 1)
         squares[0, 4] *= at_rest  # the acceleration before a start in motion is unknown
-        height = _home_height(p)
+        height = mean_feet(p)[:, 2] + (p.final_center[2] - p.position[-1, :2, 2].mean())
         weights = np.sqrt(SCALE * squares)
         count = p.active.sum(1)
         for contacts in range(1, 5):
@@ -349,10 +390,10 @@ class Program:
             pose = np.concatenate(pose, 2).reshape(len(step), -1)
             parameters = np.concatenate([p.dt[step, None], pose, weights[step], height[step + 1, None]], 1)
             rows = first_row[step][:, None] + np.arange(STATE)
-            blocks.append(Block(self._pieces.stage[contacts], variables, rows, parameters))
+            blocks.append(Block(self._pieces[f"stage{contacts}"], variables, rows, parameters))
         for which, variables in self._carried:
             rows = first_row[:n, None] + STATE + 2 * which + np.arange(2)
-            blocks.append(Block(self._pieces.carry, variables, rows, np.zeros((n, 0))))
+            blocks.append(Block(self._pieces["carry"], variables, rows, np.zeros((n, 0))))
         self.assembly = Assembly(blocks, layout.size, total)
         self.row_bounds = np.stack([np.zeros(total), np.full(total, np.inf)], 1)
         for stage in range(n):
@@ -372,18 +413,7 @@ class Program:
 
 
 def wanted_friction(problem: CentroidalProblem, step: np.ndarray, foot: int) -> np.ndarray:
-    """(n,) part of its friction that a foot's contact is wanted to use at most; see `RESERVE`."""
+    """(n,) largest part of its friction that a foot's contact should use; see `RESERVE`."""
     wanted = problem.margins.friction
     rest = steepness(problem.rotation[step, foot, 2, 2]) / np.maximum(problem.friction[step, foot], 1e-9)
     return np.where(rest < 1.0, np.clip(rest + RESERVE, wanted, max(FULL, wanted)), wanted)
-
-
-def _home_height(problem: CentroidalProblem) -> np.ndarray:
-    """(N + 1,) m; home height of the CoM above the mean of the feet around each knot."""
-    home = problem.final_center[2] - problem.position[-1, :2, 2].mean()
-    knots, limbs, positions, _ = knot_contacts(problem)
-    feet = limbs < 2
-    total, count = np.zeros(problem.steps + 1), np.zeros(problem.steps + 1)
-    np.add.at(total, knots[feet], positions[feet, 2])
-    np.add.at(count, knots[feet], 1.0)
-    return total / np.maximum(count, 1.0) + home

@@ -1,8 +1,8 @@
 """Independent check of a centroidal motion, one pass over its steps.
 
-Nothing of the solvers is used and no law of `toolkit.physics`: momenta are integrated about the CoM by Simpson's rule
-(exact, the CoM is a parabola on each step), the constraints are evaluated from force, CoP and torque, and whatever is
-undefined counts as infinite. Compiled, a motion takes about ten microseconds, so labels in bulk get the same check.
+It uses neither the solvers nor the laws of `toolkit.physics`. Momenta are integrated about the CoM by Simpson's rule,
+which is exact since the CoM is a parabola on each step. The constraints are evaluated from force, CoP and torque. What
+is undefined counts as infinite. A compiled check takes about ten microseconds, so labels in bulk get the same one.
 """
 
 from __future__ import annotations
@@ -19,23 +19,25 @@ from toolkit.compiled import compiled
 
 TOLERANCE = 1e-6
 """Largest accepted residual. In units of weight (forces), weight times 1 m (moments), m and m/s."""
+LOADED = 0.01
+"""Weights; normal force from which on a contact counts in the margins."""
 
 
 class Residuals(NamedTuple):
     """Largest violation of each group of constraints; 0 where satisfied, inf where undefined.
 
     Attributes:
-        initial: of the given initial state; m, m/s, m/s times 1 m.
-        dynamics: per step, in the same units.
-        inactive: force, CoP or torque of a limb out of contact; weights, m, weight times 1 m.
-        friction: |lateral force| beyond the cone; weights.
-        normal_force: below zero or above the limb's bound; weights.
-        cop: centre of pressure outside the patch, in m, times the normal force; weight times 1 m.
-        yaw: yaw moment beyond what friction on the patch can hold; weight times 1 m.
-        reach: distance from hip or shoulder to the contact beyond the limb's reach; m.
-        height: CoM below its least height; m.
-        final_box: last CoM outside its box; m.
-        rest: last speed where it must be zero; m/s.
+        initial: Difference from the given initial state; m, m/s, m/s times 1 m.
+        dynamics: Defect of a step, in the same units.
+        inactive: Force, CoP or torque of a limb out of contact; weights, m, weight times 1 m.
+        friction: Lateral force beyond the cone; weights.
+        normal_force: Normal force below zero or above the limb's bound; weights.
+        cop: Distance of the CoP outside the patch in m, times the normal force; weight times 1 m.
+        yaw: Yaw moment beyond what friction on the patch can hold; weight times 1 m.
+        reach: Distance from hip or shoulder to the contact beyond the limb's reach; m.
+        height: Height of the CoM below the least one; m.
+        final_box: Distance of the last CoM outside its box; m.
+        rest: Last speed where it must be zero; m/s.
     """
 
     initial: float
@@ -60,9 +62,9 @@ class Residuals(NamedTuple):
         """The largest violation of all."""
         return max(self)
 
-    def within(self, tolerance: float = TOLERANCE) -> bool:
-        """Whether every violation is at most `tolerance`."""
-        return self.largest <= tolerance
+    def within(self) -> bool:
+        """Whether every violation is at most `TOLERANCE`."""
+        return self.largest <= TOLERANCE
 
 
 UNDEFINED = Residuals(*[np.inf] * len(Residuals._fields))
@@ -73,33 +75,28 @@ def check(motion: CentroidalMotion) -> Residuals:
     return _evaluated(motion)[0]
 
 
-def objective(motion: CentroidalMotion) -> float:
-    """The paper's objective of a motion (Sec. IV; see `toolkit.centroidal.problem`), from its knots and wrenches."""
-    return _evaluated(motion)[1]
-
-
-def confirmed(motion: CentroidalMotion, tolerance: float = TOLERANCE) -> CentroidalMotion:
+def confirmed(motion: CentroidalMotion) -> CentroidalMotion:
     """The motion with `feasible` and `objective` set from this module: the only place where `feasible` becomes True."""
     residuals, value = _evaluated(motion)
-    status = motion.status if residuals.within(tolerance) else f"{motion.status}; residual: {residuals.worst}"
+    status = motion.status if residuals.within() else f"{motion.status}; residual: {residuals.worst}"
     value = value if residuals.largest < np.inf else np.inf
-    return replace(motion, feasible=residuals.within(tolerance), objective=value, status=status)
+    return replace(motion, feasible=residuals.within(), objective=value, status=status)
 
 
-def friction_margin(motion: CentroidalMotion, least_force: float = 0.01) -> float:
-    """Smallest mu - |lateral| / normal over contacts that carry at least `least_force` weights; inf if none does."""
+def friction_margin(motion: CentroidalMotion) -> float:
+    """Smallest mu - |lateral| / normal over the loaded contacts (`LOADED`); inf if none is loaded."""
     p = motion.problem
     local = (p.rotation * motion.force[..., None]).sum(-2)
-    loaded = p.active & (local[..., 2] > least_force * p.mass * STANDARD_GRAVITY)
+    loaded = p.active & (local[..., 2] > LOADED * p.mass * STANDARD_GRAVITY)
     ratio = np.hypot(local[loaded, 0], local[loaded, 1]) / local[loaded, 2]
     return float(np.min(p.friction[loaded] - ratio, initial=np.inf))
 
 
-def cop_margin(motion: CentroidalMotion, least_force: float = 0.01) -> float:
-    """Smallest distance in m from a CoP to the edge of its patch over loaded contacts, as `friction_margin`."""
+def cop_margin(motion: CentroidalMotion) -> float:
+    """Smallest distance in m from a CoP to the edge of its patch over the loaded contacts; inf if none is loaded."""
     p = motion.problem
     normal_force = (p.rotation[..., 2] * motion.force).sum(-1)
-    loaded = p.active & (normal_force > least_force * p.mass * STANDARD_GRAVITY)
+    loaded = p.active & (normal_force > LOADED * p.mass * STANDARD_GRAVITY)
     return float(np.min((p.half_size - np.abs(motion.cop))[loaded], initial=np.inf))
 
 
@@ -115,14 +112,9 @@ def _evaluated(motion: CentroidalMotion) -> tuple[Residuals, float]:
 
 @compiled(kept=True)
 def evaluate(p, motion):
-    """Residuals and objective.
+    """`Residuals` and objective of a problem (`ProblemArrays`) and its motion (`MotionArrays`).
 
-    Args:
-        p: The problem, as `ProblemArrays`.
-        motion: Of that problem, as `MotionArrays`.
-
-    Returns:
-        `Residuals` and the objective, all of them infinite where a number of the motion is not finite.
+    All of them are infinite where a number of the motion is not finite.
     """
     com, linear, angular, force, cop, torque = motion
     n, weight = p.dt.shape[0], p.mass * STANDARD_GRAVITY
@@ -205,7 +197,7 @@ def evaluate(p, motion):
 
 @compiled
 def _worse(worst, value):
-    """The larger one; infinite once a value was undefined."""
+    """The larger one; infinite as soon as a value is undefined."""
     if value <= worst:
         return worst
     return value if value < np.inf else np.inf
@@ -236,7 +228,7 @@ def _beyond_cone(p, step, limb, force, cop, torque):
 
 @compiled
 def _stretch(p, com, knot, limb, place, rotation):
-    """By how much a contact is further than the limb's reach, in m, with the CoM (3,) of a knot."""
+    """Distance in m of a contact beyond the limb's reach, with the CoM (3,) of a knot."""
     cos, sin, tip, root = math.cos(p.yaw[knot]), math.sin(p.yaw[knot]), p.tip_in_contact[limb], p.root_in_com[limb]
     square = 0.0
     for a in range(3):

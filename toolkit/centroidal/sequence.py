@@ -1,8 +1,7 @@
 """The whole-sequence optimisation: the motion that is executed.
 
-The paper's objective under exact cones, with what the body can do (`toolkit.centroidal.body`), and with margins: the
-wanted margins may be relaxed at a price, so they shrink only where nothing else is feasible, and the motion says how
-far. Solved by Ipopt.
+Ipopt minimises the paper's objective under exact cones, the limits of the body (`toolkit.centroidal.body`) and margins.
+The wanted margins may be relaxed at a price, so they shrink where nothing else is feasible; the motion says how far.
 """
 
 from __future__ import annotations
@@ -13,12 +12,11 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
-from toolkit.centroidal.body import BodyMargins, knot_contacts
+from toolkit.centroidal.body import BodyMargins, mean_feet
 from toolkit.centroidal.build import ProblemConfig, sequence_problem
-from toolkit.centroidal.layout import indices
 from toolkit.centroidal.pieces import WRENCH, G
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem, Margins, Weights
-from toolkit.centroidal.program import Landing, Program, Regularisers
+from toolkit.centroidal.program import Landing, Program, Regularisers, indices
 from toolkit.centroidal.verdict import judged
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.schedule import ContactSchedule
@@ -29,28 +27,26 @@ from toolkit.robot.model import RobotModel
 
 WANTED = Margins(friction=0.66, cop=(0.055, 0.045), yaw=0.6)
 CALM = Weights(angular_momentum=20.0, angular_momentum_rate=1.0)
-"""The paper's weights but for the angular momentum: what fast swings ask for with the paper's, no body can follow."""
+"""The paper's weights except for the angular momentum: with the paper's, no body can follow fast swings."""
 WANTED_BODY = BodyMargins(length=0.015, ankle=0.1, hip=0.05, height=0.02, torque=0.85)
 CONVERGED = "converged"
+_IPOPT = {"max_iter": 150, "tol": 1e-4, "constr_viol_tol": 1e-8, "bound_relax_factor": 0.0}
+_SILENT = {"print_level": 0, "sb": "yes"}
 
 
 @dataclass(frozen=True)
 class SequenceConfig:
-    """What a sequence is planned with.
+    """Settings of the optimisation of a sequence.
 
     Attributes:
-        problem: discretisation, final box, weights and the wanted margins of the contacts.
-        body: wanted margins of legs and arms.
-        regularisers: small terms beside the paper's objective.
-        max_iterations: of Ipopt.
-        tolerance: of Ipopt; its constraints are met to about this.
+        problem: Discretisation, final box, weights and the wanted margins of the contacts.
+        body: Wanted margins of legs and arms.
+        regularisers: Small terms beside the paper's objective.
     """
 
     problem: ProblemConfig = field(default_factory=lambda: ProblemConfig(weights=CALM, margins=WANTED, min_dt=0.02))
     body: BodyMargins = WANTED_BODY
     regularisers: Regularisers = field(default_factory=Regularisers)
-    max_iterations: int = 150
-    tolerance: float = 1e-4
 
 
 def optimise(
@@ -65,20 +61,20 @@ def optimise(
     """Optimise the motion of a whole schedule, which ends at rest.
 
     Args:
-        robot: mass, patches, legs and arms.
-        schedule: phases; the last one has both feet in contact.
-        com: (3,) m initial CoM in the world.
+        robot: The robot, with its mass, patches, legs and arms.
+        schedule: The phases; the last one has both feet in contact.
+        com: (3,) m; initial CoM in the world.
         com_velocity: (3,) m/s.
-        config: see the class.
+        config: Settings.
         room: (transitions, 2, 2) m; lowest and highest displacement of each transition's contact along its own axes,
-            where feet may land elsewhere: `CentroidalMotion.landed` says where. As planned where None.
+            where feet may land elsewhere; `CentroidalMotion.landed` says where they do. None: contacts stay as planned.
 
     Returns:
         The motion. Feasible where NumPy confirms it within the margins that it keeps and the body's limits; else its
         failure names the constraint that is violated most, and where.
 
     Raises:
-        InputError: as `sequence_problem`, or a contact is not finite.
+        InputError: As `sequence_problem`, or a contact is not finite.
     """
     start = time.perf_counter()
     problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem)
@@ -86,14 +82,14 @@ def optimise(
     program = Program(problem, robot, config.body, config.regularisers, landings)
     if not np.isfinite(program.assembly.parameters).all():
         raise InputError("a contact pose, a friction coefficient or a timing of the sequence is not finite")
-    x, status, iterations = _solve(program, config)
+    x, status, iterations = _solve(program)
     motion = judged(_motion(program, x, status), robot, x[program.layout.slack])
     failure = None if motion.failure is None else _placed(motion.failure, problem, schedule)
     return replace(motion, failure=failure, iterations=iterations, seconds=time.perf_counter() - start)
 
 
 def _placed(failure: Failure, problem: CentroidalProblem, schedule: ContactSchedule) -> Failure:
-    """The failure with the transition that it belongs to, in words as well."""
+    """The failure with its transition, which the reason then names too."""
     if failure.knot is None or failure.time is None:
         return failure
     step = min(failure.knot, problem.steps - 1)
@@ -102,54 +98,27 @@ def _placed(failure: Failure, problem: CentroidalProblem, schedule: ContactSched
     return replace(failure, reason=words, transition=transition)
 
 
-def _solve(program: Program, config: SequenceConfig) -> tuple[np.ndarray, str, int]:
-    """Variables, the solver's word ("converged" or what it said) and its iterations."""
+def _solve(program: Program) -> tuple[np.ndarray, str, int]:
+    """Variables at the solution, whether the solver converged, in words, and its iterations."""
     functions = program.assembly.functions()
     nlp = functions.pop("nlp")
-    options = {
-        "cache": functions,
-        "print_time": False,
-        "calc_lam_x": False,
-        "calc_lam_p": False,
-        "calc_f": False,
-        "calc_g": False,
-        "ipopt": {
-            "print_level": 0,
-            "sb": "yes",
-            "max_iter": config.max_iterations,
-            "tol": config.tolerance,
-            "constr_viol_tol": 1e-8,
-            "bound_relax_factor": 0.0,
-        },
-    }
-    instance = ca.nlpsol("sequence", "ipopt", nlp, options)
-    bounds = program.variable_bounds, program.row_bounds
-    result = instance(
-        x0=_guess(program),
-        p=program.assembly.parameters,
-        lbx=bounds[0][:, 0],
-        ubx=bounds[0][:, 1],
-        lbg=bounds[1][:, 0],
-        ubg=bounds[1][:, 1],
-    )
+    unused = dict.fromkeys(("print_time", "calc_lam_x", "calc_lam_p", "calc_f", "calc_g"), False)
+    instance = ca.nlpsol("sequence", "ipopt", nlp, {"cache": functions, "ipopt": _IPOPT | _SILENT, **unused})
+    (lbx, ubx), (lbg, ubg) = program.variable_bounds.T, program.row_bounds.T
+    guess, parameters = _guess(program), program.assembly.parameters
+    result = instance(x0=guess, p=parameters, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
     stats = instance.stats()
     status = CONVERGED if stats["success"] else "the solver stopped early"
     return np.array(result["x"]).ravel(), status, int(stats["iter_count"])
 
 
 def _guess(program: Program) -> np.ndarray:
-    """Start of the solver: the CoM along the mean of the feet, the weight shared."""
+    """Start of the solver: the CoM follows the mean of the feet, and the contacts share the weight."""
     p, layout = program.problem, program.layout
     n = p.steps
-    knots, limbs, positions, _ = knot_contacts(p)
     x = np.zeros(layout.size)
     velocity = np.zeros((n + 1, 3))
-    feet = limbs < 2
-    total, count = np.zeros((n + 1, 3)), np.zeros(n + 1)
-    np.add.at(total, knots[feet], positions[feet])
-    np.add.at(count, knots[feet], 1.0)
-    total /= np.maximum(count, 1.0)[:, None]
-    com = total + [0.0, 0.0, p.final_center[2] - p.position[-1, :2, 2].mean()]
+    com = mean_feet(p) + [0.0, 0.0, p.final_center[2] - p.position[-1, :2, 2].mean()]
     width = max(n // 20, 3)
     padded = np.concatenate([np.repeat(p.com[None], width, 0), com, np.repeat(com[-1:], width, 0)])
     window = np.hanning(2 * width + 3)[1:-1]
@@ -183,7 +152,7 @@ def _landings(problem: CentroidalProblem, schedule: ContactSchedule, room: np.nd
 
 
 def _landed(program: Program, x: np.ndarray) -> np.ndarray | None:
-    """(N, 4, 3) m; contacts where the variables have them; None where they cannot move."""
+    """(N, 4, 3) m; places of the contacts, moved by the variables; None where they cannot move."""
     p, layout = program.problem, program.layout
     if not layout.moving:
         return None
@@ -192,7 +161,7 @@ def _landed(program: Program, x: np.ndarray) -> np.ndarray | None:
         moved = np.einsum("tij,tj->ti", p.rotation[:, foot, :, :2], x[layout.pair(step, foot)])
         on = p.active[:, foot]
         position[on, foot] += moved[on]
-        held = np.maximum.accumulate(np.where(on, step, -1))  # in the air, the contact it left
+        held = np.maximum.accumulate(np.where(on, step, -1))  # a foot in the air has the contact that it left
         position[held >= 0, foot] = position[held[held >= 0], foot]
     return position
 
@@ -218,8 +187,5 @@ def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
         force=np.einsum("tlij,tlj->tli", p.rotation, local),
         cop=np.stack(cop, -1),
         yaw_torque=torque,
-        objective=np.inf,
-        seconds=0.0,
-        iterations=0,
         landed=_landed(program, x),
     )

@@ -1,6 +1,6 @@
-"""The verdict on an optimised sequence: what it keeps, or which limit it breaks first, and where.
+"""The verdict on an optimised sequence: which margins it keeps, or which limit it breaks most, and where.
 
-Everything here is recomputed in NumPy from forces and CoM; the solver's flag counts for nothing.
+Everything here is recomputed from forces and CoM; the solver's own flag is not used.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 
 BODY_TOLERANCE = 1e-5  # m, rad, part of a torque limit
-CHEATED = 1e-5  # weights; excess beyond a contact's physical limits that is no rounding
+CHEATED = 1e-5  # weights; a larger excess beyond a contact's physical limits is no rounding error
 
 
 def judged(motion: CentroidalMotion, robot: RobotModel, slack: np.ndarray) -> CentroidalMotion:
     """The motion with the margins that it keeps, and the verdict of the independent checks.
 
     Args:
-        motion: as the solver left it; its problem has the wanted margins.
-        robot: for the limits of the body.
-        slack: (N + 1, 2); the excess beyond contacts' physical limits in weights, and the body's slack, by knot. Used
-            only to say where an infeasible sequence is worst.
+        motion: The motion as the solver left it; its problem has the wanted margins.
+        robot: The robot, for the limits of its body.
+        slack: (N + 1, 2); the excess beyond the contacts' physical limits in weights, and the body's slack, by knot.
+            They only tell where an infeasible sequence is worst.
     """
     verdict = motion
     for margins in (None, *_wider(motion)):
-        verdict = confirmed(replace(motion, kept=margins), TOLERANCE)
+        verdict = confirmed(replace(motion, kept=margins))
         if verdict.feasible:
             break
     body = body_residuals(verdict, robot)
@@ -65,7 +65,7 @@ def _wider(motion: CentroidalMotion) -> list[Margins]:
 
 
 def _failure(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) -> Failure:
-    """Which constraint is violated most, by how much, and where."""
+    """The constraint that is violated most, by how much, and where."""
     times = motion.problem.times
     step = int(np.argmax(slack[:-1, 0]))
     excess = slack[step, 0]

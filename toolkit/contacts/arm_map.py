@@ -1,7 +1,8 @@
-"""ArmMap: where, and facing which way, a palm can be held with an upright trunk and no joint at the end of its range.
+"""ArmMap: where a palm can be held, and facing which way.
 
-A distance to the shoulder says little: near the trunk the elbow is at its end, and a wrist turns a palm only so far.
-The map holds what the arm does at evenly spread joint angles; a palm is served if one of them comes near to it.
+The trunk is upright, and no joint comes near the end of its range. The distance to the shoulder does not tell this:
+near the trunk the elbow reaches its end, and a wrist turns a palm only so far. The map holds the palms of evenly spread
+joint angles. The arm can hold a palm if one of these is near to it.
 """
 
 from __future__ import annotations
@@ -18,22 +19,9 @@ from toolkit.geometry.limb import Limb
 from toolkit.robot.chain import arm_joints
 from toolkit.robot.model import RobotModel
 
-
-@dataclass(frozen=True)
-class ArmMapConfig:
-    """Settings.
-
-    Attributes:
-        samples: joint angles of the map.
-        margin: rad; off both ends of each joint's range, at most a fifth of it.
-        position: m; and
-        angle: rad; how far a palm may be from a sample: what the trunk adds by leaning.
-    """
-
-    samples: int = 2**17
-    margin: float = 0.15
-    position: float = 0.05
-    angle: float = 0.25
+SAMPLES = 2**17  # joint angles of a map
+MARGIN = 0.15  # rad; distance from both ends of each joint's range, at most a fifth of the range
+NEAR = (0.05, 0.25)  # m and rad; how far a palm may be from a sample, since the trunk can lean
 
 
 @dataclass(frozen=True)
@@ -41,21 +29,19 @@ class ArmMap:
     """Palms that an arm can hold.
 
     Attributes:
-        positions: (n, 3) m; patches relative to the shoulder, axes of the upright base.
-        normals: (n, 3); z axes of the patches, which point along the outward normal of the surface that they rest on.
-        angles: (n, k) rad; of the joints from the trunk to the palm.
-        config: settings.
+        positions: (n, 3) Patches relative to the shoulder in the axes of the upright base, in m.
+        normals: (n, 3) Unit z axes of the patches: the outward normals of the surfaces that they rest on.
+        angles: (n, k) Angles of the joints from the trunk to the palm, in rad.
     """
 
     positions: np.ndarray
     normals: np.ndarray
     angles: np.ndarray
-    config: ArmMapConfig
 
     @staticmethod
-    def of(robot: RobotModel, limb: Limb, config: ArmMapConfig | None = None) -> ArmMap:
-        """Map of one arm; the other joints stay at home. The same angles every time (a Sobol sequence)."""
-        config, model = config or ArmMapConfig(), robot.mujoco_model
+    def of(robot: RobotModel, limb: Limb) -> ArmMap:
+        """Map of one arm. The other joints stay at home, and the angles are the same every time (a Sobol sequence)."""
+        model = robot.mujoco_model
         data = mujoco.MjData(model)
         data.qpos[:] = robot.home
         mujoco.mj_kinematics(model, data)
@@ -64,34 +50,34 @@ class ArmMap:
         shoulder = data.subtree_com[1] + base @ robot.arms[limb].shoulder_in_com
         joints = arm_joints(model, limb)
         low, high = model.jnt_range[joints].T
-        margin = np.minimum(config.margin, 0.2 * (high - low))
-        unit = qmc.Sobol(len(joints), scramble=False).random(config.samples)
+        margin = np.minimum(MARGIN, 0.2 * (high - low))
+        unit = qmc.Sobol(len(joints), scramble=False).random(SAMPLES)
         flipped = _flipped(robot, data, limb, joints)
         unit[:, flipped] = 1.0 - unit[:, flipped]
         angles = low + margin + unit * (high - low - 2 * margin)
         turned = angles - data.qpos[model.jnt_qposadr[joints]]
         site = model.site(robot.limbs[limb].site).id
-        positions = np.tile(data.site_xpos[site], (config.samples, 1))
-        normals = np.tile(data.site_xmat[site, 2::3], (config.samples, 1))
+        positions = np.tile(data.site_xpos[site], (SAMPLES, 1))
+        normals = np.tile(data.site_xmat[site, 2::3], (SAMPLES, 1))
         for row, joint in reversed(list(enumerate(joints))):  # from the hand to the shoulder, by axes at home
             axis, anchor = data.xaxis[joint], data.xanchor[joint]
             positions = anchor + _rotated(positions - anchor, axis, turned[:, row])
             normals = _rotated(normals, axis, turned[:, row])
-        return ArmMap((positions - shoulder) @ base, normals @ base, angles, config)
+        return ArmMap((positions - shoulder) @ base, normals @ base, angles)
 
     def serves(self, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(n,) bool; whether the arm can hold palms.
 
         Args:
-            positions: (n, 3) m; relative to the shoulder, in the yaw frame of the base.
-            normals: (n, 3); outward normals of the surfaces, the same frame.
+            positions: (n, 3) Places relative to the shoulder in the yaw frame of the base, in m.
+            normals: (n, 3) Outward normals of the surfaces in the same frame.
         """
         return self._tree.query(self._scaled(positions, normals), distance_upper_bound=1.0)[0] < 1.0
 
-    def posture(self, position: np.ndarray, normal: np.ndarray, near: np.ndarray, count: int = 64) -> np.ndarray:
-        """(k,) rad; of the samples about a palm, the one with the joints nearest to `near` (k,)."""
+    def posture(self, position: np.ndarray, normal: np.ndarray, near: np.ndarray) -> np.ndarray:
+        """(k,) rad; among 64 samples around a palm, the joint angles that are nearest to `near` (k,)."""
         scaled = self._scaled(position[None], normal[None])[0]
-        distance, rows = self._tree.query(scaled, count)
+        distance, rows = self._tree.query(scaled, 64)
         rows = rows[distance < max(1.0, 1.5 * distance[0])]
         return self.angles[rows[np.argmin(np.square(self.angles[rows] - near).sum(1))]]
 
@@ -100,11 +86,11 @@ class ArmMap:
         return cKDTree(self._scaled(self.positions, self.normals))
 
     def _scaled(self, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        return np.hstack([positions / self.config.position, normals / self.config.angle])
+        return np.hstack([positions / NEAR[0], normals / NEAR[1]])
 
 
 def _flipped(robot: RobotModel, data: mujoco.MjData, limb: Limb, joints: list[int]) -> np.ndarray:
-    """(k,) bool; joints of a right arm that turn against those of the left one: mirrored robots get mirrored maps."""
+    """(k,) bool; joints of a right arm that turn against the left arm's, so that mirrored arms get mirrored maps."""
     others = arm_joints(robot.mujoco_model, limb.mirrored) if limb.mirrored in robot.arms else []
     if limb.is_left or len(others) != len(joints):
         return np.zeros(len(joints), bool)
@@ -113,6 +99,6 @@ def _flipped(robot: RobotModel, data: mujoco.MjData, limb: Limb, joints: list[in
 
 
 def _rotated(vectors: np.ndarray, axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Vectors (n, 3) turned about a unit axis (3,) by angles (n,) (Rodrigues)."""
+    """Vectors (n, 3) turned about a unit axis (3,) by angles (n,) in rad (Rodrigues' formula)."""
     along = (vectors @ axis)[:, None] * axis
     return along + np.cos(angle)[:, None] * (vectors - along) + np.sin(angle)[:, None] * np.cross(axis, vectors)

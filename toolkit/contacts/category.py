@@ -1,4 +1,4 @@
-"""The categories of contact transitions (paper, Fig. 3): the one table of them, and what is derived from it."""
+"""The categories of contact transitions (paper, Fig. 3)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from toolkit.robot.model import RobotModel
 class Category(IntEnum):
     """Category of a contact transition; the value is the paper's index.
 
-    Each row of the table holds the number, the palms in contact before the transition, the limb that moves, and
-    whether it makes a contact (else it breaks one). Rows are written for a left limb that moves; each stands for its
-    mirror image too. The inner foot is the one on the side of the only palm in contact.
+    Each row holds the number, the palms in contact before the transition, the limb that moves, and whether that limb
+    makes a contact or breaks one. A row is written for a left limb that moves and stands for its mirror image too. The
+    inner foot is the one on the side of the only palm in contact.
 
     Attributes:
-        before: limbs in contact before the transition, in order.
-        moving: the limb that moves.
-        makes: whether it makes a new contact.
+        before: Limbs in contact before the transition, in order.
+        moving: The limb that moves.
+        makes: Whether it makes a new contact.
     """
 
     before: tuple[Limb, ...]
@@ -57,7 +57,7 @@ class Category(IntEnum):
 
     @property
     def contact_limbs(self) -> tuple[Limb, ...]:
-        """Limbs of the contacts that describe a transition: those before it, then the new one if there is one."""
+        """Limbs of the contacts that describe a transition: those before it, then that of the new contact if any."""
         return (*self.before, self.moving) if self.makes else self.before
 
     @property
@@ -70,7 +70,7 @@ def category_rows(stance: Stance, transitions: Sequence[ContactTransition]) -> n
     """(n,) int; category of each of n transitions out of a stance.
 
     Raises:
-        ValueError: a limb that is not in contact cannot break its contact.
+        ValueError: A limb that is not in contact would break its contact.
     """
     rows = TransitionRows.of(transitions)
     found = _table(stance.limbs)[rows.limb, rows.makes.astype(int)]
@@ -86,19 +86,19 @@ def category_of(stance: Stance, transition: ContactTransition) -> Category:
 
 
 def performs(robot: RobotModel, category: Category, *, mirrored: bool = False) -> bool:
-    """Whether a robot has the limbs of a category's row, or of its mirror image."""
+    """Whether a robot has all limbs of a category's row, or of the mirror image of the row."""
     used = (*category.before, category.moving)
     return {limb.mirrored if mirrored else limb for limb in used} <= {*robot.legs, *robot.arms}
 
 
 def categories_of(robot: RobotModel) -> list[Category]:
-    """Categories that a robot has the limbs for, on one of its sides at least."""
+    """Categories that a robot has the limbs for on at least one side."""
     return [category for category in Category if performs(robot, category) or performs(robot, category, mirrored=True)]
 
 
 @lru_cache
 def _table(in_contact: tuple[Limb, ...]) -> np.ndarray:
-    """(len(Limb), 2) int; category by the limb that moves and by whether it makes a contact; -1 where there is none."""
+    """(len(Limb), 2) int; category by the limb that moves and by whether it makes a contact, or -1."""
     table = np.full((len(Limb), 2), -1)
     for category in Category:
         for mirrored in (False, True):

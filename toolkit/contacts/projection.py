@@ -1,14 +1,13 @@
-"""Projection of soles and palms on surfaces: where a limb lands, if its whole patch finds room there.
+"""Projection of soles and palms on surfaces: where the whole patch of a limb finds room.
 
 A patch fits if its rectangle lies in the surface's region: the centre is inside by the even-odd rule over all rings,
 and no boundary edge meets the rectangle. That is exact for regions that are not convex or have holes.
 
-- A sole falls along the vertical on the HIGHEST surface in reach on which it fits. Where it fits nowhere it may shift
-  a little, in a fixed order of offsets along its own axes (this goes beyond the paper: a discrete step set rarely hits
-  a 0.30 m tread or a small stone by chance).
-- A palm follows a ray to the NEAREST surface on which it fits, and is rejected where anything blocks the ray before.
-  Its x axis is the heading, carried by the least rotation that takes the vertical to the normal: forwards on a side
-  wall, up on a wall ahead, as the hand of an arm raised from hanging points.
+- A sole falls along the vertical on the HIGHEST surface in reach on which it fits. Where it fits nowhere, it may shift
+  a little along its own axes. The paper has no shifts, but a discrete step set rarely hits a 0.30 m tread by chance.
+- A palm follows a ray to the NEAREST surface on which it fits. It is rejected where something blocks the ray before.
+  Its x axis is the heading, turned by the least rotation that takes the vertical to the normal. So a hand points
+  forwards on a side wall and up on a wall ahead.
 """
 
 from __future__ import annotations
@@ -32,11 +31,11 @@ class ProjectionConfig:
     """Settings of the projection.
 
     Attributes:
-        margin: m around a sole that must also be in the surface.
-        palm_margin: m around a palm.
-        shift: m; how far a sole may move to fit; 0 for the paper's projection.
-        shift_step: m; spacing of the offsets tried.
-        block_tolerance: m; something nearer than a palm's surface by more than this blocks the ray.
+        margin: Margin around a sole that must also lie in the surface, in m.
+        palm_margin: The same around a palm, in m.
+        shift: How far a sole may move to fit, in m; 0 for the paper's projection.
+        shift_step: Spacing of the offsets that are tried, in m.
+        block_tolerance: What lies nearer than a palm's surface by more than this blocks the ray, in m.
     """
 
     margin: float = 0.01
@@ -48,12 +47,12 @@ class ProjectionConfig:
 
 @dataclass(frozen=True)
 class Projected:
-    """Patches of n candidates; rows with surface -1 found none.
+    """Patches of n candidates.
 
     Attributes:
-        surface: (n,) int.
-        position: (n, 3) m; centre of the patch.
-        rotation: (n, 3, 3); world_from_contact.
+        surface: (n,) int Index of the surface, -1 where the patch fits on none.
+        position: (n, 3) Centre of the patch in the world, in m.
+        rotation: (n, 3, 3) world_from_contact.
     """
 
     surface: np.ndarray
@@ -62,16 +61,21 @@ class Projected:
 
     @property
     def found(self) -> np.ndarray:
-        """(n,) bool."""
+        """(n,) bool; whether the patch fits on a surface."""
         return self.surface >= 0
 
+    @classmethod
+    def none(cls, count: int) -> Projected:
+        """Candidates whose patches fit nowhere yet."""
+        return cls(np.full(count, -1), np.zeros((count, 3)), np.zeros((count, 3, 3)))
+
     def select(self, rows: np.ndarray) -> Projected:
-        """Some of the candidates, by index or by mask."""
+        """The candidates of these rows, by index or by mask."""
         return Projected(self.surface[rows], self.position[rows], self.rotation[rows])
 
 
 def shifts(reach: float, step: float) -> np.ndarray:
-    """(n, 2) offsets along x and y in a disc, nearest first, along x before y, forwards before backwards."""
+    """(n, 2) m; offsets along x and y in a disc: the nearest first, along x before y, forwards before backwards."""
     count = round(reach / step) if step > 0 else 0
     grid = [(i, j) for i in range(-count, count + 1) for j in range(-count, count + 1) if i * i + j * j <= count**2]
     grid.sort(key=lambda ij: (ij[0] ** 2 + ij[1] ** 2, abs(ij[1]), -ij[0], -ij[1]))
@@ -82,10 +86,10 @@ class Projector:
     """Projects the soles and palms of one robot on the surfaces of one world.
 
     Args:
-        robot: patch sizes.
-        surfaces: of the world.
-        model: the world compiled, for blocked rays.
-        config: settings.
+        robot: The robot, for the sizes of its patches.
+        surfaces: Surfaces of the world.
+        model: The compiled world, for blocked rays.
+        config: Settings.
     """
 
     def __init__(
@@ -108,80 +112,50 @@ class Projector:
     def project_soles(
         self, limb: Limb, pose: np.ndarray, low: float, high: float, *, shift: bool = True, outward: float = 0.0
     ) -> Projected:
-        """Drop soles on the highest surfaces that hold them.
+        """Drop soles on the highest surfaces that hold them; z along the surface's normal, x along yaw.
 
         Args:
-            limb: a foot.
-            pose: (n, 3) float; x m, y m, yaw rad of the sole in the world.
-            low: m; lowest height of the sole's centre.
-            high: m; highest.
-            shift: whether soles may shift to fit.
-            outward: sign of the shifts across the foot tried first: +1 to the left, -1 to the right.
-
-        Returns:
-            Soles, z along the surface's normal, x along yaw.
+            limb: A foot.
+            pose: (n, 3) float x (m), y (m) and yaw (rad) of the soles in the world.
+            low: Lowest height of a sole's centre, in m.
+            high: Highest height of a sole's centre, in m.
+            shift: Whether soles may shift to fit.
+            outward: Sign of the shifts across the foot that are tried first: +1 to the left, -1 to the right.
         """
         offsets = self.offsets if shift else self.offsets[:1]
         if outward < 0:
             offsets = offsets * [1.0, -1.0]
-        n = len(pose)
-        surface, position, rotation = np.empty(n, np.int64), np.zeros((n, 3)), np.zeros((n, 3, 3))
-        project_soles(
-            np.ascontiguousarray(pose, dtype=float),
-            float(low),
-            float(high),
-            self.half_sizes[limb],
-            np.ascontiguousarray(offsets),
-            self.table,
-            surface,
-            position,
-            rotation,
-        )
-        return Projected(surface, position, rotation)
+        soles, half = Projected.none(len(pose)), self.half_sizes[limb]
+        pose, offsets = np.ascontiguousarray(pose, dtype=float), np.ascontiguousarray(offsets)
+        found = soles.surface, soles.position, soles.rotation
+        project_soles(pose, float(low), float(high), half, offsets, self.table, *found)
+        return soles
 
     def project_palms(self, limb: Limb, shoulder: np.ndarray, rays: np.ndarray, yaw: float, reach: float) -> Projected:
-        """Send palms along rays to the nearest surfaces that hold them.
+        """Send palms along rays to the nearest surfaces that hold them; z along the surface's normal.
 
         Args:
-            limb: a palm.
-            shoulder: (3,) m, world.
-            rays: (n, 3) unit, world.
-            yaw: rad; heading of the body.
-            reach: m; rays end there.
-
-        Returns:
-            Palms, z along the surface's normal.
+            limb: A palm.
+            shoulder: (3,) Start of the rays in the world, in m.
+            rays: (n, 3) Unit vectors in the world.
+            yaw: Heading of the body, in rad.
+            reach: Length of the rays, in m.
         """
-        n, table = len(rays), self.table
-        surface, position, rotation = np.empty(n, np.int64), np.zeros((n, 3)), np.zeros((n, 3, 3))
+        palms, table, half = Projected.none(len(rays)), self.table, self.half_sizes[limb]
         chosen = self._palm_surfaces
-        if len(chosen):
-            near = np.linalg.norm(table.centre[chosen] - shoulder, axis=1) < table.radius[chosen] + reach
-            chosen = chosen[near]
+        chosen = chosen[np.linalg.norm(table.centre[chosen] - shoulder, axis=1) < table.radius[chosen] + reach]
         if not len(chosen):
-            surface[:] = -1
-            return Projected(surface, position, rotation)
-        distance = np.full(n, np.inf)
-        rays = np.ascontiguousarray(rays, dtype=float)
-        project_palms(
-            np.asarray(shoulder, float),
-            rays,
-            float(yaw),
-            float(reach),
-            self.half_sizes[limb],
-            chosen,
-            table,
-            surface,
-            distance,
-            position,
-            rotation,
-        )
-        if (surface >= 0).any():
-            surface[self._blocked(np.asarray(shoulder, float), rays, distance, reach)] = -1
-        return Projected(surface, position, rotation)
+            return palms
+        distance = np.full(len(rays), np.inf)
+        shoulder, rays = np.asarray(shoulder, float), np.ascontiguousarray(rays, dtype=float)
+        found = palms.surface, distance, palms.position, palms.rotation
+        project_palms(shoulder, rays, float(yaw), float(reach), half, chosen, table, *found)
+        if palms.found.any():
+            palms.surface[self._blocked(shoulder, rays, distance, reach)] = -1
+        return palms
 
     def _blocked(self, origin: np.ndarray, rays: np.ndarray, distance: np.ndarray, reach: float) -> np.ndarray:
-        """(n,) bool; whether anything that collides lies before `distance` (n,) on a ray."""
+        """(n,) bool; whether anything that collides lies before `distance` (n,) m on each ray."""
         n = len(rays)
         geom, hit = np.empty(n, np.int32), np.empty(n)
         mujoco.mj_multiRay(

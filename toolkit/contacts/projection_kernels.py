@@ -1,4 +1,4 @@
-"""Compiled projection: does a patch fit on a surface, and which surface does it meet first?"""
+"""Compiled projection: whether a patch fits on a surface, and which surface it meets first."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def plane_height(table, q, x, y):
 
 @compiled
 def sole_axis(table, q, c, s):
-    """The x axis of a sole on surface q: the heading (c, s) dropped on the plane along the vertical."""
+    """The x axis of a sole on surface q: the heading (c, s) projected on the plane along the vertical."""
     normal = table.rotation[q, :, 2]
     ax, ay, az = c * normal[2], s * normal[2], -(c * normal[0] + s * normal[1])
     length = np.sqrt(ax * ax + ay * ay + az * az)
@@ -35,7 +35,7 @@ def sole_axis(table, q, c, s):
 
 @compiled
 def cell_of(table, x, y):
-    """Index of the cell of the table's grid at (x, y), -1 outside."""
+    """Index of the cell of the table's grid at (x, y), or -1 outside."""
     i, j = int(np.floor((x - table.corner[0]) / table.cell)), int(np.floor((y - table.corner[1]) / table.cell))
     return i * table.shape[1] + j if 0 <= i < table.shape[0] and 0 <= j < table.shape[1] else -1
 
@@ -47,7 +47,7 @@ def sole_fits(table, cell, entry, x, y, c, s, half):
     r, origin, edges = table.rotation[q], table.origin[q], table.edges
     ax, ay, az = sole_axis(table, q, c, s)
     cx, sx = r[0, 0] * ax + r[1, 0] * ay + r[2, 0] * az, r[0, 1] * ax + r[1, 1] * ay + r[2, 1] * az
-    # The centre and the cell's reference point, both in the surface frame.
+    # p and d are taken to the surface frame: the centre, and the way to it from the cell's reference point.
     px, py, pz = x - origin[0], y - origin[1], plane_height(table, q, x, y) - origin[2]
     i, j = cell // table.shape[1], cell % table.shape[1]
     rx, ry = table.corner[0] + (i + 0.5) * table.cell, table.corner[1] + (j + 0.5) * table.cell
@@ -62,7 +62,7 @@ def sole_fits(table, cell, entry, x, y, c, s, half):
             cx * au + sx * av, -sx * au + cx * av, cx * bu + sx * bv, -sx * bu + cx * bv, half[0], half[1]
         ):
             return False
-        # Does the edge cross the way from the reference to the centre? Sides of the line through both, half open.
+        # The edge crosses the way from the reference point to the centre if its ends lie on different sides of it.
         side_a, side_b = du * av - dv * au, du * bv - dv * bu
         if (side_a > 0.0) != (side_b > 0.0):
             t = side_a / (side_a - side_b)

@@ -1,4 +1,4 @@
-"""Room of a contact: how far it may be displaced on its surface, where the optimiser chooses landing points."""
+"""Room of a contact: how far the optimiser may displace it on its surface."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class RoomConfig:
     """How far landing points may move.
 
     Attributes:
-        reach: (2,) m; along and across the foot, each way.
-        margin: m; kept between a sole and the edge of its surface, or as much as the planned contact keeps.
-        gap: m; kept between a sole and the other one, or as much as the planned contacts keep.
-        step: m; the room is found in such steps.
-        arrival: m; kept between the mean of the last feet and the edge of the goal, or as much as the plan keeps.
+        reach: (2,) Largest displacement along and across the foot, each way, in m.
+        margin: Distance of a sole from the edge of its surface, in m; less where the plan keeps less.
+        gap: Distance of a sole from the other one, in m; less where the plan keeps less.
+        step: The room grows in steps of this length, in m.
+        arrival: Distance of the last feet's mean from the edge of the goal, in m; less where the plan keeps less.
     """
 
     reach: tuple[float, float] = (0.15, 0.04)
@@ -47,14 +47,14 @@ def landing_room(
     """Box of displacements along each new contact's own axes that keep a sole on its surface and off the other sole.
 
     Args:
-        robot: sizes of the soles.
-        surfaces: of the world; contacts without one do not move.
-        sequence: planned contacts.
-        config: settings.
-        goal: that the last contacts of the feet do not leave; None: they may.
+        robot: The robot, for the sizes of its soles.
+        surfaces: Surfaces of the world; contacts without a surface do not move.
+        sequence: The planned contacts.
+        config: Settings.
+        goal: The goal at which the feet must stay in the end; None where they may leave it.
 
     Returns:
-        (transitions, 2, 2) m; lowest and highest displacement along x and y; zeros for palms.
+        (transitions, 2, 2) m; the lowest and the highest displacement along x and y, zeros for palms.
     """
     room = np.zeros((len(sequence.transitions), 2, 2))
     stances = sequence.stances
@@ -77,13 +77,13 @@ def landing_room(
 
 
 def _apart(box: np.ndarray, contact: Contact, sole: Contact, half_size: np.ndarray, gap: float) -> np.ndarray:
-    """The box without displacements towards another sole; the other one may come as far, so each gets half the way."""
+    """The box without displacements towards another sole. Both soles may move, so each gets half of the way."""
     local = contact.pose.inverse() @ sole.pose
     corners = np.array([[a, b, 0.0] for a in (-1, 1) for b in (-1, 1)]) * np.append(half_size, 0.0)
     points = (local @ corners)[:, :2]
     ahead, behind = points.min(0) - half_size, -half_size - points.max(0)  # free way to the sole in + and - directions
     box = box.copy()
-    # Feet pass each other: they stay apart across, and along as well where they are not.
+    # Soles that are apart across may pass each other; others must stay apart along as well.
     for axis in (1,) if max(ahead[1], behind[1]) > 0.0 else (0, 1):
         if ahead[axis] >= behind[axis]:
             box[1, axis] = min(box[1, axis], max((ahead[axis] - gap) / 2, 0.0))
@@ -95,7 +95,7 @@ def _apart(box: np.ndarray, contact: Contact, sole: Contact, half_size: np.ndarr
 def _arrived(goal: Goal, centre: np.ndarray, contact: Contact, margin: float, box: np.ndarray) -> bool:
     """Whether the mean of the feet stays at the goal wherever in the box a foot lands.
 
-    If it does where both feet are displaced alike, it does where each is on its own: a disc is convex.
+    Both feet are displaced alike here. That covers any other displacements of the two, since the goal is convex.
     """
     corners = np.array([[x, y, 0.0] for x in box[:, 0] for y in box[:, 1]])
     moved = centre + corners @ contact.pose.rotation.T
@@ -112,7 +112,7 @@ def _inside(
     config: RoomConfig,
     allowed: Callable[[np.ndarray], bool] | None,
 ) -> np.ndarray:
-    """The part of the box, grown evenly from zero, that is allowed and in which the sole stays on the surface."""
+    """The part of the box that is allowed and keeps the sole on the surface; it grows evenly from zero."""
     region = surface.region
     frame = surface.pose.inverse() @ contact.pose
     shapely.prepare(region)
@@ -129,11 +129,9 @@ def _inside(
     growing = {(end, axis) for end in range(2) for axis in range(2)}
     while growing:
         for end, axis in sorted(growing):
-            wider = found.copy()
-            limit = box[end, axis]
-            wider[end, axis] = (
-                max(found[0, axis] - config.step, limit) if end == 0 else min(found[1, axis] + config.step, limit)
-            )
+            wider, limit = found.copy(), box[end, axis]
+            bound, step = (min, config.step) if end else (max, -config.step)
+            wider[end, axis] = bound(found[end, axis] + step, limit)
             stuck = wider[end, axis] == found[end, axis] or (allowed is not None and not allowed(wider))
             if stuck or not holds(wider, margin):
                 growing.discard((end, axis))
@@ -145,16 +143,13 @@ def _inside(
 def moved_sequence(
     sequence: ContactSequence, schedule: ContactSchedule, times: np.ndarray, position: np.ndarray
 ) -> ContactSequence:
-    """The sequence with its contacts where a motion has them.
+    """The sequence with its contacts where a motion has them; surfaces, rotations and timings stay as planned.
 
     Args:
-        sequence: as planned.
-        schedule: its schedule.
-        times: (N + 1,) s; knots of the motion.
-        position: (N, len(Limb), 3) m; of the contacts in the motion's steps.
-
-    Returns:
-        The same transitions; surfaces, orientation and timing as planned.
+        sequence: The planned contacts.
+        schedule: The schedule of the sequence.
+        times: (N + 1,) Times of the motion's knots, in s.
+        position: (N, len(Limb), 3) Places of the contacts in the motion's steps, in m.
     """
     transitions = []
     for index, transition in enumerate(sequence.transitions):

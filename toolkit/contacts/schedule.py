@@ -14,10 +14,10 @@ class Phase:
     """An interval with constant contacts.
 
     Attributes:
-        start, end: s.
-        contacts: in contact during the phase, in order of `Limb`.
-        swing: the limb that moves; None while shifting. A palm that is added or broken moves too.
-        transition: index of the transition it belongs to; `len(transitions)` for the final rest.
+        start, end: Times in s.
+        contacts: Contacts during the phase, in the order of `Limb`.
+        swing: The limb that moves, None while shifting. A palm that makes or breaks its contact moves too.
+        transition: Index of the transition that the phase belongs to; `len(transitions)` for the final rest.
     """
 
     start: float
@@ -43,9 +43,9 @@ class ContactSchedule:
         """Schedule of a sequence.
 
         Args:
-            sequence: start stance and transitions with their timing.
-            initial_rest: s added to the first shift, at rest on the start stance.
-            final_rest: s on the last stance after the last transition; no phase where 0.
+            sequence: The start stance and the transitions with their timing.
+            initial_rest: Time that is added to the first shift, in s.
+            final_rest: Time on the last stance after the last transition, in s; no phase where 0.
         """
         phases: list[Phase] = []
         stance, time, rest = sequence.start, 0.0, initial_rest

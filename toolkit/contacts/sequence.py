@@ -14,9 +14,9 @@ class ContactTransition:
     """One limb moves to a new contact, or a palm breaks its contact.
 
     Attributes:
-        limb: the limb that moves.
-        contact: the new contact; None where a palm contact is broken.
-        timing: shift and swing time.
+        limb: The limb that moves.
+        contact: The new contact, None where a palm breaks its contact.
+        timing: Times of the shift and the swing.
     """
 
     limb: Limb
@@ -43,8 +43,8 @@ class ContactSequence:
     """A start stance and the transitions from it.
 
     Attributes:
-        start: the stance at rest in which the robot starts.
-        transitions: in order; may be empty.
+        start: The stance in which the robot starts at rest.
+        transitions: The transitions in order, perhaps none.
     """
 
     start: Stance
@@ -60,5 +60,5 @@ class ContactSequence:
 
     @property
     def duration(self) -> float:
-        """Seconds of all transitions."""
+        """Length of all transitions in s."""
         return sum(transition.timing.shift + transition.timing.swing for transition in self.transitions)

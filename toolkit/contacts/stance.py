@@ -13,11 +13,11 @@ class Contact:
     """A limb's patch resting on a surface.
 
     Attributes:
-        limb: the limb in contact.
-        pose: world_from_contact; origin at the centre of the patch, z along the outward normal of the surface, for
-            feet x along the toes. The limb's site in the robot model coincides with this frame.
+        limb: The limb in contact.
+        pose: world_from_contact. The origin is the centre of the patch, z is the outward normal of the surface, and
+            x of a foot points along its toes. The limb's site in the robot model coincides with this frame.
         friction: Coulomb coefficient of the surface.
-        surface: index of the surface in `World.surfaces`; -1 where there is none.
+        surface: Index of the surface in `World.surfaces`, -1 where there is none.
     """
 
     limb: Limb
@@ -28,11 +28,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class Stance:
-    """A set of contacts: both feet always, palms or none.
-
-    Attributes:
-        contacts: in the order of `Limb`, at most one per limb.
-    """
+    """A set of contacts in the order of `Limb`, at most one for each limb: always both feet, perhaps palms."""
 
     contacts: tuple[Contact, ...]
 
@@ -71,10 +67,10 @@ class Stance:
         return mean_pose(*(contact.pose for contact in self.feet))
 
     def replace(self, contact: Contact) -> Stance:
-        """The stance with `contact` made, in place of the limb's old one if there is one."""
+        """The stance with `contact` in place of the limb's old contact, if there is one."""
         kept = [old for old in self.contacts if old.limb != contact.limb]
         return Stance(tuple(sorted([*kept, contact], key=lambda item: item.limb)))
 
     def without(self, limb: Limb) -> Stance:
-        """The stance with a palm's contact broken."""
+        """The stance without the contact of a palm."""
         return Stance(tuple(contact for contact in self.contacts if contact.limb != limb))

@@ -1,4 +1,4 @@
-"""Surfaces as flat arrays with an index by place, for the compiled projection of soles and palms."""
+"""Surfaces as flat arrays, with a grid that finds them by place, for the compiled projection of soles and palms."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 from toolkit.compiled import compiled
 from toolkit.world.surface import Surface
 
+_CELL = 0.1  # m; cell size, larger where the world would need more than the following number of cells
 _MAX_CELLS = 400_000
-# No cell's centre should lie on an authored edge: edges like round numbers, this offset does not.
+# No cell's centre should lie on an authored edge. Those edges often lie at round numbers, so this offset is not round.
 _OFFSET = np.array([0.0417319, 0.0283727])
 
 
@@ -19,19 +20,19 @@ class SurfaceTable(NamedTuple):
     """Arrays over S surfaces with E boundary edges, and a grid over XY whose cells list what matters in them.
 
     Attributes:
-        origin: (S, 3) m, rotation: (S, 3, 3); world_from_surface.
-        friction: (S,).
-        foot, palm: (S,) bool.
-        edges: (E, 4) m; u, v of both ends in the surface frame, rings closed.
-        edge_start: (S + 1,) int; edges of surface s are edge_start[s] : edge_start[s + 1].
-        centre: (S, 3) m and radius: (S,) m; a sphere around each.
-        corner: (2,) m; lower corner of the grid.
-        cell: m; its cell size.
-        shape: (2,) int; cells along x and y.
-        entry_start: (cells + 1,) int; entries of cell (i, j) at i * shape[1] + j.
-        entry_surface: (n,) int; a foot surface that may hold a patch centred in the cell.
-        entry_inside: (n,) bool; whether the cell's centre, dropped on the plane, lies in the region.
-        near_start: (n + 1,) int and near: (m,) int; edges that a patch centred in the cell may meet.
+        origin, rotation: (S, 3) m and (S, 3, 3) world_from_surface.
+        friction: (S,) Coulomb coefficients.
+        foot, palm: (S,) bool Whether each serves feet, and palms.
+        edges: (E, 4) Both ends (u, v) of the edges of closed rings in the surface frame, in m.
+        edge_start: (S + 1,) int Surface s has the edges edge_start[s] : edge_start[s + 1].
+        centre, radius: (S, 3) m and (S,) m A sphere around each surface.
+        corner: (2,) Lower corner of the grid, in m.
+        cell: Cell size of the grid, in m.
+        shape: (2,) int Number of cells along x and y.
+        entry_start: (cells + 1,) int First entry of each cell; cell (i, j) has the number i * shape[1] + j.
+        entry_surface: (n,) int A foot surface that may hold a patch centred in the cell.
+        entry_inside: (n,) bool Whether the cell's centre, projected on the plane, lies in the region.
+        near_start, near: (n + 1,) int and (m,) int Edges that a patch centred in the cell may meet.
     """
 
     origin: np.ndarray
@@ -53,14 +54,8 @@ class SurfaceTable(NamedTuple):
     near: np.ndarray
 
 
-def surface_table(surfaces: Sequence[Surface], reach: float, cell: float = 0.1) -> SurfaceTable:
-    """Table of surfaces.
-
-    Args:
-        surfaces: of a world; at least one.
-        reach: m; distance from a patch's centre to its corners.
-        cell: m; wanted cell size; larger where the world would need too many cells.
-    """
+def surface_table(surfaces: Sequence[Surface], reach: float) -> SurfaceTable:
+    """Table of the surfaces of a world, at least one; a patch's corners are `reach` m from its centre."""
     origin = np.array([surface.pose.position for surface in surfaces]).reshape(-1, 3)
     rotation = np.array([surface.pose.rotation for surface in surfaces]).reshape(-1, 3, 3)
     edges, start = [], [0]
@@ -75,7 +70,7 @@ def surface_table(surfaces: Sequence[Surface], reach: float, cell: float = 0.1) 
     foot = np.array([surface.serves_foot for surface in surfaces])
 
     low, high = points[:, :2].min(0), points[:, :2].max(0)
-    cell = max(cell, float(np.sqrt((high - low + cell).prod() / _MAX_CELLS)))
+    cell = max(_CELL, float(np.sqrt((high - low + _CELL).prod() / _MAX_CELLS)))
     corner = low - cell * (1.0 + _OFFSET)
     shape = (np.ceil((high - corner) / cell) + 1).astype(np.int64)
     used = np.flatnonzero(foot)
@@ -109,13 +104,8 @@ def surface_table(surfaces: Sequence[Surface], reach: float, cell: float = 0.1) 
 
 
 def _entries(ranges: np.ndarray, shape: np.ndarray) -> dict[str, np.ndarray]:
-    """The last five fields of `SurfaceTable`, zeros but for how many entries each cell has.
-
-    Args:
-        ranges: (k, 4) int; cells that each surface covers: i from, to, j from, to.
-        shape: (2,) int.
-    """
-    count = np.zeros((shape[0] + 1, shape[1] + 1), np.int64)  # by differences: every range adds a rectangle
+    """The last five fields of `SurfaceTable`, with room for all entries; see `_fill` for `ranges`."""
+    count = np.zeros((shape[0] + 1, shape[1] + 1), np.int64)  # of differences: every range adds a rectangle
     for low, high, sign in ((0, 2, 1), (1, 3, 1), (0, 3, -1), (1, 2, -1)):
         np.add.at(count, (ranges[:, low], ranges[:, high]), sign)
     per_cell = count.cumsum(0).cumsum(1)[: shape[0], : shape[1]].ravel()
@@ -138,57 +128,13 @@ def _distance_to_segment(x, y, ax, ay, bx, by):
     return np.hypot(ax + t * dx - x, ay + t * dy - y)
 
 
-def _index(
-    edges_xy: np.ndarray,
-    edge_start: np.ndarray,
-    surfaces: np.ndarray,
-    ranges: np.ndarray,
-    corner: np.ndarray,
-    cell: float,
-    shape: np.ndarray,
-    near_distance: float,
-) -> tuple[np.ndarray, ...]:
-    """The last five fields of `SurfaceTable`: count entries, then the edges near them, then fill.
-
-    Args:
-        edges_xy: (E, 4) m; both ends of the edges in the world's XY.
-        edge_start: (S + 1,) int.
-        surfaces: (k,) int; those that serve feet.
-        ranges: (k, 4) int; cells that each surface covers: i from, to, j from, to.
-        corner: (2,) m.
-        cell: m.
-        shape: (2,) int.
-        near_distance: m; edges this near to a cell's centre count.
-    """
-    count = np.zeros((shape[0] + 1, shape[1] + 1), np.int64)  # by differences: every range adds a rectangle
-    for low, high, sign in ((0, 2, 1), (1, 3, 1), (0, 3, -1), (1, 2, -1)):
-        np.add.at(count, (ranges[:, low], ranges[:, high]), sign)
-    per_cell = count.cumsum(0).cumsum(1)[: shape[0], : shape[1]].ravel()
-    entry_start = np.concatenate([[0], np.cumsum(per_cell)])
-    total = int(entry_start[-1])
-    entry_surface, entry_inside = np.zeros(total, np.int64), np.zeros(total, bool)
-    near_start, near = np.zeros(total + 1, np.int64), np.zeros(0, np.int64)
-    columns = int(shape[1])
-    fixed = (edges_xy, edge_start, surfaces, ranges, corner, cell, columns, near_distance)
-    _fill(*fixed, entry_start[:-1].copy(), entry_surface, entry_inside, near_start, near)
-    near_start = np.cumsum(near_start)
-    near = np.zeros(int(near_start[-1]), np.int64)
-    if len(near):
-        _fill(*fixed, entry_start[:-1].copy(), entry_surface, entry_inside, near_start, near)
-    return entry_start, entry_surface, entry_inside, near_start, near
-
-
 @compiled(kept=True)
 def _fill(table, xy, surfaces, ranges, near_distance, fill):
-    """Fill the entries; counts the near edges of entry k in near_start[k + 1] while `near` has no room.
+    """Fill the entries of a table; count the near edges of entry k in near_start[k + 1] while `near` has no room.
 
-    Args:
-        table: `SurfaceTable`; its entries are filled.
-        xy: (E, 4) m; both ends of the edges in the world's XY.
-        surfaces: (k,) int; those that serve feet.
-        ranges: (k, 4) int; cells that each surface covers: i from, to, j from, to.
-        near_distance: m; edges this near to a cell's centre count.
-        fill: (cells,) int; the next entry of each cell, counted up.
+    `xy` (E, 4) m holds both ends of the edges in the world's XY, and `surfaces` (k,) those that serve feet. `ranges`
+    (k, 4) are the cells that each of these covers: i from, i to, j from, j to. An edge is near within `near_distance` m
+    of a cell's centre. `fill` (cells,) is the next entry of each cell, counted up.
     """
     near_start, near, corner, cell, columns = table.near_start, table.near, table.corner, table.cell, table.shape[1]
     write = len(near) > 0

@@ -1,8 +1,7 @@
 """The discrete set of moves that the search may make (paper, Fig. 2): steps of a foot, reaches of a palm.
 
-Steps are rows (x, y, yaw) of the new left foot in the upright frame of the standing right foot; the right foot's are
-their mirror image. Reaches are unit rays from the left shoulder in the upright frame of the mean feet; the right's are
-their mirror image.
+Steps are rows (x m, y m, yaw rad) of the new left foot in the upright frame of the standing right foot. Reaches are
+unit rays from the left shoulder in the upright frame of the mean feet. Moves of right limbs are the mirror image.
 """
 
 from __future__ import annotations
@@ -14,22 +13,16 @@ import numpy as np
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 
-REFERENCE_LEG = 0.80  # m; thigh and shin of the robot that the paper's numbers fit
+_REFERENCE_LEG = 0.80  # m; thigh and shin of the robot that the paper's numbers fit
 _MIRROR_STEP = np.array([1.0, -1.0, -1.0])
 _MIRROR_RAY = np.array([1.0, -1.0, 1.0])
 
 
-def foot_steps(yaws_deg: tuple[float, ...]) -> np.ndarray:
-    """Steps of a left foot: the grid of the paper's figure.
+def _foot_steps(yaws_deg: tuple[float, ...]) -> np.ndarray:
+    """(n, 3) steps of a left foot: the grid of the paper's figure.
 
-    x from -0.2 m to 0.4 m by 0.1 m; y 0.2, 0.3 and 0.4 m, backwards only 0.2 m; in place (x = 0) and at the longest
-    (x = 0.4 m) only straight. The corner (0.4, 0.4) m, 0.57 m away, is left out, which gives the paper's counts.
-
-    Args:
-        yaws_deg: headings of the other rows in degrees.
-
-    Returns:
-        (n, 3) float; x m, y m, yaw rad.
+    Steps backwards are only 0.2 m wide. Steps in place (x = 0) and the longest ones (x = 0.4 m) are straight; the
+    others have each of the given headings. The corner (0.4, 0.4) m is left out, which gives the paper's counts.
     """
     rows: list[tuple[float, float, float]] = []
     for x in (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4):
@@ -41,25 +34,22 @@ def foot_steps(yaws_deg: tuple[float, ...]) -> np.ndarray:
 
 
 def steps_38() -> np.ndarray:
-    """(38, 3) float; the steps of the paper's data collection (yaw 0, +-30 deg)."""
-    return foot_steps((0.0, -30.0, 30.0))
+    """(38, 3) steps of the paper's data collection (yaw 0, +-30 deg)."""
+    return _foot_steps((0.0, -30.0, 30.0))
 
 
 def steps_60() -> np.ndarray:
-    """(60, 3) float; the steps of the paper's experiments (yaw 0, +-15, +-30 deg)."""
-    return foot_steps((0.0, -15.0, 15.0, -30.0, 30.0))
+    """(60, 3) steps of the paper's experiments (yaw 0, +-15, +-30 deg)."""
+    return _foot_steps((0.0, -15.0, 15.0, -30.0, 30.0))
 
 
 def wide_steps() -> np.ndarray:
-    """(14, 3) float; straight steps of 0.45 m to 0.75 m that are added for wide gaps."""
+    """(14, 3) straight steps of 0.45 m to 0.75 m, which are added for wide gaps."""
     return np.array([(x, y, 0.0) for x in (0.45, 0.50, 0.55, 0.60, 0.65, 0.70, 0.75) for y in (0.2, 0.3)])
 
 
 def palm_rays() -> np.ndarray:
-    """(18, 3) float unit rays from the left shoulder.
-
-    10 to 60 degrees from straight sideways towards the front, each level and 20 degrees up and down.
-    """
+    """(18, 3) rays of the left palm: 10 to 60 degrees from sideways to the front, level and 20 degrees up and down."""
     forward, elevation = np.meshgrid(np.radians([10, 20, 30, 40, 50, 60]), np.radians([0, -20, 20]), indexing="ij")
     rays = np.stack(
         [np.cos(elevation) * np.sin(forward), np.cos(elevation) * np.cos(forward), np.sin(elevation)], axis=-1
@@ -72,8 +62,8 @@ class TransitionModel:
     """The moves of every limb of one robot.
 
     Attributes:
-        steps: (n, 3) float; of the left foot beside the right one: x m, y m, yaw rad.
-        rays: (m, 3) float; of the left palm, unit.
+        steps: (n, 3) Steps of the left foot.
+        rays: (m, 3) Rays of the left palm.
     """
 
     steps: np.ndarray
@@ -81,12 +71,12 @@ class TransitionModel:
 
     @classmethod
     def of(cls, robot: RobotModel, steps: np.ndarray) -> TransitionModel:
-        """Moves for a robot: steps scaled with its legs, wide enough apart for its soles; rays if it has arms.
+        """Moves of a robot: steps that are scaled with its legs and wide enough for its soles, and rays if it has arms.
 
-        The scale is 1 within 10 % of the leg that the paper's numbers fit.
+        Steps are not scaled where the legs are within 10 % of those that the paper's numbers fit.
         """
         leg = robot.legs[Limb.LEFT_FOOT]
-        scale = (leg.thigh + leg.shin) / REFERENCE_LEG
+        scale = (leg.thigh + leg.shin) / _REFERENCE_LEG
         scale = 1.0 if abs(scale - 1.0) < 0.1 else scale
         scaled = steps * [scale, scale, 1.0]
         apart = 2.0 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04
@@ -94,7 +84,7 @@ class TransitionModel:
         return cls(scaled, palm_rays() if robot.arms else np.zeros((0, 3)))
 
     def steps_of(self, limb: Limb) -> np.ndarray:
-        """(n, 3) steps of a foot in the upright frame of the other, which stands."""
+        """(n, 3) steps of a foot in the upright frame of the standing one."""
         return self.steps if limb.is_left else self.steps * _MIRROR_STEP
 
     def rays_of(self, limb: Limb) -> np.ndarray:
@@ -103,5 +93,5 @@ class TransitionModel:
 
     @property
     def longest_step(self) -> float:
-        """m; longest distance between the standing and the new foot along x."""
+        """Longest distance along x between the standing and the new foot, in m."""
         return float(self.steps[:, 0].max())

@@ -1,4 +1,4 @@
-"""Many contact transitions out of one stance as arrays, for those who judge them together."""
+"""Many contact transitions out of one stance as arrays, so that they can be judged together."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from toolkit.contacts.sequence import ContactTransition
 
 @dataclass(frozen=True)
 class TransitionRows(Sequence[ContactTransition]):
-    """Transitions by rows; one that is asked for by its index is made then.
+    """Transitions as rows of arrays.
 
     Attributes:
-        limb: (n,) int; that moves.
-        makes: (n,) bool; False where a palm breaks: its row of the contact's arrays says nothing.
-        position: (n, 3) m; of the new contact.
-        rotation: (n, 3, 3); its world_from_contact.
-        friction: (n,); its coefficient.
-        shift: (n,) s.
-        swing: (n,) s.
-        make: the transition of a row.
+        limb: (n,) int The limb that moves.
+        makes: (n,) bool False where a palm breaks its contact; its rows of the next three arrays mean nothing then.
+        position: (n, 3) Place of the new contact, in m.
+        rotation: (n, 3, 3) world_from_contact of the new contact.
+        friction: (n,) Coulomb coefficient of the new contact.
+        shift, swing: (n,) Times of the transition, in s.
+        make: Makes the transition of a row when it is asked for by index.
     """
 
     limb: np.ndarray
@@ -37,7 +36,7 @@ class TransitionRows(Sequence[ContactTransition]):
 
     @classmethod
     def of(cls, transitions: Sequence[ContactTransition]) -> TransitionRows:
-        """Rows of transitions that exist; they themselves where they are rows already."""
+        """Rows of the given transitions; these themselves where they are rows already."""
         if isinstance(transitions, cls):
             return transitions
         n = len(transitions)
@@ -72,15 +71,6 @@ class TransitionRows(Sequence[ContactTransition]):
         return self.make(range(len(self))[index])
 
     def select(self, rows: np.ndarray) -> TransitionRows:
-        """Some of them, by index."""
-        rows = np.asarray(rows)
-        return TransitionRows(
-            self.limb[rows],
-            self.makes[rows],
-            self.position[rows],
-            self.rotation[rows],
-            self.friction[rows],
-            self.shift[rows],
-            self.swing[rows],
-            lambda row: self.make(int(rows[row])),
-        )
+        """The transitions of these rows, by index."""
+        arrays = self.limb, self.makes, self.position, self.rotation, self.friction, self.shift, self.swing
+        return TransitionRows(*(array[rows] for array in arrays), make=lambda row: self.make(int(rows[row])))

@@ -2,32 +2,49 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from toolkit.centroidal.problem import Margins
-from toolkit.control.config import ControllerConfig, TaskGains
 from toolkit.control.corrector import PENDULUM_RATE, Cones, Corrector, MotionTarget
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.joint_box import JointBox
-from toolkit.control.limb_target import LimbTargets
+from toolkit.control.limb_target import LimbTargets, rotation_sine
 from toolkit.control.qp import FORCE_UNIT, ContactQP
 from toolkit.control.sampled_plan import Reference
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 
-# A limb in contact is held still by its velocity only: where it rests is a measured fact. The patch of a palm aligns
-# itself with the surface.
+
+class TaskGains(NamedTuple):
+    """A task `weight |J qdd + dJ v - a*|^2` with `a* = a_ref + kp e + kd de`, per squared m/s^2 or rad/s^2."""
+
+    weight: float
+    kp: float
+    kd: float
+
+
+# These gains walked on flat ground, on stones, on stairs and with a palm on a wall.
+SWING, SWING_ROTATION = TaskGains(200.0, 400.0, 40.0), TaskGains(20.0, 400.0, 40.0)  # a foot in the air
+HAND = TaskGains(50.0, 200.0, 28.0)  # a palm that approaches or leaves its contact
+# The posture keeps arms and trunk on the way that was found clear; to follow the momentum they would leave it.
+COM, BASE, POSTURE = TaskGains(1000.0, 60.0, 14.0), TaskGains(50.0, 100.0, 20.0), TaskGains(4.0, 60.0, 15.0)
+SPIN = TaskGains(40.0, 5.0, 0.0)  # of the angular momentum in units of MOMENTUM_SCALE; kd is unused
+# A limb in contact is held still by its velocity only, because its resting place is a measured fact. The patch of a
+# palm aligns itself with the surface.
 STANCE, STANCE_PALM_ROTATION = TaskGains(1e4, 0.0, 30.0), TaskGains(20.0, 0.0, 20.0)
-LEG_POSTURE = 0.005  # of the posture's weight for joints that carry a foot: feet and CoM place them
+LEG_POSTURE = 0.005  # factor on the posture's weight for joints that carry a foot: feet and CoM place them
 ARM_POSTURE = 0.01  # the same for an arm whose palm is in contact, and not quite where it was planned to be
 MOMENTUM_SCALE = 10.0  # kg m^2/s per unit of the task of angular momentum
 FORCE, MOMENT = 1e-5, 2e-4  # weights on squared N and N m of deviation from the planned wrenches: they break ties
 ACCELERATION = 1e-4  # weight on squared joint accelerations: keeps the Hessian definite
+NESTING = 0.5  # where the controller's margins lie between the plan's (1) and the simulation's (0)
 DIVERGENCE = 0.01  # m; divergence of the CoM that halves the weights of angular momentum and base orientation...
-URGENT_NESTING = 0.05  # ... and from which on the CoP may come that near the edge, instead of `nesting`
+URGENT_NESTING = 0.05  # ... and beyond which this replaces NESTING for the CoP, which may then come nearer to the edge
 MAX_FRICTION, MAX_YAW = 1.0, 0.9  # bounds on the factors on friction and yaw moment, also where the plan has no margin
-TORQUE_FRACTION = 0.98  # of the joint torque limits that may be used: the solver's tolerance stays within the limit
+TORQUE_FRACTION = 0.98  # usable part of the joint torque limits: the solver's tolerance stays within the limit
 
 
 class Controller:
@@ -37,10 +54,9 @@ class Controller:
     accelerations and contact wrenches that follow all tasks best while respecting physics and the robot's limits.
 
     Attributes:
-        tracker: which limbs are in contact.
-        failures: ticks whose QP was not solved as posed; each was then solved without acceleration boxes and least
-            forces, or, where that failed too (`blind`), held its posture with joint gains.
-        wrench: (4, 6) wanted wrenches in the contact frames at the last tick.
+        aim: What the last tick tracked.
+        failures: Ticks whose QP was not solved as posed. Each was then solved without acceleration boxes and least
+            forces, or, where that failed too, held its posture with joint gains.
     """
 
     def __init__(
@@ -49,22 +65,20 @@ class Controller:
         reference: Reference,
         margins: Margins,
         period: float,
-        config: ControllerConfig,
         corrector: Corrector | None = None,
     ):
         """Prepare for a run.
 
         Args:
-            robot: the robot as the controller knows it.
-            reference: the plan at the control ticks.
-            margins: the plan's margins; the controller's lie between them and none.
-            period: s between control ticks.
-            config: settings.
-            corrector: optimises motion and landing points anew; they stay as planned where None.
+            robot: The robot as the controller knows it.
+            reference: The plan at the control ticks.
+            margins: The plan's margins; the controller's lie between them and none.
+            period: Time between control ticks in s.
+            corrector: It optimises motion and landing points anew. Without one they stay as planned.
         """
         self._corrector, self.aim = corrector, MotionTarget.zeros()
         self._com, self._com_velocity = np.zeros(3), np.zeros(3)
-        self._robot, self._reference, self._config = robot, reference, config
+        self._robot, self._reference = robot, reference
         self._period = period
         self.dynamics = RobotDynamics(robot)
         self.limbs = self.dynamics.limbs
@@ -76,51 +90,41 @@ class Controller:
         self.targets = LimbTargets(reference, self.tracker)
         self._box = JointBox(robot)
         self._torque_limit = TORQUE_FRACTION * robot.torque_limit
-        nesting = config.nesting
         self._limits = {
             urgent: Cones(
-                min(1.0 + nesting * (margins.friction - 1.0), MAX_FRICTION),
-                min(1.0 + nesting * (margins.yaw - 1.0), MAX_YAW),
+                min(1.0 + NESTING * (margins.friction - 1.0), MAX_FRICTION),
+                min(1.0 + NESTING * (margins.yaw - 1.0), MAX_YAW),
                 robot.half_sizes - shrink * np.minimum(margins.cop, robot.half_sizes / 2.0),
             )
-            for urgent, shrink in ((False, nesting), (True, URGENT_NESTING))
+            for urgent, shrink in ((False, NESTING), (True, URGENT_NESTING))
         }
         self._urgent, self._calm = False, 1.0
         legs = robot.carrying(limb for limb in self.limbs if limb.is_foot)
-        gains, nv = config, self.dynamics.nv
-        self._posture_weight = np.where(legs, LEG_POSTURE, 1.0) * gains.posture.weight
+        nv = self.dynamics.nv
+        self._posture_weight = np.where(legs, LEG_POSTURE, 1.0) * POSTURE.weight
         self._arms = {limb: robot.arm_joints(limb) for limb in self.limbs if not limb.is_foot}
         self._posture = self._posture_weight.copy()
         self._diagonal = np.full(nv + 18, ACCELERATION)
-        self._diagonal[3:6] += gains.base.weight
+        self._diagonal[3:6] += BASE.weight
         self._diagonal[6:nv] += self._posture_weight
         self._diagonal[nv:] = FORCE * FORCE_UNIT**2
         self._target = np.zeros(nv + 18)
         self._tasks, self._wanted = np.zeros((6 + 24, nv)), np.zeros(6 + 24)
         self._qps: dict[tuple[Limb, ...], ContactQP] = {}
-        self._error = np.zeros(3)
-        self.failures = self.blind = 0
-        self.wrench = np.zeros((4, 6))
+        self.failures = 0
 
     def tick(self, index: int, qpos: np.ndarray, qvel: np.ndarray, normal_force: np.ndarray) -> np.ndarray:
-        """One control tick.
+        """Joint torques (n,) in N m, within the limits, for a row of the reference.
 
-        Args:
-            index: row of the reference.
-            qpos: (7 + n,) MuJoCo order.
-            qvel: (6 + n,) MuJoCo order.
-            normal_force: (4,) N; measured along the patches' normals.
-
-        Returns:
-            (n,) joint torques in N m within the limits.
+        The state has qpos (7 + n,) and qvel (6 + n,) in MuJoCo's order; the forces (4,) in N were measured along the
+        patches' normals.
         """
         self.dynamics.update(qpos, qvel)
         self.tracker.update(float(self._reference.times[index]), self._period, normal_force)
         self._com[:], self._com_velocity[:] = self._reference.com[index], self._reference.com_velocity[index]
         self.aim.follow(self._reference, index)
         if self._corrector is not None:
-            cones = self._limits[self._urgent]
-            self._corrector.update(index, self._period, self.dynamics, self.tracker, self.targets, cones, self.aim)
+            self._corrector.update(index, self.dynamics, self.targets, self._limits[self._urgent], self.aim)
             self._com += self._corrector.com_shift
         self.targets.update(index, self.dynamics)
         limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
@@ -135,22 +139,16 @@ class Controller:
             self.failures += 1
             x = qp.solve_relaxed()
         if x is None:
-            self.blind += 1
             return self._hold(index, qpos, qvel)
-        self.wrench[:] = 0.0
-        for limb in limbs:
-            self.wrench[limb] = qp.wrench(x, limb)
         torque = (qp.rows[6 : qp.nv] @ x) + self.dynamics.bias[6:]
         limit = self._robot.torque_limit
         return np.clip(torque, -limit, limit)
 
     def _constrain(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in dynamics, cones and boxes."""
-        dynamics, tracker = self.dynamics, self.tracker
+        tracker = self.tracker
         friction, limits = self._reference.friction[index], self._limits[self._urgent]
-        qp.set_dynamics(
-            dynamics.mass_matrix, dynamics.bias, dynamics.jacobian, dynamics.limb_rotation, self._torque_limit
-        )
+        qp.set_dynamics(self.dynamics, self._torque_limit)
         for limb in qp.limbs:
             qp.set_cone(limb, friction[limb] * limits.friction, limits.half_size[limb], limits.yaw)
             qp.set_normal_force(limb, tracker.min_force[limb], tracker.max_force[limb])
@@ -159,25 +157,24 @@ class Controller:
 
     def _pursue(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in the objective."""
-        reference, dynamics, gains, nv = self._reference, self.dynamics, self._config, self.dynamics.nv
+        reference, dynamics, nv = self._reference, self.dynamics, self.dynamics.nv
         tasks, wanted, target, aim = self._tasks, self._wanted, self._target, self.aim
-        root = gains.com.weight**0.5
+        root = COM.weight**0.5
         np.multiply(dynamics.com_jacobian, root, out=tasks[:3])
-        error = gains.com.kp * (aim.com - dynamics.com)
-        error += gains.com.kd * (aim.com_velocity - dynamics.com_velocity)
+        error = COM.kp * (aim.com - dynamics.com)
+        error += COM.kd * (aim.com_velocity - dynamics.com_velocity)
         wanted[:3] = root * (error + aim.com_acceleration - dynamics.com_drift)
-        root = (gains.angular_momentum.weight * self._calm) ** 0.5 / MOMENTUM_SCALE
+        root = (SPIN.weight * self._calm) ** 0.5 / MOMENTUM_SCALE
         np.multiply(dynamics.momentum_jacobian, root, out=tasks[3:6])
-        error = gains.angular_momentum.kp * (aim.angular_momentum - dynamics.angular_momentum)
+        error = SPIN.kp * (aim.angular_momentum - dynamics.angular_momentum)
         wanted[3:6] = root * (error + aim.angular_momentum_rate - dynamics.momentum_drift)
         rows = 6
         for limb in self.limbs:
             rows = self._pursue_limb(limb, rows)
         self._orient_base(index, qvel, target)
-        posture = gains.posture
         target[6:nv] = reference.joint_acceleration[index]
-        target[6:nv] += posture.kp * (reference.joints[index] - qpos[7:])
-        target[6:nv] += posture.kd * (reference.joint_velocity[index] - qvel[6:])
+        target[6:nv] += POSTURE.kp * (reference.joints[index] - qpos[7:])
+        target[6:nv] += POSTURE.kd * (reference.joint_velocity[index] - qvel[6:])
         target[6:nv] *= self._posture / self._diagonal[6:nv]
         diagonal = self._diagonal[: qp.size]
         for limb, slot in qp.slots.items():
@@ -188,18 +185,17 @@ class Controller:
         qp.set_objective(tasks[:rows], wanted[:rows], diagonal, target[: qp.size])
 
     def _sense_urgency(self) -> None:
-        """See how far the CoM diverges from its plan.
+        """Adapt margins and weights to how far the CoM diverges from its plan.
 
         A robot about to fall uses its feet to their edges and swings its body: the margins of the CoP shrink, and so do
-        the weights of angular momentum, of the base's orientation and of the posture. Friction keeps its margin: a slip
-        saves nobody.
+        the weights of angular momentum, of the base's orientation and of the posture. Friction keeps its margin.
         """
-        gains, dynamics = self._config, self.dynamics
+        dynamics = self.dynamics
         x, y = (dynamics.com - self._com + (dynamics.com_velocity - self._com_velocity) / PENDULUM_RATE)[:2]
         squared = (x * x + y * y) / DIVERGENCE**2
         self._calm = 1.0 / (1.0 + squared)
         self._urgent = squared > (0.25 if self._urgent else 1.0)
-        self._diagonal[3:6] = ACCELERATION + gains.base.weight * self._calm
+        self._diagonal[3:6] = ACCELERATION + BASE.weight * self._calm
         np.multiply(self._posture_weight, self._calm, out=self._posture)
         for limb, joints in self._arms.items():
             if self.tracker.in_contact[limb] and self.tracker.current[limb] is not None:
@@ -207,14 +203,14 @@ class Controller:
         np.add(self._posture, ACCELERATION, out=self._diagonal[6 : dynamics.nv])
 
     def _pursue_limb(self, limb: Limb, rows: int) -> int:
-        """Append a limb's task rows after the first `rows`; returns their new number."""
-        gains, dynamics, targets = self._config, self.dynamics, self.targets
+        """Append a limb's task rows after the first `rows` and return their new number."""
+        dynamics, targets = self.dynamics, self.targets
         if self.tracker.in_contact[limb]:
             linear, angular = STANCE, STANCE if limb.is_foot else STANCE_PALM_ROTATION
         elif self.tracker.state[limb] is LimbState.FREE or targets.authority[limb] <= 0.0:
             return rows
         else:
-            linear, angular = (gains.swing, gains.swing_rotation) if limb.is_foot else (gains.hand, gains.hand)
+            linear, angular = (SWING, SWING_ROTATION) if limb.is_foot else (HAND, HAND)
         share = 1.0 if self.tracker.in_contact[limb] else targets.authority[limb]
         rows = self._append(limb, slice(0, 3), linear, share, rows)
         rows = self._append(limb, slice(3, 6), angular, share, rows)
@@ -227,7 +223,7 @@ class Controller:
         return rows - 1
 
     def _append(self, limb: Limb, part: slice, task: TaskGains, share: float, rows: int) -> int:
-        """Append the three rows of a limb's linear or angular task; returns the new number of rows."""
+        """Append the three rows of a limb's linear or angular task and return the new number of rows."""
         dynamics, targets = self.dynamics, self.targets
         root, here = (share * task.weight) ** 0.5, slice(rows, rows + 3)
         np.multiply(dynamics.jacobian[limb, part], root, out=self._tasks[here])
@@ -237,16 +233,15 @@ class Controller:
         return rows + 3
 
     def _orient_base(self, index: int, qvel: np.ndarray, target: np.ndarray) -> None:
-        """Wanted angular acceleration of the base, in the base."""
-        task, reference = self._config.base, self._reference
-        turn = self.dynamics.base_rotation.T @ reference.base_rotation[index]
-        error = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-        acceleration = reference.base_acceleration[index] + task.kp * error
-        acceleration += task.kd * (reference.base_velocity[index] - qvel[3:6])
-        target[3:6] = acceleration * (self._calm * task.weight / self._diagonal[3:6])
+        """Fill in the wanted angular acceleration of the base, in the base."""
+        reference = self._reference
+        error = rotation_sine(self.dynamics.base_rotation.T @ reference.base_rotation[index])
+        acceleration = reference.base_acceleration[index] + BASE.kp * error
+        acceleration += BASE.kd * (reference.base_velocity[index] - qvel[3:6])
+        target[3:6] = acceleration * (self._calm * BASE.weight / self._diagonal[3:6])
 
     def _hold(self, index: int, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
-        """Last resort of a tick: gravity and Coriolis forces, and joint gains to the planned posture."""
+        """Compensate gravity and Coriolis forces and drive the joints to the planned posture, as a last resort."""
         reference, robot = self._reference, self._robot
         torque = self.dynamics.bias[6:] + robot.kp * (reference.joints[index] - qpos[7:])
         torque += robot.kd * (reference.joint_velocity[index] - qvel[6:])

@@ -1,4 +1,4 @@
-"""What the controller tracks at a tick, within which cones, and who may correct it."""
+"""What the controller tracks at a tick, its contact cones, and the interface of what may correct it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import numpy as np
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.limb_target import LimbTargets
 from toolkit.control.sampled_plan import Reference
-from toolkit.control.touchdown import ContactTracker
 
 PENDULUM_RATE = 3.4
-"""1/s; frequency of the pendulum that a humanoid is: the CoM diverges by `(c - c_plan) + (v - v_plan) / rate`."""
+"""Rate in 1/s of an inverted pendulum like a humanoid: the CoM diverges by `(c - c_plan) + (v - v_plan) / rate`."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +35,9 @@ class MotionTarget:
     """What the controller tracks at a tick; world frame, SI units.
 
     Attributes:
-        com, com_velocity, com_acceleration: (3,).
-        angular_momentum, angular_momentum_rate: (3,) about the CoM.
-        wrench: (4, 6) about the patches' centres in the contact frames.
+        com, com_velocity, com_acceleration: Each (3,).
+        angular_momentum, angular_momentum_rate: Each (3,), about the CoM.
+        wrench: (4, 6) wrenches about the patches' centres in the contact frames.
     """
 
     com: np.ndarray
@@ -50,12 +49,12 @@ class MotionTarget:
 
     @classmethod
     def zeros(cls) -> MotionTarget:
-        """Room for one."""
+        """A target of zeros."""
         com, velocity, acceleration, momentum, rate = np.zeros((5, 3))
         return cls(com, velocity, acceleration, momentum, rate, np.zeros((4, 6)))
 
     def follow(self, reference: Reference, index: int) -> None:
-        """Fill in a row of the plan."""
+        """Copy a row of the plan."""
         self.com[:], self.com_velocity[:] = reference.com[index], reference.com_velocity[index]
         self.com_acceleration[:] = reference.com_acceleration[index]
         self.angular_momentum[:] = reference.angular_momentum[index]
@@ -64,33 +63,12 @@ class MotionTarget:
 
 
 class Corrector(Protocol):
-    """Optimises the motion anew while the plan is carried out; see `toolkit.replanning.replanner.Replanner`.
-
-    Attributes:
-        com_shift: (3,) m; by how much the feet that bear the plan stand off it.
-    """
+    """Optimises the motion anew while the plan is carried out; see `toolkit.replanning.replanner.Replanner`."""
 
     com_shift: np.ndarray
 
     def update(
-        self,
-        index: int,
-        period: float,
-        dynamics: RobotDynamics,
-        tracker: ContactTracker,
-        targets: LimbTargets,
-        cones: Cones,
-        aim: MotionTarget,
+        self, index: int, dynamics: RobotDynamics, targets: LimbTargets, cones: Cones, aim: MotionTarget
     ) -> None:
-        """Say what to track at a tick.
-
-        Args:
-            index: row of the reference.
-            period: s since the last tick.
-            dynamics: measured state.
-            tracker: contact states at this tick.
-            targets: whose landing points may be moved.
-            cones: what the controller allows now.
-            aim: the plan's target; overwritten where another one is better.
-        """
+        """Move the aim and the landing points of the targets at a row of the reference."""
         ...

@@ -22,16 +22,16 @@ class RobotDynamics:
     where gravity cancels in the second, so that no separate Jacobian of CoM or momentum is needed.
 
     Attributes:
-        nv: 6 + n degrees of freedom.
-        mass: kg.
-        limbs: those the robot has.
-        mass_matrix: (nv, nv). bias: (nv,) Coriolis, gravity, less passive joint forces.
-        jacobian: (4, 6, nv); linear then angular velocity of each limb's site in the world; zero for missing limbs.
-        drift: (4, 6); dJ/dt v.
-        limb_position: (4, 3); limb_rotation: (4, 3, 3) world_from_limb; limb_velocity: (4, 6).
-        com, com_velocity: (3,). angular_momentum: (3,) about the CoM.
-        com_jacobian: (3, nv); com_drift: (3,). momentum_jacobian: (3, nv) and momentum_drift: (3,), so that
-            k' = momentum_jacobian @ qdd + momentum_drift.
+        nv: Number of degrees of freedom, 6 + n.
+        mass: Mass in kg.
+        limbs: The limbs that the robot has.
+        mass_matrix, bias: (nv, nv), and (nv,) Coriolis and gravity forces less passive joint forces.
+        jacobian, drift: (4, 6, nv) of the linear, then angular velocity of each limb's site in the world, and (4, 6)
+            dJ/dt v. Both are zero for missing limbs.
+        limb_position, limb_rotation, limb_velocity: (4, 3), (4, 3, 3) world_from_limb and (4, 6).
+        com, com_velocity, angular_momentum: Each (3,), the last about the CoM.
+        com_jacobian, com_drift: (3, nv) and (3,), so that c'' = com_jacobian @ qdd + com_drift.
+        momentum_jacobian, momentum_drift: (3, nv) and (3,), so that k' = momentum_jacobian @ qdd + momentum_drift.
         base_rotation: (3, 3) world_from_base.
     """
 
@@ -59,18 +59,12 @@ class RobotDynamics:
         self.momentum_drift = np.zeros(3)
         self.angular_momentum = np.zeros(3)
         self._dot = np.zeros((6, self.nv))
-        self._lever = np.zeros((3, 3))
         self.com = data.subtree_com[self._base]
         self.base_rotation = data.xmat[self._base].reshape(3, 3)
         self.base_position = data.xpos[self._base]
 
     def update(self, qpos: np.ndarray, qvel: np.ndarray) -> None:
-        """Evaluate everything at a state.
-
-        Args:
-            qpos: (7 + n,) MuJoCo order.
-            qvel: (6 + n,) MuJoCo order.
-        """
+        """Evaluate everything at a state (7 + n,), (6 + n,) in MuJoCo's order."""
         model, data = self._model, self._data
         data.qpos[:] = qpos
         data.qvel[:] = qvel
@@ -93,11 +87,10 @@ class RobotDynamics:
             np.dot(dot, qvel, out=self.drift[limb])
 
     def _momentum(self, qvel: np.ndarray) -> None:
-        """Momentum and its rate from the base's rows of the equation of motion."""
-        mass, rotation, lever = self.mass, self.base_rotation, self._lever
+        """Evaluate momentum and its rate from the base's rows of the equation of motion."""
+        mass, rotation = self.mass, self.base_rotation
         x, y, z = self.com - self.base_position
-        lever[0, 1], lever[0, 2], lever[1, 2] = -z, y, -x
-        lever[1, 0], lever[2, 0], lever[2, 1] = z, -y, x
+        lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         linear, angular = self.mass_matrix[:3], self.mass_matrix[3:6]
         np.divide(linear, mass, out=self.com_jacobian)
         np.divide(self.bias[:3], mass, out=self.com_drift)

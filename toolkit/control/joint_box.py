@@ -7,20 +7,21 @@ import numpy as np
 from toolkit.robot.model import RobotModel
 
 RANGE_MARGIN = 0.01  # rad; kept from each end of a joint's range
-RANGE_RATE = 25.0  # 1/s; how fast a joint may approach the end of its range, per rad of distance
-VELOCITY_FRACTION = 0.95  # of the joint velocity limits that may be used: a tick's error stays within the limit
-VELOCITY_TIME = 0.02  # s; over which a joint may reach its velocity limit
+RANGE_RATE = 25.0  # 1/s; speed at which a joint may approach the end of its range, per rad of distance
+VELOCITY_FRACTION = 0.95  # usable part of the joint velocity limits: a tick's error stays within the limit
+VELOCITY_TIME = 0.02  # s; time in which a joint may reach its velocity limit
 MAX_ACCELERATION = 2000.0  # rad/s^2; bound on every joint's acceleration: keeps the QP's numbers alike
 
 
 class JointBox:
     """Bounds on joint accelerations.
 
-    With d the distance to the upper end of the range and r the rate, `qdd <= r^2 d - 2 r v` keeps d >= 0 for ever once
-    `v <= r d` holds (a barrier of second order); `qdd <= (v_max - v) / T` keeps the velocity limit. The same downwards.
+    With d the distance to the upper end of the range and r the rate, `qdd <= r^2 d - 2 r v` keeps d >= 0 once
+    `v <= r d` holds (a barrier of second order), and `qdd <= (v_max - v) / T` keeps the velocity limit. Both hold for
+    the lower ends alike.
 
     Attributes:
-        lower, upper: (n,) rad/s^2, lower <= upper.
+        lower, upper: Each (n,) rad/s^2; lower <= upper.
     """
 
     def __init__(self, robot: RobotModel):
@@ -48,7 +49,7 @@ class JointBox:
         np.maximum(self.lower, work, out=self.lower)
         np.clip(self.upper, -MAX_ACCELERATION, MAX_ACCELERATION, out=self.upper)
         np.clip(self.lower, -MAX_ACCELERATION, MAX_ACCELERATION, out=self.lower)
-        # Where a joint is pressed from both sides the middle is the best that can be done.
+        # Where the two bounds contradict each other, both become the middle.
         np.add(self.lower, self.upper, out=work)
         work *= 0.5
         crossed = self.lower > self.upper

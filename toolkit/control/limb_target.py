@@ -1,4 +1,4 @@
-"""LimbTargets: where limbs should be now, given where they really are."""
+"""LimbTargets: where limbs should be now, given their measured poses."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.control.touchdown import ContactTracker, LimbState
 
-FADE = 0.7  # of a swing, over which the offset that it started with is lost
-SWING_SHARE = 0.05
-"""Part of a foot's weights that counts until it prepares to land: where its joints are too slow the foot gives way, not
-the body."""
-REST_SPEED = 0.05  # m/s; at which a foot that bounced off goes back along the inward normal
+FADE = 0.7  # part of a swing over which the offset that it started with fades away
+SWING_SHARE = 0.05  # part of a foot's weights until it prepares to land: a foot that is too slow does not move the body
+REST_SPEED = 0.05  # m/s; speed at which a foot that bounced off goes back along the inward normal
 
 
 class LimbTargets:
@@ -22,14 +20,15 @@ class LimbTargets:
     first part of the swing. A limb that has not met its surface in time goes on along the inward normal.
 
     Attributes:
-        error: (4, 6) m and rad; from the limb to its target, world frame.
-        velocity, acceleration: (4, 6).
+        tracker: Which limbs are in contact.
+        error: (4, 6) m and rad, from the limb to its target, in the world frame.
+        velocity, acceleration: Each (4, 6).
         authority: (4,) in [0, 1]; how binding the target is (palms blend to and from their free posture).
-        shift: (4, 3) m; displacement of the landing point, and shift_velocity: (4, 3) m/s.
+        shift, shift_velocity: (4, 3) displacement of the landing point in m, and its rate in m/s.
     """
 
     def __init__(self, reference: Reference, tracker: ContactTracker):
-        self._reference, self._tracker = reference, tracker
+        self._reference, self.tracker = reference, tracker
         self.error, self.velocity, self.acceleration = np.zeros((4, 6)), np.zeros((4, 6)), np.zeros((4, 6))
         self.authority = np.ones(4)
         self.shift, self.shift_velocity = np.zeros((4, 3)), np.zeros((4, 3))
@@ -38,7 +37,7 @@ class LimbTargets:
 
     def update(self, index: int, dynamics: RobotDynamics) -> None:
         """Evaluate at a row of the reference and the measured limbs."""
-        reference, tracker = self._reference, self._tracker
+        reference, tracker = self._reference, self.tracker
         for limb in dynamics.limbs:
             state, swing = tracker.state[limb], tracker.current[limb]
             self.error[limb] = self.velocity[limb] = self.acceleration[limb] = 0.0
@@ -52,7 +51,9 @@ class LimbTargets:
                 if not swing.breaks:
                     self._offset[limb] = 0.0
                 self.shift[limb] = self.shift_velocity[limb] = 0.0
-            pace, row = tracker.pace[limb], self._row(index, tracker.lead[limb])
+            pace, lead, row = tracker.pace[limb], tracker.lead[limb], index
+            if lead:
+                row = min(index + round(lead / self._period), len(reference.times) - 1)
             target = reference.limb_position[row, limb] + self.shift[limb]
             self.velocity[limb] = pace * reference.limb_velocity[row, limb]
             self.velocity[limb, :3] += self.shift_velocity[limb]
@@ -65,24 +66,17 @@ class LimbTargets:
                 target = target - tracker.depth[limb] * normal
                 self.velocity[limb, :3] -= tracker.search_speed(limb) * normal
             else:
-                target = target + self._remaining(swing, reference.times[row]) * self._offset[limb]
+                target = target + _remaining(swing, reference.times[row]) * self._offset[limb]
             self.error[limb, :3] = target - dynamics.limb_position[limb]
-            self.error[limb, 3:] = rotation_error(reference.limb_rotation[row, limb], dynamics.limb_rotation[limb])
-
-    def _row(self, index: int, lead: float) -> int:
-        """Row of the reference that a limb whose swing runs ahead has reached."""
-        return min(index + round(lead / self._period), len(self._reference.times) - 1) if lead else index
-
-    def _remaining(self, swing: Swing, time: float) -> float:
-        """Share of the initial offset that is left."""
-        share = min((time - swing.start) / (FADE * (swing.end - swing.start)), 1.0)
-        return 1.0 - share * share * (3.0 - 2.0 * share)
+            self.error[limb, 3:] = rotation_sine(reference.limb_rotation[row, limb] @ dynamics.limb_rotation[limb].T)
 
 
-def rotation_error(wanted: np.ndarray, actual: np.ndarray) -> np.ndarray:
-    """Rotation vector (3,) in rad, world frame, that turns `actual` towards `wanted` (exact for small angles).
+def _remaining(swing: Swing, time: float) -> float:
+    """Share of the initial offset that is left."""
+    share = min((time - swing.start) / (FADE * (swing.end - swing.start)), 1.0)
+    return 1.0 - share * share * (3.0 - 2.0 * share)
 
-    The sine of the angle along its axis: monotonic to 90 degrees.
-    """
-    turn = wanted @ actual.T
+
+def rotation_sine(turn: np.ndarray) -> np.ndarray:
+    """Sine of a (3, 3) rotation's angle along its axis (3,): the rotation vector in rad where the angle is small."""
     return 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import daqp
 import numpy as np
 
+from toolkit.control.dynamics import RobotDynamics
 from toolkit.geometry.limb import Limb
 from toolkit.physics.wrench import foot_rows, friction_rows
 
@@ -25,9 +26,9 @@ class ContactQP:
     task rows plus a diagonal.
 
     Attributes:
-        limbs: in contact, in order.
-        size: number of variables.
-        slots: limb -> slice of its wrench in x (in units of `FORCE_UNIT`).
+        limbs: The limbs in contact, in order.
+        size: Number of variables.
+        slots: By limb, the slice of x with its wrench in units of `FORCE_UNIT`.
     """
 
     def __init__(self, limbs: tuple[Limb, ...], nv: int):
@@ -74,27 +75,12 @@ class ContactQP:
         cone = foot_rows(friction, half_size, yaw) if limb.is_foot else friction_rows(friction)
         self.rows[self._cone_rows[limb], self.slots[limb]] = cone
 
-    def set_dynamics(
-        self,
-        mass_matrix: np.ndarray,
-        bias: np.ndarray,
-        jacobian: np.ndarray,
-        rotation: np.ndarray,
-        torque_limit: np.ndarray,
-    ) -> None:
-        """Set the equation of motion.
-
-        Args:
-            mass_matrix: (nv, nv).
-            bias: (nv,).
-            jacobian: (4, 6, nv).
-            rotation: (4, 3, 3) world_from_limb.
-            torque_limit: (n,) N m.
-        """
-        nv, size = self.nv, self.size
-        self.rows[:nv, :nv] = mass_matrix
+    def set_dynamics(self, dynamics: RobotDynamics, torque_limit: np.ndarray) -> None:
+        """Set the equation of motion; the torque limits (n,) are in N m."""
+        nv, size, bias, jacobian = self.nv, self.size, dynamics.bias, dynamics.jacobian
+        self.rows[:nv, :nv] = dynamics.mass_matrix
         for limb, slot in self.slots.items():
-            to_contact = -FORCE_UNIT * rotation[limb]
+            to_contact = -FORCE_UNIT * dynamics.limb_rotation[limb]
             columns = self.rows[:nv, slot]
             columns[:, :3] = jacobian[limb, :3].T @ to_contact
             if limb.is_foot:
@@ -105,12 +91,12 @@ class ContactQP:
         np.subtract(-torque_limit, bias[6:], out=lower[6:])
 
     def set_normal_force(self, limb: Limb, low: float, high: float) -> None:
-        """Bound the normal force of a limb in contact, N."""
+        """Bound the normal force of a limb in contact, in N."""
         index = self.slots[limb].start + 2
         self.lower[index], self.upper[index] = low / FORCE_UNIT, high / FORCE_UNIT
 
     def set_acceleration(self, low: np.ndarray, high: np.ndarray) -> None:
-        """Bound the joint accelerations, (n,) rad/s^2 each."""
+        """Bound the joint accelerations; each bound is (n,) rad/s^2."""
         self.lower[6 : self.nv] = low
         self.upper[6 : self.nv] = high
 
@@ -118,10 +104,10 @@ class ContactQP:
         """Set the objective.
 
         Args:
-            tasks: (r, nv) weighted task rows.
-            wanted: (r,) weighted accelerations.
-            diagonal: (size,) weights of x itself.
-            target: (size,) wanted x.
+            tasks: Weighted task rows (r, nv).
+            wanted: Weighted accelerations (r,).
+            diagonal: Weights (size,) of x itself.
+            target: Wanted x (size,).
         """
         nv = self.nv
         self.hessian[:nv, :nv] = tasks.T @ tasks
@@ -132,11 +118,7 @@ class ContactQP:
         np.negative(self.gradient, out=self.gradient)
 
     def solve(self) -> np.ndarray | None:
-        """Solve, warm-started from the last tick's active set.
-
-        Returns:
-            (size,) x, or None where the solver failed or its answer violates the constraints.
-        """
+        """The best x (size,), from the last tick's active set on; None where no x within the constraints was found."""
         model = self._model
         if model is None:
             model = self._model = daqp.Model()
@@ -147,16 +129,13 @@ class ContactQP:
             x, _, flag, _ = model.solve()
             if flag > 0 and self._holds(x, self.lower, self.upper):
                 return x
-        self._model = None  # a broken workspace is not warm-started from
+        self._model = None  # a workspace that failed is not used again
         return None
 
     def solve_relaxed(self) -> np.ndarray | None:
-        """Solve from scratch without the boxes on joint accelerations and without least normal forces.
+        """The same from scratch, without the boxes on joint accelerations and without least normal forces.
 
         The robot in free fall with zero torque satisfies what remains, up to passive joint forces.
-
-        Returns:
-            (size,) x, or None where the solver failed.
         """
         upper, lower = self.upper.copy(), self.lower.copy()
         upper[: self.nv], lower[: self.nv] = UNBOUNDED, -UNBOUNDED
@@ -167,17 +146,10 @@ class ContactQP:
         )
         return x if flag > 0 and self._holds(x, lower, upper) else None
 
-    def wrench(self, x: np.ndarray, limb: Limb) -> np.ndarray:
-        """(6,) N and N m; a limb's wrench in its contact frame, from a solution."""
-        wrench = np.zeros(6)
-        slot = self.slots[limb]
-        wrench[: slot.stop - slot.start] = FORCE_UNIT * x[slot]
-        return wrench
-
     def _holds(self, x: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> bool:
-        """Whether x satisfies the constraints (believe residuals, not flags)."""
+        """Whether x satisfies the constraints, by its residuals: the solver's flags are not enough."""
         values = self.rows @ x
-        tolerance, size = 1e-2, self.size  # of N m and N, far below what the simulation can tell
+        tolerance, size = 1e-2, self.size  # N m and N; far below what matters in the simulation
         return bool(
             np.isfinite(values).all()
             and (x <= upper[:size] + tolerance).all()

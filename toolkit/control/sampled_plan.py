@@ -6,15 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_from_quaternion
-from toolkit.robot.model import RobotModel
-from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.motion_dynamics import planned_wrench, posture_momentum
+from toolkit.wholebody.plan import WholeBodyPlan
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 
@@ -23,11 +21,11 @@ class Swing:
     """A limb's planned move.
 
     Attributes:
-        limb: which.
-        start, end: s.
-        transition: index in the sequence.
-        contact: what it makes; None where a palm's contact is broken.
-        breaks: whether the limb was in contact before.
+        limb: The limb that moves.
+        start, end: Times in s.
+        transition: Index in the sequence.
+        contact: The contact that it makes; None where a palm's contact is broken.
+        breaks: Whether the limb was in contact before.
     """
 
     limb: Limb
@@ -44,17 +42,17 @@ class Reference:
 
     Attributes:
         times: (C,) s.
-        com, com_velocity, com_acceleration: (C, 3).
-        angular_momentum, angular_momentum_rate: (C, 3) about the CoM.
-        joints, joint_velocity, joint_acceleration: (C, n).
-        base_rotation: (C, 3, 3); base_velocity: (C, 3) rad/s in the base; base_acceleration: (C, 3).
-        limb_position: (C, 4, 3); limb_rotation: (C, 4, 3, 3); limb_velocity, limb_acceleration: (C, 4, 6).
+        com, com_velocity, com_acceleration: Each (C, 3).
+        angular_momentum, angular_momentum_rate: Each (C, 3), about the CoM.
+        joints, joint_velocity, joint_acceleration: Each (C, n).
+        base_rotation, base_velocity, base_acceleration: (C, 3, 3) world_from_base; (C, 3) in the base, in rad and s.
+        limb_position, limb_rotation: (C, 4, 3) and (C, 4, 3, 3) world_from_limb.
+        limb_velocity, limb_acceleration: Each (C, 4, 6).
         authority: (C, 4) in [0, 1]; how binding a limb's pose is (0: it hangs free).
-        in_contact: (C, 4) bool; as planned.
-        friction: (C, 4); of the contact that holds or that the limb moves to; 1 where there is none.
-        wrench: (C, 4, 6); planned force and moment about the patch's centre, in the contact frame.
-        swings: in order of time.
-        duration: s; of the plan, without the rest added to it.
+        in_contact: (C, 4) bool; the planned contacts.
+        friction: (C, 4) of the contact that holds or that the limb moves to; 1 where there is none.
+        wrench: (C, 4, 6) planned force and moment about the patch's centre, in the contact frame.
+        swings: The planned moves in order of time.
     """
 
     times: np.ndarray
@@ -78,44 +76,20 @@ class Reference:
     friction: np.ndarray
     wrench: np.ndarray
     swings: tuple[Swing, ...]
-    duration: float
-
-    @property
-    def momentum(self) -> np.ndarray:
-        """(C, 6) linear momentum per kg, then angular momentum about the CoM."""
-        return np.hstack([self.com_velocity, self.angular_momentum])
 
 
-def sample_reference(
-    times: np.ndarray,
-    sequence: ContactSequence,
-    schedule: ContactSchedule,
-    motion: CentroidalMotion,
-    trajectory: WholeBodyTrajectory,
-    paths: LimbPaths,
-    robot: RobotModel,
-) -> Reference:
-    """Sample a plan.
+def sample_reference(times: np.ndarray, plan: WholeBodyPlan) -> Reference:
+    """Sample a plan at increasing times (C,) in s; beyond its end it rests.
 
-    Args:
-        times: (C,) s, increasing; beyond the plan's end it rests.
-        sequence: contacts.
-        schedule: when they hold.
-        motion: CoM, angular momentum and wrenches.
-        trajectory: joints and base.
-        paths: limbs.
-        robot: whose limbs, and whose angular momentum on the way: the one that the postures have, not the optimiser's,
-            which they follow only roughly.
-
-    Returns:
-        The plan at `times`.
+    The angular momentum is that of the postures. They follow the optimiser's only roughly.
     """
+    robot, motion, paths = plan.robot, plan.motion, plan.paths
     moving = times < motion.problem.times[-1]
     com = np.array([np.stack(motion.sample(float(time))) for time in times])
     com[~moving, 1:] = 0.0
     knots, problem = motion.problem.times, motion.problem
     interval = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, problem.steps - 1)
-    grid = trajectory.times
+    trajectory, grid = plan.trajectory, plan.trajectory.times
     spin = posture_momentum(robot.mujoco_model, grid, trajectory.qpos, trajectory.qvel)
     momentum, rate = (np.column_stack([np.interp(times, grid, part[:, k]) for k in range(3)]) for part in spin)
     momentum, rate = momentum * moving[:, None], rate * moving[:, None]
@@ -130,7 +104,7 @@ def sample_reference(
                 position[k, limb], rotation[k, limb] = pose.position, pose.rotation
                 velocity[k, limb], acceleration[k, limb] = rates
                 authority[k, limb] = paths.authority(limb, float(time))
-    swings = swings_of(sequence, schedule)
+    swings = _swings(plan.sequence, plan.schedule)
     return Reference(
         times=times,
         com=com[:, 0],
@@ -150,14 +124,13 @@ def sample_reference(
         limb_acceleration=acceleration,
         authority=authority,
         in_contact=in_contact,
-        friction=_friction(times, sequence, swings),
+        friction=_friction(times, plan.sequence, swings),
         wrench=planned_wrench(motion)[interval],
         swings=swings,
-        duration=schedule.duration,
     )
 
 
-def swings_of(sequence: ContactSequence, schedule: ContactSchedule) -> tuple[Swing, ...]:
+def _swings(sequence: ContactSequence, schedule: ContactSchedule) -> tuple[Swing, ...]:
     """The planned moves, in order of time."""
     stances = sequence.stances
     return tuple(
@@ -184,7 +157,7 @@ def _posture(times: np.ndarray, trajectory: WholeBodyTrajectory) -> tuple[np.nda
         return qpos[:, 7:], rotation_from_quaternion(qpos[:, 3:7]), qvel, np.zeros_like(qvel)
     share = ((clamped - grid[cell]) / (grid[cell + 1] - grid[cell]))[:, None]
     first, second = trajectory.qpos[cell], trajectory.qpos[cell + 1]
-    # Neighbouring samples are a few degrees apart at most: normalised interpolation is as good as slerp.
+    # Neighbouring samples are at most a few degrees apart, so normalised interpolation is as good as slerp.
     sign = np.where((first[:, 3:7] * second[:, 3:7]).sum(1, keepdims=True) < 0.0, -1.0, 1.0)
     quaternion = (1.0 - share) * first[:, 3:7] + share * sign * second[:, 3:7]
     joints = (1.0 - share) * first[:, 7:] + share * second[:, 7:]
@@ -195,7 +168,7 @@ def _posture(times: np.ndarray, trajectory: WholeBodyTrajectory) -> tuple[np.nda
 
 
 def _friction(times: np.ndarray, sequence: ContactSequence, swings: tuple[Swing, ...]) -> np.ndarray:
-    """(C, 4) coefficient of the contact that each limb has or moves to."""
+    """Friction (C, 4) of the contact that each limb has or moves to."""
     friction = np.ones((len(times), 4))
     for contact in sequence.start.contacts:
         friction[:, contact.limb] = contact.friction

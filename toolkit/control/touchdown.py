@@ -10,18 +10,18 @@ from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.geometry.limb import Limb
 
 # When a moving limb is taken to be in contact.
-EARLY_FRACTION = 0.6  # of the swing, after which a measured force ends it: before, the foot still leaves its surface
-EARLY_FOOT_FORCE, LATE_FOOT_FORCE = 25.0, 15.0  # N; end a foot's swing before and after its planned end
-PALM_FORCE, CONFIRM_TICKS = 3.0, 2  # N in so many consecutive ticks make a palm's contact: arms bounce
-LATE_FOOT_SPEED, PALM_SPEED = 0.15, 0.08  # m/s; along the inward normal after the planned end
+EARLY_FRACTION = 0.6  # part of the swing after which a force ends it: before, the foot still leaves its surface
+EARLY_FOOT_FORCE, LATE_FOOT_FORCE = 25.0, 15.0  # N; they end a foot's swing before and after its planned end
+PALM_FORCE, CONFIRM_TICKS = 3.0, 2  # N, and consecutive ticks that it must last: arms bounce
+LATE_FOOT_SPEED, PALM_SPEED = 0.15, 0.08  # m/s; speeds along the inward normal after the planned end
 MAX_DEPTH = 0.08  # m; how far a limb searches below the planned surface
 
 # How much force a limb in contact is asked to bear.
-MIN_FOOT_FORCE, MIN_PALM_FORCE = 10.0, 2.0  # N; in every settled contact, so that it stays one
-FOOT_RAMP, PALM_RAMP = 0.06, 0.4  # s; over which the bound on the normal force rises after contact is made
-RELEASE_RAMP = 0.06  # s; over which it falls before contact is broken
+MIN_FOOT_FORCE, MIN_PALM_FORCE = 10.0, 2.0  # N; least forces of settled contacts, so that they stay closed
+FOOT_RAMP, PALM_RAMP = 0.06, 0.4  # s; times in which the bound on the normal force rises after contact is made
+RELEASE_RAMP = 0.06  # s; time in which it falls before contact is broken
 SETTLE_FORCE, RELEASE_FORCE = 30.0, 5.0  # N; where the rising bound starts, and where the falling one ends
-LOOSE_FORCE = 15.0  # N; a limb in contact that is measured to bear less bounced off
+LOOSE_FORCE = 15.0  # N; a limb in contact that bears less has bounced off
 
 
 class LimbState(Enum):
@@ -41,32 +41,19 @@ class ContactTracker:
     before it is broken, so that forces never jump.
 
     Attributes:
-        state: by limb.
+        state: By limb, what it does.
         in_contact: (4,) bool.
-        min_force, max_force: (4,) N; range of the normal force at the current tick.
+        min_force, max_force: Each (4,) N; the range of the normal force at the current tick.
         depth: (4,) m; how far a searching limb has gone beyond the planned surface.
-        begun, made: (4,) bool; swings that began, contacts that were made at this very tick.
-        lead: (4,) s; how far the last swing has come before its planned time.
-        pace: (4,) how fast swings go on relative to the plan; to be set by whoever wants them to end earlier.
+        begun, made: Each (4,) bool; swings that began and contacts that were made at this tick.
+        lead: (4,) s; how far the last swing is ahead of the plan.
+        pace: (4,) speed of the swings relative to the plan. A corrector may set it to end swings earlier.
         loose: (4,) bool; limbs that should be in contact but are measured to bear next to nothing.
-        current: by limb, the swing under way or the last one; None before the first.
+        current: By limb, the swing under way or the last one; None before the first.
     """
 
-    def __init__(
-        self,
-        reference: Reference,
-        limbs: tuple[Limb, ...],
-        weight: float,
-        max_normal_force: np.ndarray,
-    ):
-        """Start in the planned contacts.
-
-        Args:
-            reference: the plan.
-            limbs: those the robot has.
-            weight: N; of the robot.
-            max_normal_force: (4,) N.
-        """
+    def __init__(self, reference: Reference, limbs: tuple[Limb, ...], weight: float, max_normal_force: np.ndarray):
+        """Start in the planned contacts; the robot's weight and the largest normal forces (4,) are in N."""
         self._cap = np.minimum(2.5 * weight, max_normal_force)
         self._pending = {limb: [swing for swing in reference.swings if swing.limb == limb] for limb in limbs}
         self.current: dict[Limb, Swing | None] = dict.fromkeys(limbs)
@@ -80,13 +67,7 @@ class ContactTracker:
         self.loose = np.zeros(4, bool)
 
     def update(self, time: float, period: float, normal_force: np.ndarray) -> None:
-        """Advance to a tick.
-
-        Args:
-            time: s.
-            period: s since the last tick.
-            normal_force: (4,) N measured along each patch's normal.
-        """
+        """Advance to a time in s, a period in s after the last tick; the forces (4,) in N are along the normals."""
         self.begun[:] = False
         self.made[:] = False
         for limb in self.state:
@@ -106,7 +87,7 @@ class ContactTracker:
             self._bound(limb, time)
 
     def _advance(self, limb: Limb, swing: Swing, time: float, period: float, force: float) -> None:
-        """Follow one limb through its swing; its time runs ahead by its lead."""
+        """Follow one limb through its swing; the given time includes its lead."""
         over = time >= swing.end - 1e-9
         if swing.contact is None:
             if over:
@@ -133,7 +114,7 @@ class ContactTracker:
         return LATE_FOOT_SPEED if limb.is_foot else PALM_SPEED
 
     def _bound(self, limb: Limb, time: float) -> None:
-        """Range of the normal force."""
+        """Set the range of the normal force."""
         if not self.in_contact[limb]:
             self.min_force[limb] = self.max_force[limb] = 0.0
             return

@@ -1,4 +1,4 @@
-"""A check has three values and starts as not checked."""
+"""Check: a measured value, its limit and the result."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class Check:
     """One measured value held against its limit.
 
     Attributes:
-        name: what is measured, e.g. `slip`.
-        value: measured value; inf or NaN where undefined, None where not measured.
-        limit: the value may not exceed it.
-        unit: SI unit, "" for counts and flags.
+        name: What is measured, e.g. `slip`.
+        limit: The value may not exceed it.
+        unit: SI unit; "" for counts and flags.
+        value: The measured value; inf or NaN where undefined, None where not measured.
     """
 
     name: str

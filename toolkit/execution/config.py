@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from toolkit.control.config import ControllerConfig
 from toolkit.errors import InputError
 from toolkit.execution.disturbance import Disturbance
-from toolkit.replanning.config import ReplanConfig
 
 
 @dataclass(frozen=True)
@@ -15,19 +13,19 @@ class ExecutionConfig:
     """The simulated run.
 
     Attributes:
-        timestep: s; of the physics.
-        control_decimation: physics steps per control tick.
-        slip_limit, com_rms_limit: m; of the verdict.
-        controller, replanning, disturbance: see the classes.
+        timestep: Step of the physics in s.
+        control_decimation: Physics steps per control tick.
+        slip_limit, com_rms_limit: Limits of the verdict in m.
+        replanning: Whether the motion is optimised again during the run.
+        disturbance: Differences between the simulation and the plan.
     """
 
     timestep: float = 0.002
     control_decimation: int = 1
     slip_limit: float = 0.02
     com_rms_limit: float = 0.02
-    controller: ControllerConfig = field(default_factory=ControllerConfig)
-    replanning: ReplanConfig = field(default_factory=ReplanConfig)
-    disturbance: Disturbance = field(default_factory=Disturbance)
+    replanning: bool = True
+    disturbance: Disturbance = Disturbance()
 
     def __post_init__(self):
         if not self.timestep > 0.0:

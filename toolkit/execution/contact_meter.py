@@ -1,4 +1,4 @@
-"""ContactMeter: what MuJoCo's contacts say about a robot in a scene."""
+"""ContactMeter: the contact forces between a robot and the world, and its unplanned contacts."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ class ContactMeter:
     """Reads contact forces after a physics step; they belong to the state before it.
 
     Attributes:
-        wrench: (4, 6) N and N m; contact force and moment about each patch's centre, world frame, of the last step.
-        normal_force: (4,) N; its part along the patch's z axis.
-        expected: (4,) bool; limbs whose patch may touch now, to be set by whoever knows the plan; all at first.
-        unplanned: (robot geom, world geom) pairs that touched outside the expected patches, since the start.
-        unplanned_time: s; when the first of them happened, None before.
-        trunk_touched: name of a trunk geom that touched the world, "" if none did.
-        friction_mismatches: contacts whose friction was not the world geom's, since the start.
+        wrench: (4, 6) N and N m; force and moment about each patch's centre in the last step, world frame.
+        normal_force: (4,) N; the part of the force along the patch's z axis.
+        expected: (4,) bool; limbs whose patch may touch now. All may at first; the run sets it from the plan.
+        unplanned: The (robot geom, world geom) pairs that have touched outside the expected patches.
+        unplanned_time: Time of the first of them in s; None before.
+        trunk_touched: Name of a trunk geom that touched the world; "" if none did.
+        friction_mismatches: Number of contacts so far whose friction was not the world geom's.
     """
 
     def __init__(self, index: SceneIndex):

@@ -1,4 +1,4 @@
-"""What may differ between the simulation and the controller's idea of it."""
+"""Differences between the simulation and what the controller knows of it."""
 
 from __future__ import annotations
 
@@ -14,20 +14,17 @@ from toolkit.errors import InputError
 class Disturbance:
     """Differences between the simulated world and the plan; all zero by default.
 
-    A pushed run cannot be replayed from its controls alone: the push acts beside them (`replayable`).
-
     Attributes:
-        push: N; horizontal force at the base.
-        push_duration: s.
-        push_time: s; NaN draws a time uniformly over the plan.
-        push_direction: rad; heading of the push in the world; NaN draws one uniformly.
-        mass_error: relative; masses and inertias of the robot are multiplied by 1 + it.
-        friction_error: relative; of every contact between robot and world.
-        terrain_offset: m; each static geom of the world is moved by up to this much along its own z axis...
-        terrain_tilt: rad; ... and turned by up to this much about a random horizontal axis.
-        state_noise: standard deviation of what the controller is told: m and rad of positions, ten times as many m/s
-            and rad/s of velocities.
-        delay: s; age of the state that the controller is told.
+        push, push_duration: Horizontal force at the base in N, and for how many s it acts.
+        push_time: Time of the push in s; NaN draws a time uniformly over the plan.
+        push_direction: Heading of the push in the world in rad; NaN draws one uniformly.
+        mass_error: Relative error of all masses and inertias of the robot.
+        friction_error: Relative error of every contact between robot and world.
+        terrain_offset: Each static geom of the world is moved by up to this much along its own z axis, in m...
+        terrain_tilt: ... and turned by up to this much about a random horizontal axis, in rad.
+        state_noise: Standard deviation of the state that the controller receives: in m and rad for positions, and ten
+            times the number in m/s and rad/s for velocities.
+        delay: Age in s of the state that the controller receives.
     """
 
     push: float = 0.0
@@ -55,7 +52,7 @@ class Disturbance:
 
     @property
     def replayable(self) -> bool:
-        """Whether the controls alone reproduce the run: nothing else acted on the robot."""
+        """Whether the controls alone reproduce the run. A push acts beside them."""
         return self.push == 0.0
 
     def disturb_model(
@@ -64,10 +61,10 @@ class Disturbance:
         """Change a compiled scene in place.
 
         Args:
-            scene: robot and world.
-            robot_geom: (ngeom,) bool; geoms of the robot.
-            kept: (ngeom,) bool; static geoms that stay where they are: the robot starts on them.
-            rng: draws displacements of the terrain.
+            scene: Robot and world.
+            robot_geom: Which geoms (ngeom,) belong to the robot.
+            kept: Which static geoms (ngeom,) stay where they are because the robot starts on them.
+            rng: Random generator for the displacements of the terrain.
         """
         if self.mass_error:
             bodies = np.unique(scene.geom_bodyid[robot_geom])
@@ -78,7 +75,7 @@ class Disturbance:
         if self.friction_error:
             scene.geom_friction[~robot_geom, 0] *= 1.0 + self.friction_error
         if self.terrain_offset or self.terrain_tilt:
-            # The compiled tree of bounding boxes knows static geoms only where they were.
+            # The compiled tree of bounding boxes holds the old places of the static geoms.
             scene.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
             for geom in np.flatnonzero(~robot_geom & ~kept):
                 self._displace(scene, int(geom), rng)
@@ -95,12 +92,7 @@ class Disturbance:
         mujoco.mju_mulQuat(scene.geom_quat[geom], turn, quaternion)
 
     def draw_push(self, duration: float, rng: np.random.Generator) -> tuple[float, np.ndarray]:
-        """When the push begins, in s, and its (3,) force in N.
-
-        Args:
-            duration: s; of the plan.
-            rng: draws what is not given.
-        """
+        """Begin of the push in s, within the plan's duration in s, and its force (3,) in N."""
         time, heading = rng.uniform(0.0, duration), rng.uniform(0.0, 2.0 * np.pi)
         time = time if np.isnan(self.push_time) else self.push_time
         heading = heading if np.isnan(self.push_direction) else self.push_direction
@@ -108,16 +100,15 @@ class Disturbance:
 
 
 class StateFilter:
-    """What the controller is told of the state: late and noisy."""
+    """Delays states and adds noise to them, as a controller with a tick every `period` s receives them."""
 
     def __init__(self, disturbance: Disturbance, period: float, rng: np.random.Generator):
-        """Prepare for a run with a control tick every `period` s."""
         self._noise, self._rng = disturbance.state_noise, rng
         self._delay = round(disturbance.delay / period)
         self._past: list[tuple[np.ndarray, np.ndarray]] = []
 
     def __call__(self, qpos: np.ndarray, qvel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pass a state in, get what is told: (7 + n,) and (6 + n,)."""
+        """The delayed and noisy state for a true one; (7 + n,) and (6 + n,)."""
         if not self._delay and not self._noise:
             return qpos, qvel
         self._past.append((qpos.copy(), qvel.copy()))

@@ -1,8 +1,6 @@
-"""From a recorded run to an Execution: everything the verdict needs, measured."""
+"""measure: from a recorded run to an Execution with its verdict."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -12,99 +10,78 @@ from toolkit.control.sampled_plan import Reference
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution, Samples
-from toolkit.execution.slip import BEARING_FORCE, CONTACT_GAP, SETTLE_TIME, ContactInterval, contact_intervals
-from toolkit.execution.verdict import Measured, execution_checks, failure_reason
+from toolkit.execution.slip import SETTLE_TIME, ContactInterval, contact_intervals
+from toolkit.execution.verdict import execution_checks, failure_reason
 from toolkit.replanning.replanner import ReplanCounts
-from toolkit.robot.model import RobotModel
 from toolkit.wholebody.plan import WholeBodyPlan
 
 
-@dataclass(frozen=True)
-class RunLog:
-    """What the loop itself knows of a run.
-
-    Attributes:
-        scene: compiled. qpos0, qvel0: initial state. final_qpos, final_qvel: after the last step.
-        final_feet: (2, 3) m; foot patches in the final state.
-        ctrl: (S, nu). tick_seconds: (C,) s. wall_seconds: of the loop.
-        finished: the loop reached its end.
-        solver_failures: ticks.
-        com_aim: (C, 3) m; where the controller wanted the CoM: the plan, as replanned.
-        replanning: as in `Execution`.
-    """
-
-    scene: mujoco.MjModel
-    qpos0: np.ndarray
-    qvel0: np.ndarray
-    final_qpos: np.ndarray
-    final_feet: np.ndarray
-    ctrl: np.ndarray
-    tick_seconds: np.ndarray
-    wall_seconds: float
-    finished: bool
-    solver_failures: int
-    com_aim: np.ndarray
-    replanning: ReplanCounts
-
-
 def measure(
-    log: RunLog,
     recorder: Recorder,
+    controls: Controls,
     reference: Reference,
     plan: WholeBodyPlan,
     config: ExecutionConfig,
+    *,
+    solver_failures: int,
+    wall_seconds: float,
+    replanning: ReplanCounts,
 ) -> Execution:
-    """Measure a run.
+    """The execution with its checks, from a recorded run.
 
     Args:
-        log: what the loop knows.
-        recorder: what was sampled.
-        reference: the plan at the ticks.
-        plan: what was executed.
-        config: settings and limits.
-
-    Returns:
-        The execution with its checks.
+        recorder: What was sampled.
+        controls: What was applied.
+        reference: The plan at the ticks.
+        plan: What was executed.
+        config: Settings and limits.
+        solver_failures: Number of ticks whose QP was not solved.
+        wall_seconds: Duration of the loop in s.
+        replanning: How the run was replanned.
     """
-    robot, goal, count = plan.robot, plan.world.goal, recorder.count
+    robot, goal, scene, count = plan.robot, plan.world.goal, recorder.scene, recorder.count
     times = reference.times[:count]
-    intervals = _intervals(recorder, robot, config)
+    intervals = []
+    for limb, model in sorted(robot.limbs.items()):
+        force, position = recorder.normal_force[:count, limb], recorder.limb_position[:count, limb]
+        rotation = recorder.limb_rotation[:count, limb]
+        intervals += contact_intervals(limb, force, position, rotation, model.half_size, config.control_period)
     slip = _slip_by_stance(intervals, times, reference, len(plan.sequence.stances))
     touchdowns = _touchdowns(intervals, recorder, reference, config)
     missing = sum(swing.contact is not None for swing in reference.swings) - len(touchdowns)
-    error = recorder.com[:count] - log.com_aim
+    error = recorder.com[:count] - recorder.com_aim[:count]
     torque_ratio = (np.abs(recorder.torque[:count]) / robot.torque_limit).max(1)
     joints, speed = recorder.qpos[:count, 7:], np.abs(recorder.qvel[:count, 6:])
     excess = np.maximum(joints - robot.upper, robot.lower - joints).max()
-    feet = log.final_feet.mean(0)[:2]
+    feet = _feet(recorder, controls.final_qpos).mean(0)[:2]
     distance = float(np.hypot(*(feet - goal.position[:2])))
     fell = bool(recorder.fall)
-    measured = Measured(
-        completed=log.finished and not fell,
-        fall_reason=recorder.fall,
-        max_slip=max(slip) if slip else float("inf"),
-        com_rms_error=float(np.sqrt((error**2).sum(1).mean())),
-        max_torque_ratio=float(torque_ratio.max()),
-        max_velocity_ratio=float((speed / robot.velocity_limit).max()),
-        range_excess=float(max(excess, 0.0)),
-        final_goal_distance=distance,
-        goal_radius=goal.radius,
-        unplanned_contacts=len(recorder.meter.unplanned),
-        friction_mismatches=recorder.meter.friction_mismatches,
-        missed_touchdowns=missing,
-    )
-    checks = execution_checks(measured, config)
+    completed = count == len(reference.times) and not fell
+    values = {
+        "upright": float(fell),
+        "completed": float(not completed),
+        "touchdowns": float(missing),
+        "goal_distance": distance,
+        "unplanned_contacts": float(len(recorder.meter.unplanned)),
+        "friction": float(recorder.meter.friction_mismatches),
+        "slip": max(slip) if slip else float("inf"),
+        "com_rms_error": float(np.sqrt((error**2).sum(1).mean())),
+        "torque_ratio": float(torque_ratio.max()),
+        "joint_range": float(max(excess, 0.0)),
+        "velocity_ratio": float((speed / robot.velocity_limit).max()),
+    }
+    checks = execution_checks(values, goal.radius, config)
     when = _failure_time(fell, recorder, slip, times, reference, config)
     reason = failure_reason(checks, recorder.fall)
     transition = None if when is None else plan.schedule.phase_at(when).transition
-    simulated = len(log.ctrl) * config.timestep
-    mass = float(log.scene.body_subtreemass[0])
+    simulated = len(controls.ctrl) * config.timestep
+    mass = float(scene.body_subtreemass[0])
     return Execution(
-        scene=log.scene,
-        controls=Controls(config.timestep, log.qpos0, log.qvel0, log.ctrl, log.final_qpos),
+        scene=scene,
+        controls=controls,
         samples=Samples(
             tick_times=times,
-            tick_seconds=log.tick_seconds,
+            tick_seconds=recorder.tick_seconds[:count],
             qpos=recorder.qpos[:count],
             qvel=recorder.qvel[:count],
             com=recorder.com[:count],
@@ -120,23 +97,23 @@ def measure(
         ),
         touchdowns=touchdowns,
         slip=slip,
-        completed=measured.completed,
+        completed=completed,
         fall=Failure(recorder.fall, float(times[-1])) if fell else None,
         goal_reached=not fell and distance <= goal.radius,
         final_goal_distance=distance,
-        max_slip=measured.max_slip,
+        max_slip=values["slip"],
         max_touchdown_error=max((touchdown["position_error"] for touchdown in touchdowns), default=0.0),
-        max_torque_ratio=measured.max_torque_ratio,
-        max_velocity_ratio=measured.max_velocity_ratio,
-        com_rms_error=measured.com_rms_error,
-        solver_failures=log.solver_failures,
+        max_torque_ratio=values["torque_ratio"],
+        max_velocity_ratio=values["velocity_ratio"],
+        com_rms_error=values["com_rms_error"],
+        solver_failures=solver_failures,
         unplanned_contacts=recorder.meter.unplanned_names,
         simulated_seconds=simulated,
-        real_time_factor=simulated / log.wall_seconds,
+        real_time_factor=simulated / wall_seconds,
         checks=checks,
         replayable=config.disturbance.replayable,
         failure=Failure(reason, when, transition) if reason else None,
-        replanning=log.replanning,
+        replanning=replanning,
     )
 
 
@@ -148,7 +125,7 @@ def _failure_time(
     reference: Reference,
     config: ExecutionConfig,
 ) -> float | None:
-    """When the run went wrong, for whoever plans again: fall, unplanned contact, or the swing of the worst slip."""
+    """Time in s at which the run went wrong: a fall, an unplanned contact, or the swing before the worst slip."""
     if fell:
         return float(times[-1])
     if recorder.meter.unplanned_time is not None:
@@ -159,31 +136,12 @@ def _failure_time(
     return None
 
 
-def _intervals(recorder: Recorder, robot: RobotModel, config: ExecutionConfig) -> list[ContactInterval]:
-    """Contacts of all limbs."""
-    count, period = recorder.count, config.control_period
-    found = []
-    for limb, model in sorted(robot.limbs.items()):
-        found += contact_intervals(
-            limb,
-            recorder.normal_force[:count, limb],
-            recorder.limb_position[:count, limb],
-            recorder.limb_rotation[:count, limb],
-            model.half_size,
-            threshold=BEARING_FORCE,
-            gap=round(CONTACT_GAP / period),
-            settle=round(SETTLE_TIME / period),
-        )
-    return found
-
-
 def _slip_by_stance(
     intervals: list[ContactInterval], times: np.ndarray, reference: Reference, stances: int
 ) -> tuple[float, ...]:
     """Largest slip of the contacts that overlap each stance; stance k ends with transition k's swing.
 
-    A contact that lasts over several stances counts with its whole slip in each of them: never less than what slipped
-    in the stance alone.
+    A contact that lasts over several stances counts with its whole slip in each of them.
     """
     ends = np.full(stances, np.inf)
     for swing in reference.swings:
@@ -227,8 +185,16 @@ def _touchdowns(
 
 
 def _world_wrench(reference: Reference, count: int) -> np.ndarray:
-    """(count, 4, 6) planned wrenches about the patches' centres in the world."""
+    """Planned wrenches (count, 4, 6) about the patches' centres in the world frame."""
     rotation, wrench = reference.limb_rotation[:count], reference.wrench[:count]
     return np.concatenate(
         [np.einsum("klij,klj->kli", rotation, wrench[..., part]) for part in (slice(0, 3), slice(3, 6))], axis=-1
     )
+
+
+def _feet(recorder: Recorder, qpos: np.ndarray) -> np.ndarray:
+    """Positions (2, 3) in m of the foot patches in a state."""
+    data = mujoco.MjData(recorder.scene)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(recorder.scene, data)
+    return np.array([data.site_xpos[site] for limb, site in recorder.index.sites.items() if limb.is_foot])

@@ -1,4 +1,4 @@
-"""Recorder: what happened at each control tick, read from the simulation."""
+"""Recorder: the measurements at each control tick, read from the simulation."""
 
 from __future__ import annotations
 
@@ -11,27 +11,30 @@ from toolkit.execution.slip import BEARING_FORCE
 from toolkit.geometry.pose import quaternion_from_rotation
 from toolkit.robot.model import RobotModel
 
-MAX_TILT = np.radians(60.0)  # rad; of the base, beyond which the robot has fallen
-MIN_HEIGHT = 0.5  # of the home CoM height above the lowest foot, below which the robot has fallen
+MAX_TILT = np.radians(60.0)  # rad; tilt of the base beyond which the robot has fallen
+MIN_HEIGHT = 0.5  # part of the home CoM height above the lowest foot below which the robot has fallen
 
 
 class Recorder:
     """Samples of a run at its control ticks; rows beyond `count` are not filled.
 
     A physics step leaves positions of bodies, contacts and forces of the state before it in the data, beside the new
-    state: so nothing has to be computed again, and reading changes nothing.
+    state. So nothing has to be computed again, and reading changes nothing.
 
     Attributes:
-        count: rows filled.
-        fall: one line once the robot has fallen, "" before.
-        qpos, qvel, com, momentum, wrench, normal_force, cop_margin, limb_position, torque: see `Execution`.
-        limb_rotation: (C, 4, 3, 3) world_from_limb.
+        scene, index, meter: The scene that runs, the robot in it, and its contacts.
+        count: Number of rows that are filled.
+        fall: One line once the robot has fallen; "" before.
+        tick_seconds, qpos, qvel, com, momentum, wrench, cop_margin, torque: See `Samples`.
+        com_aim: (C, 3) m; the CoM that the controller tracked.
+        normal_force, limb_position, limb_rotation: (C, 4) N, (C, 4, 3) m and (C, 4, 3, 3) world_from_limb.
     """
 
     def __init__(self, ticks: int, scene: mujoco.MjModel, robot: RobotModel, index: SceneIndex):
-        self._scene, self._robot, self._index = scene, robot, index
+        self.scene, self.index, self._robot = scene, index, robot
         self.meter = ContactMeter(index)
         self.count, self.fall = 0, ""
+        self.tick_seconds, self.com_aim = np.zeros(ticks), np.zeros((ticks, 3))
         self.qpos, self.qvel = np.zeros((ticks, scene.nq)), np.zeros((ticks, scene.nv))
         self.com, self.momentum = np.zeros((ticks, 3)), np.zeros((ticks, 6))
         self.wrench, self.normal_force = np.zeros((ticks, 4, 6)), np.zeros((ticks, 4))
@@ -40,14 +43,13 @@ class Recorder:
         self.limb_rotation = np.full((ticks, 4, 3, 3), np.nan)
         self.torque = np.zeros((ticks, scene.nu))
         self._mass = float(scene.body_subtreemass[index.base])
-        self._half_size = robot.half_sizes
 
     def record(self, data: mujoco.MjData, qpos: np.ndarray, qvel: np.ndarray) -> None:
-        """Take a sample after the physics step that began in the state (qpos, qvel); contacts must have been read."""
-        k, index, meter = self.count, self._index, self.meter
+        """Take a sample after the physics step that began in the state (qpos, qvel) and whose contacts were read."""
+        k, index, meter = self.count, self.index, self.meter
         self.count += 1
         self.qpos[k], self.qvel[k] = qpos, qvel
-        mujoco.mj_subtreeVel(self._scene, data)
+        mujoco.mj_subtreeVel(self.scene, data)
         self.com[k] = data.subtree_com[index.base]
         self.momentum[k, :3] = self._mass * data.subtree_linvel[index.base]
         self.momentum[k, 3:] = data.subtree_angmom[index.base]
@@ -58,14 +60,14 @@ class Recorder:
             self.limb_position[k, limb], self.limb_rotation[k, limb] = data.site_xpos[site], rotation
             if meter.normal_force[limb] > BEARING_FORCE:
                 moment = meter.wrench[limb, 3:] @ rotation
-                half = self._half_size[limb]
+                half = self._robot.limbs[limb].half_size
                 x, y = -moment[1] / meter.normal_force[limb], moment[0] / meter.normal_force[limb]
                 self.cop_margin[k, limb] = min(half[0] - abs(x), half[1] - abs(y))
         self._judge(data)
 
     def _judge(self, data: mujoco.MjData) -> None:
-        """See whether the robot has fallen."""
-        index, k = self._index, self.count - 1
+        """Note whether the robot has fallen."""
+        index, k = self.index, self.count - 1
         upright = data.xmat[index.base, 8]
         height = self.com[k, 2] - np.nanmin(self.limb_position[k, :2, 2])
         least = MIN_HEIGHT * self._robot.com_height
@@ -80,9 +82,9 @@ class Recorder:
 
     @property
     def limb_pose(self) -> np.ndarray:
-        """(count, 4, 7) positions and quaternions wxyz, NaN for limbs that the robot has not."""
+        """Positions and quaternions wxyz (count, 4, 7); NaN for limbs that the robot does not have."""
         pose = np.full((self.count, 4, 7), np.nan)
-        for limb in self._index.limbs():
+        for limb in self.index.sites:
             pose[:, limb, :3] = self.limb_position[: self.count, limb]
             pose[:, limb, 3:] = [quaternion_from_rotation(each) for each in self.limb_rotation[: self.count, limb]]
         return pose

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -14,28 +13,17 @@ from toolkit.execution.result import Controls
 _NAMES = ("timestep", "qpos0", "qvel0", "ctrl", "qpos")
 
 
-@dataclass(frozen=True)
-class Replay:
-    """A replayed run.
+def replay(scene_path: Path | str, execution_path: Path | str) -> float:
+    """Largest absolute difference of the final qpos to the recorded one when only the controls of a run act.
 
-    Attributes:
-        qpos: (nq,) after the last step.
-        difference: largest absolute difference to the recorded final state; 0 where the controls tell the whole story.
-    """
-
-    qpos: np.ndarray
-    difference: float
-
-
-def replay(scene_path: Path | str, execution_path: Path | str) -> Replay:
-    """Replay a saved run: nothing acts but its controls.
+    It is 0 unless something else acted on the robot.
 
     Args:
-        scene_path: scene.mjb.
-        execution_path: execution.npz with `timestep`, `qpos0`, `qvel0`, `ctrl` and `qpos` (its last row counts).
+        scene_path: The run's scene.mjb.
+        execution_path: Its execution.npz with `timestep`, `qpos0`, `qvel0`, `ctrl` and `qpos` (its last row counts).
 
     Raises:
-        InputError: a file is missing or is not what its name says.
+        InputError: A file is missing or is not what its name says.
     """
     for path in (scene_path, execution_path):
         if not Path(path).is_file():
@@ -54,7 +42,7 @@ def replay(scene_path: Path | str, execution_path: Path | str) -> Replay:
     if scene.opt.timestep != float(timestep):
         raise InputError(f"{scene_path}: steps of {scene.opt.timestep} s where the run made {float(timestep)} s")
     final = replay_controls(scene, Controls(float(timestep), qpos0, qvel0, ctrl, qpos[-1]))
-    return Replay(final, float(np.abs(final - qpos[-1]).max()))
+    return float(np.abs(final - qpos[-1]).max())
 
 
 def replay_controls(scene: mujoco.MjModel, controls: Controls) -> np.ndarray:

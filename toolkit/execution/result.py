@@ -1,4 +1,4 @@
-"""Execution: what the simulated run recorded and measured."""
+"""Execution: the records and measurements of a simulated run."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Controls:
     """What replays a run of S physics steps in plain MuJoCo, and where it ends.
 
     Attributes:
-        timestep: s, of the physics.
-        qpos0, qvel0: (nq,), (nv,) initial state.
+        timestep: Step of the physics in s.
+        qpos0, qvel0: Initial state (nq,), (nv,).
         ctrl: (S, nu) applied controls, one row per physics step.
         final_qpos: (nq,) after the last step.
     """
@@ -36,16 +36,14 @@ class Samples:
     """What was measured at the C control ticks of a run, beside what was planned.
 
     Attributes:
-        tick_times: (C,) s, when the samples were taken.
-        tick_seconds: (C,) wall-clock of each control tick.
-        qpos: (C, nq); qvel: (C, nv).
-        com: (C, 3) measured; com_planned: (C, 3).
-        momentum: (C, 6) measured linear and angular momentum about the CoM; momentum_planned: (C, 6).
-        wrench: (C, 4, 6) measured contact force and moment about the patch centre, world frame.
-        wrench_planned: (C, 4, 6).
+        tick_times, tick_seconds: Each (C,) s; when the samples were taken, and the wall-clock time of each tick.
+        qpos, qvel: (C, nq) and (C, nv).
+        com, com_planned: Each (C, 3) m.
+        momentum, momentum_planned: Each (C, 6); linear, and angular about the CoM.
+        wrench, wrench_planned: Each (C, 4, 6); contact force and moment about the patch centre, world frame.
         cop_margin: (C, 4) m; distance of the measured CoP to the patch's edge, NaN without contact.
-        limb_pose: (C, 4, 7) measured patch poses.
-        torque: (C, nu) applied; torque_ratio (C,): largest |torque| / limit.
+        limb_pose: (C, 4, 7) measured patch poses, positions and quaternions wxyz.
+        torque, torque_ratio: Applied torques (C, nu) in N m, and the largest |torque| / limit (C,).
     """
 
     tick_times: np.ndarray
@@ -66,24 +64,22 @@ class Samples:
 
 @dataclass(frozen=True)
 class Execution:
-    """A simulated run, all measured in MuJoCo by code apart from the controller.
+    """A simulated run, measured in MuJoCo by code that shares nothing with the controller.
 
     Attributes:
-        scene: the compiled scene that ran (robot + world), as saved in scene.mjb.
-        controls, samples, replanning: see the classes.
-        touchdowns: one dict per transition: `transition`, `limb`, `time`, `planned_time`, `position_error` m.
-        slip: one entry per stance: largest tangential displacement of any patch while it was in contact, m.
-        completed: the plan was run to its end.
+        scene: The compiled scene that ran (robot and world), as saved in scene.mjb.
+        touchdowns: One dict per transition: `transition`, `limb`, `time`, `planned_time`, `position_error` in m.
+        slip: For each stance, the largest tangential displacement of any patch while it was in contact, in m.
+        completed: Whether the plan was run to its end.
         fall: How the robot fell: base too low, tilted, or body contact with the world. None where it did not.
-        solver_failures: control ticks whose QP was not solved.
-        com_rms_error: m; from the plan as replanned: a robot that recovers from a push is not asked to be where it
-            would be without, and a run that nothing disturbs has no other plan than the first one.
-        unplanned_contacts: distinct (robot geom, world geom) names that touched outside the patches.
-        simulated_seconds, real_time_factor: of the whole loop.
-        checks: every check of the verdict that execution decides.
+        solver_failures: Number of control ticks whose QP was not solved.
+        com_rms_error: Distance in m from the plan as replanned, so that a push does not count for ever.
+        unplanned_contacts: Distinct (robot geom, world geom) names that touched outside the patches.
+        simulated_seconds, real_time_factor: Of the whole loop.
+        checks: Every check of the verdict that execution decides.
         failure: The first check that did not pass, or the fall; its time is that of the fall, the first unplanned
             contact or the stance that slipped too far. None where every check passed.
-        replayable: the controls alone reproduce the run; False where it was pushed.
+        replayable: Whether the controls alone reproduce the run; False where it was pushed.
     """
 
     scene: mujoco.MjModel = field(repr=False)
@@ -110,7 +106,7 @@ class Execution:
     replanning: ReplanCounts = ReplanCounts()
 
     def named(self) -> dict[str, Any]:
-        """Everything but the scene by its name, as report.json and execution.npz have it: the groups taken apart."""
+        """Everything but the scene by its name, as report.json and execution.npz have it; groups are unpacked."""
         fall = "" if self.fall is None else self.fall.reason
         when = None if self.failure is None else self.failure.time
         values: dict[str, Any] = {"fell": self.fell, "fall_reason": fall, "failure_time": when}

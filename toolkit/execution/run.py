@@ -1,4 +1,4 @@
-"""execute: carry a plan out in MuJoCo and measure what happened."""
+"""execute: carry a plan out in MuJoCo and measure the run."""
 
 from __future__ import annotations
 
@@ -14,18 +14,17 @@ from toolkit.control.sampled_plan import sample_reference
 from toolkit.errors import ExecutionError
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import StateFilter
-from toolkit.execution.measure import RunLog, measure
+from toolkit.execution.measure import measure
 from toolkit.execution.recorder import Recorder
-from toolkit.execution.result import Execution
+from toolkit.execution.result import Controls, Execution
 from toolkit.execution.scene_index import SceneIndex
-from toolkit.replanning.nominal import Nominal
-from toolkit.replanning.replanner import ReplanCounts, Replanner
+from toolkit.replanning.replanner import MAX_FRICTION, ReplanCounts, Replanner
 from toolkit.wholebody.plan import WholeBodyPlan
 
 Observer = Callable[[float, str], None]
-"""Told of progress: the share of the run that is done, and a word on it."""
+"""Receives progress: the share of the run that is done, and a short text."""
 
-EXTRA_REST = 0.5  # s; on the last stance, beyond the plan's own rest: a robot that topples does so within it
+EXTRA_REST = 0.5  # s; time on the last stance after the plan's own rest, in which an unstable robot would topple
 _DEFAULT = ExecutionConfig()
 
 
@@ -38,23 +37,23 @@ def execute(
 ) -> Execution:
     """Simulate a plan under the controller.
 
-    The robot starts in the trajectory's first state and is driven by joint torques alone, within its limits (but for a
-    push that `config.disturbance` asks for). The run ends `EXTRA_REST` after the plan, or with a fall.
+    The robot starts in the trajectory's first state. Only joint torques within its limits drive it, apart from a push
+    that `config.disturbance` asks for. The run ends `EXTRA_REST` after the plan, or with a fall.
 
     Args:
-        plan: what to do; its robot is the robot as the controller knows it, its scene stays as it is.
-        config: settings.
-        rng: draws disturbances; one with seed 0 where None.
-        observer: told of progress every 0.1 s of simulated time.
+        plan: The plan. Its robot is the robot as the controller knows it, and its scene stays unchanged.
+        config: Settings.
+        rng: Random generator for disturbances; one with seed 0 where None.
+        observer: Receives progress every 0.1 s of simulated time.
 
     Returns:
-        What happened, measured, with the verdict's checks.
+        The measured run with the verdict's checks.
 
     Raises:
-        ExecutionError: the plan's parts do not fit each other or the robot.
+        ExecutionError: The plan's parts do not fit each other or the robot.
     """
     rng = np.random.default_rng(0) if rng is None else rng
-    robot, motion, trajectory = plan.robot, plan.motion, plan.trajectory
+    robot, trajectory = plan.robot, plan.trajectory
     scene = copy.copy(plan.scene)
     scene.opt.timestep = config.timestep
     index = SceneIndex(scene, robot)
@@ -63,30 +62,26 @@ def execute(
     config.disturbance.disturb_model(scene, index.robot_geom, _touched(scene, index, qpos0), rng)
     period = config.control_period
     ticks = int(np.ceil((plan.schedule.duration + EXTRA_REST) / period - 1e-9))
-    reference = sample_reference(
-        period * np.arange(ticks), plan.sequence, plan.schedule, motion, trajectory, plan.paths, robot
-    )
-    margins = motion.solved.margins
-    replanner = None
-    if config.replanning.enabled and margins.friction <= config.replanning.max_friction:
-        nominal = Nominal.of(motion, reference, robot, config.replanning.horizon)
-        replanner = Replanner(reference, nominal, robot, plan.world.surfaces, config.replanning)
-    controller = Controller(robot, reference, margins, period, config.controller, replanner)
+    reference = sample_reference(period * np.arange(ticks), plan)
+    margins, replanner = plan.motion.solved.margins, None
+    if config.replanning and margins.friction <= MAX_FRICTION:
+        replanner = Replanner(reference, plan)
+    controller = Controller(robot, reference, margins, period, replanner)
     recorder = Recorder(ticks, scene, robot, index)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(plan.schedule.duration, rng)
     data = mujoco.MjData(scene)
     data.qpos[:], data.qvel[:] = qpos0, qvel0
     ctrl = np.zeros((ticks * config.control_decimation, scene.nu))
-    tick_seconds, com_aim, step = np.zeros(ticks), np.zeros((ticks, 3)), 0
+    step = 0
     report_every = max(round(0.1 / period), 1)
     qpos, qvel = qpos0.copy(), qvel0.copy()
     started = perf_counter()
     for tick in range(ticks):
         tick_started = perf_counter()
         torque = controller.tick(tick, *told(qpos, qvel), recorder.meter.normal_force)
-        tick_seconds[tick] = perf_counter() - tick_started
-        com_aim[tick] = controller.aim.com
+        recorder.tick_seconds[tick] = perf_counter() - tick_started
+        recorder.com_aim[tick] = controller.aim.com
         recorder.meter.expected[:] = reference.authority[tick] > 0.0
         data.ctrl[:] = torque
         if push.any():
@@ -104,26 +99,20 @@ def execute(
             break
         if observer is not None and tick % report_every == 0:
             observer(tick / ticks, f"{reference.times[tick]:.1f} s")
-    wall = perf_counter() - started
-    log = RunLog(
-        scene=scene,
-        qpos0=qpos0,
-        qvel0=qvel0,
-        final_qpos=qpos,
-        final_feet=_feet(scene, index, qpos),
-        ctrl=ctrl[:step],
-        tick_seconds=tick_seconds[: recorder.count],
-        wall_seconds=wall,
-        finished=recorder.count == ticks and not recorder.fall,
+    return measure(
+        recorder,
+        Controls(config.timestep, qpos0, qvel0, ctrl[:step], qpos),
+        reference,
+        plan,
+        config,
         solver_failures=controller.failures,
-        com_aim=com_aim[: recorder.count],
+        wall_seconds=perf_counter() - started,
         replanning=replanner.counts if replanner else ReplanCounts(),
     )
-    return measure(log, recorder, reference, plan, config)
 
 
 def _check_plan(plan: WholeBodyPlan) -> None:
-    """Refuse plans whose parts do not belong together."""
+    """Refuse a plan whose parts do not belong together."""
     robot, schedule, motion, trajectory = plan.robot, plan.schedule, plan.motion, plan.trajectory
     count = len(robot.joint_names)
     if trajectory.qpos.shape[1] != 7 + count or trajectory.qvel.shape[1] != 6 + count:
@@ -142,7 +131,7 @@ def _check_plan(plan: WholeBodyPlan) -> None:
 
 
 def _touched(scene: mujoco.MjModel, index: SceneIndex, qpos: np.ndarray) -> np.ndarray:
-    """(ngeom,) bool; static geoms within 2 cm of the robot in a state."""
+    """Which static geoms (ngeom,) are within 2 cm of the robot's patches in a state."""
     data = mujoco.MjData(scene)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(scene, data)
@@ -151,11 +140,3 @@ def _touched(scene: mujoco.MjModel, index: SceneIndex, qpos: np.ndarray) -> np.n
         for geom in np.flatnonzero(~index.robot_geom):
             near[geom] |= mujoco.mj_geomDistance(scene, data, int(patch), int(geom), 0.02, None) < 0.02
     return near
-
-
-def _feet(scene: mujoco.MjModel, index: SceneIndex, qpos: np.ndarray) -> np.ndarray:
-    """(2, 3) m; positions of the foot patches in a state."""
-    data = mujoco.MjData(scene)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(scene, data)
-    return np.array([data.site_xpos[site] for limb, site in index.sites.items() if limb.is_foot])

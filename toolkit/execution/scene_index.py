@@ -1,4 +1,4 @@
-"""SceneIndex: where a robot's parts are in a compiled scene."""
+"""SceneIndex: the addresses of a robot's parts in a compiled scene."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import mujoco
 import numpy as np
 
 from toolkit.errors import ExecutionError
-from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 
-PATCH_TOLERANCE = 5e-3  # m; a geom whose lowest point is that near to the patch's plane belongs to the patch
+PATCH_TOLERANCE = 5e-3  # m; a geom belongs to the patch if its lowest point is that near to the patch's plane
 
 
 class SceneIndex:
-    """Addresses of a robot in a compiled scene, with the scene's conventions asserted.
+    """Addresses of a robot in a compiled scene, whose conventions are checked.
 
     Attributes:
-        base: body id. sites: limb -> site id.
-        robot_geom: (ngeom,) bool; belongs to the robot. Every other geom belongs to the static world.
-        patch_limb: (ngeom,) int; limb whose patch the geom forms, -1 otherwise.
-        trunk_geom: (ngeom,) bool; on no arm or leg of the robot: touching the world with it is a fall.
+        base: Body id.
+        sites: Site id by limb, in the limbs' order.
+        robot_geom: (ngeom,) bool; geoms of the robot. All others belong to the static world.
+        patch_limb: (ngeom,) int; the limb whose patch the geom forms, or -1.
+        trunk_geom: (ngeom,) bool; geoms on no arm or leg of the robot. To touch the world with one is a fall.
     """
 
     def __init__(self, scene: mujoco.MjModel, robot: RobotModel):
@@ -29,11 +29,11 @@ class SceneIndex:
             ExecutionError: the scene's degrees of freedom are not the robot's, in the robot's order.
         """
         self.scene = scene
-        count = len(robot.joint_names)
-        if (scene.nq, scene.nv, scene.nu) != (7 + count, 6 + count, count):
+        joints = len(robot.joint_names)
+        if (scene.nq, scene.nv, scene.nu) != (7 + joints, 6 + joints, joints):
             raise ExecutionError(
                 f"the scene has nq, nv, nu = {scene.nq}, {scene.nv}, {scene.nu} where robot {robot.name} alone has "
-                f"{7 + count}, {6 + count}, {count}; compose it from a static world and this robot"
+                f"{7 + joints}, {6 + joints}, {joints}; compose it from a static world and this robot"
             )
         for index, name in enumerate(robot.joint_names):
             joint = _find(scene, mujoco.mjtObj.mjOBJ_JOINT, name, "joint")
@@ -50,24 +50,21 @@ class SceneIndex:
         self.patch_limb = np.full(scene.ngeom, -1)
         data = mujoco.MjData(scene)
         mujoco.mj_kinematics(scene, data)
-        limb_body = np.zeros(scene.nbody, bool)
+        count = np.zeros(scene.nbody, int)
         for limb, site in self.sites.items():
             body = int(scene.site_bodyid[site])
             for geom in np.flatnonzero(scene.body_weldid[scene.geom_bodyid] == scene.body_weldid[body]):
                 if abs(_lowest(scene, data, int(geom), site)) < PATCH_TOLERANCE:
                     self.patch_limb[geom] = limb
             while body != self.base:
-                limb_body[body] = True
+                count[body] += 1
                 body = int(scene.body_parentid[body])
-        # Wrists, fingers and toes: whatever hangs on an arm or a leg.
+        limb_body = count > 0
+        # Wrists, fingers and toes hang on an arm or a leg.
         for body in range(1, scene.nbody):
             limb_body[body] |= limb_body[scene.body_parentid[body]]
-        # Of the bodies between the base and a limb those that two limbs share are trunk.
-        self.trunk_geom = self.robot_geom & ~(limb_body & ~_shared(scene, self.sites, self.base))[scene.geom_bodyid]
-
-    def limbs(self) -> tuple[Limb, ...]:
-        """The robot's limbs, in order."""
-        return tuple(self.sites)
+        # Bodies between the base and a limb are trunk where two limbs share them.
+        self.trunk_geom = self.robot_geom & ~(limb_body & (count < 2))[scene.geom_bodyid]
 
     def geom_name(self, geom: int) -> str:
         """Name of a geom, or its body and number where it has none."""
@@ -84,17 +81,6 @@ def _find(scene: mujoco.MjModel, kind: mujoco.mjtObj, name: str, word: str) -> i
     if found < 0:
         raise ExecutionError(f"the scene has no {word} `{name}`; compose it from the world and the robot to be run")
     return found
-
-
-def _shared(scene: mujoco.MjModel, sites: dict[Limb, int], base: int) -> np.ndarray:
-    """(nbody,) bool; bodies that lie on the way to more than one limb."""
-    count = np.zeros(scene.nbody, int)
-    for site in sites.values():
-        body = int(scene.site_bodyid[site])
-        while body != base:
-            count[body] += 1
-            body = int(scene.body_parentid[body])
-    return count > 1
 
 
 def _lowest(scene: mujoco.MjModel, data: mujoco.MjData, geom: int, site: int) -> float:

@@ -1,4 +1,4 @@
-"""Contacts of a run and how far their patches slipped, from recorded forces and poses alone."""
+"""The contacts of a run and how far their patches slipped, from recorded forces and poses alone."""
 
 from __future__ import annotations
 
@@ -8,19 +8,17 @@ import numpy as np
 
 from toolkit.geometry.limb import Limb
 
-BEARING_FORCE = 20.0  # N; a patch that carries more is in contact: less is the noise of a touch
+BEARING_FORCE = 20.0  # N; a patch that carries more is in contact; less is a mere touch
 CONTACT_GAP = 0.03  # s; shorter interruptions do not end a contact: soles chatter
-SETTLE_TIME = 0.02  # s; from touchdown to the pose that slip is counted from: the impact belongs to the touchdown error
+SETTLE_TIME = 0.02  # s; from touchdown to the pose that slip is counted from, because the impact moves the patch
 
 
 @dataclass(frozen=True)
 class ContactInterval:
-    """A patch bore force from one sample to another.
+    """A contact of a limb, with its first and last sample.
 
     Attributes:
-        limb: which.
-        first, last: samples, both included.
-        slip: m; largest tangential displacement of any corner of the patch from its pose once settled.
+        slip: Largest tangential displacement of any corner of the patch from its settled pose, in m.
     """
 
     limb: Limb
@@ -35,31 +33,24 @@ def contact_intervals(
     position: np.ndarray,
     rotation: np.ndarray,
     half_size: np.ndarray,
-    *,
-    threshold: float,
-    gap: int,
-    settle: int,
+    period: float,
 ) -> list[ContactInterval]:
-    """Contacts of one limb.
+    """Contacts of one limb, in order of time.
 
-    A contact begins with the first sample above `threshold` and ends with the last before at least `gap` samples below
-    it. Slip is counted from the pose `settle` samples after its beginning (the impact of touchdown belongs to the
-    touchdown error) to its very end, and for the whole of contacts that are shorter.
+    A contact lasts while the force is above `BEARING_FORCE`, interruptions of up to `CONTACT_GAP` included. Slip is
+    counted from the pose `SETTLE_TIME` after its begin (the impact belongs to the touchdown error) to its end, and for
+    the whole of contacts that are shorter.
 
     Args:
-        limb: which.
-        normal_force: (C,) N.
-        position: (C, 3) m.
-        rotation: (C, 3, 3) world_from_patch.
-        half_size: (2,) m.
-        threshold: N.
-        gap: samples.
-        settle: samples.
-
-    Returns:
-        Contacts in order of time.
+        limb: The limb.
+        normal_force: Forces (C,) in N.
+        position: Centres (C, 3) of the patch in m.
+        rotation: Rotations (C, 3, 3), world_from_patch.
+        half_size: Half extents (2,) of the patch in m.
+        period: Time between samples in s.
     """
-    loaded = np.flatnonzero(normal_force > threshold)
+    gap, settle = round(CONTACT_GAP / period), round(SETTLE_TIME / period)
+    loaded = np.flatnonzero(normal_force > BEARING_FORCE)
     if not len(loaded):
         return []
     breaks = np.flatnonzero(np.diff(loaded) > gap)

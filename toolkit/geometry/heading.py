@@ -16,13 +16,9 @@ def mean_heading(one, other):
 
 
 def joint_heading(one: np.ndarray, other: np.ndarray) -> tuple[float, float]:
-    """The sum (x, y) of the unit vectors along the headings of two frames, whose direction is their mean heading.
+    """The sum (x, y) of the unit vectors along the headings of two frames (3, 3); it points along the mean heading.
 
-    In plain floats, which is several times faster than by way of angles: it is needed for every query.
-
-    Args:
-        one: (3, 3); world_from_foot.
-        other: (3, 3).
+    Plain floats are several times faster here than angles, and predictions need it for every query.
     """
     x = y = 0.0
     for rotation in (one, other):

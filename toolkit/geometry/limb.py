@@ -1,4 +1,4 @@
-"""The contact limbs of a humanoid: the one table of them, from which everything else about limbs is derived."""
+"""The contact limbs of a humanoid: the table from which everything else about limbs is derived."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ class Limb(IntEnum):
     Each row of the table holds the number, the side and the kind. Feet come first, as the contacts of every stance do.
 
     Attributes:
-        is_left: whether the limb is on the left.
-        is_foot: whether the limb is a foot; the others are palms.
+        is_left: Whether the limb is on the left.
+        is_foot: Whether the limb is a foot; the others are palms.
     """
 
     is_left: bool

@@ -1,4 +1,4 @@
-"""Rigid transforms, spelled so that neighbours cancel: `world_from_foot @ point_in_foot`."""
+"""Rigid transforms, named so that neighbouring frames cancel: `world_from_foot @ point_in_foot`."""
 
 from __future__ import annotations
 
@@ -11,14 +11,7 @@ from toolkit.geometry.heading import mean_heading
 
 
 def rotation_from_quaternion(quaternion_wxyz: np.ndarray) -> np.ndarray:
-    """Rotation matrices of unit quaternions.
-
-    Args:
-        quaternion_wxyz: (..., 4) float, scalar first (MuJoCo's order); normalised here.
-
-    Returns:
-        (..., 3, 3) float rotation matrices.
-    """
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4), scalar first, which are normalised here."""
     q = np.asarray(quaternion_wxyz, float)
     w, x, y, z = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
     rows = [
@@ -30,14 +23,7 @@ def rotation_from_quaternion(quaternion_wxyz: np.ndarray) -> np.ndarray:
 
 
 def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternion, scalar first and not negative, of one rotation matrix.
-
-    Args:
-        rotation: (3, 3) float.
-
-    Returns:
-        (4,) float wxyz.
-    """
+    """Unit quaternion (4,), scalar first and not negative, of one rotation matrix (3, 3)."""
     r = np.asarray(rotation, float)
     # Bar-Itzhack: the dominant eigenvector of a symmetric 4 x 4 matrix; accurate near every singular case.
     k = np.array(
@@ -91,19 +77,14 @@ def yaw_of(rotation: np.ndarray) -> np.ndarray | float:
 
 
 def steepness(normal_z: np.ndarray | float) -> np.ndarray:
-    """Rise over run (...,) of surfaces whose unit normals have the heights (...,): what resting takes of friction."""
+    """Rise over run (...,) of surfaces with the z entries (...,) of their unit normals: friction that resting needs."""
     return np.tan(np.arccos(np.clip(normal_z, 1e-6, 1.0)))
 
 
 def rotation_on_surface(normal: np.ndarray, yaw: np.ndarray | float) -> np.ndarray:
-    """Frames with z along a surface normal and x along a heading projected on the surface.
+    """Rotations (..., 3, 3), world_from_contact, with z along a surface's normal and x along a heading projected on it.
 
-    Args:
-        normal: (..., 3) float unit normals in the world, not horizontal.
-        yaw: (...,) float heading in rad.
-
-    Returns:
-        (..., 3, 3) float world_from_contact rotations.
+    The unit normals (..., 3) in the world must not be horizontal; the headings (...,) are in rad.
     """
     normal = np.asarray(normal, float)
     heading = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(np.asarray(yaw, float))], -1)

@@ -1,1 +1,1 @@
-"""Learning what the centroidal optimiser says: data sets, collection, training, evaluation."""
+"""Learning to predict the centroidal optimiser: data sets, collection, training, evaluation."""

@@ -1,4 +1,4 @@
-"""Filling a data set with shards: in parallel, by any executor, and on from where an earlier run was stopped."""
+"""Filling a data set with shards: in parallel, by any executor, continuing where an earlier run stopped."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ Counts = Counter[tuple[Category, bool]]
 
 @dataclass(frozen=True)
 class Collected:
-    """How far a collection is.
+    """State of a collection.
 
     Attributes:
-        shards: number of shards in the data set.
-        labelled: number of transitions in the data set.
-        resumed: number of those that were there before.
-        feasible: number of those that are feasible.
-        fewest: number of transitions of the rarest category.
-        seconds: wall-clock time of this call.
+        shards: Number of shards in the data set.
+        labelled: Number of transitions in the data set.
+        resumed: Number of transitions that were there before this call.
+        feasible: Number of feasible transitions in the data set.
+        fewest: Number of transitions of the rarest category.
+        seconds: Wall-clock time of this call.
     """
 
     shards: int
@@ -43,19 +43,9 @@ class Collected:
     fewest: int
     seconds: float
 
-    @property
-    def feasible_share(self) -> float:
-        """Share of all transitions that are feasible."""
-        return self.feasible / max(self.labelled, 1)
-
-    @property
-    def rate(self) -> float:
-        """New transitions per second."""
-        return (self.labelled - self.resumed) / max(self.seconds, 1e-9)
-
 
 def _job(config: CollectConfig, index: int, folder: str) -> Counts:
-    """Make and write a shard where it runs; what it counts."""
+    """Make and write a shard; returns its counts."""
     samples = collect_shard(config, index)
     write_shard(Path(folder), index, samples)
     return _count(samples)
@@ -70,29 +60,29 @@ def collect(
     *,
     ahead: int = 16,
 ) -> Collected:
-    """Fill a data set, going on where an earlier call ended or was killed.
+    """Fill a data set, continuing where an earlier call ended or was killed.
 
     Args:
-        folder: the data set, seen under the same path by every worker.
-        robot: the robot that `config.robot` names.
-        config: what to collect.
-        executor: where shards are made, through the `concurrent.futures` interface.
-        progress: is told how far it is.
-        ahead: shards handed to the executor at a time.
-
-    Returns:
-        How far it came.
+        folder: The data set; every worker must see it under the same path.
+        robot: The robot that `config.robot` names.
+        config: What to collect.
+        executor: Where shards are made.
+        progress: Is called with the state after every shard.
+        ahead: Number of shards that wait in the executor at a time.
 
     Raises:
-        DatasetError: the folder holds something else, or data of other settings or of another robot.
+        DatasetError: The folder holds something else, or data of other settings or of another robot.
     """
     began = time.perf_counter()
-    begin(folder, _manifest(robot, config))
+    # A larger collection of the same kind continues the same data set.
+    settings = plain_settings(config, "robot", "robots", "seed", "samples_per_category")
+    versions = {name: metadata.version(name) for name in PACKAGES}
+    begin(folder, Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, versions))
     counts, missing = Counts(), []
     for index in range(config.shards):
         path = shard_path(folder, index)
         if path.is_file():
-            counts += _count(read_shard(path))  # a broken one is refused by name, not kept in silence
+            counts += _count(read_shard(path))  # raises an error if the shard is broken
         else:
             missing.append(index)
     resumed, done = counts.total(), config.shards - len(missing)
@@ -120,10 +110,3 @@ def _count(samples: dict[Category, Samples]) -> Counts:
         feasible = int(group.feasible.sum())
         counts[category, True], counts[category, False] = feasible, len(group) - feasible
     return counts
-
-
-def _manifest(robot: RobotModel, config: CollectConfig) -> Manifest:
-    """What a collection asks for: a larger one of the same kind goes on with the same data set."""
-    settings = plain_settings(config, "robot", "robots", "seed", "samples_per_category")
-    versions = {name: metadata.version(name) for name in PACKAGES}
-    return Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, versions)

@@ -10,35 +10,37 @@ class CollectConfig:
     """What to collect.
 
     Attributes:
-        robot: name of the robot.
-        robots: folder that holds it, None for the default one.
-        seed: seed of every random draw.
-        samples_per_category: fewest samples of each category.
-        per_shard: fewest samples of each category in a shard.
-        slope_share: share of `per_shard` that is collected on slopes besides.
-        default_share: share of terrains with the paper's timing (1 s + 1 s), friction (0.5) and tiles; the others draw
-            all three.
-        shift, swing: s, ranges that timings are drawn from (uniformly in their logarithm), one for each transition;
-        slope_shift, slope_swing: the same on slopes.
-        friction: range of the coefficient, drawn for each state.
-        tilt: deg, and
-        rise: m; ranges from which the largest tilt and height of the tiles of a terrain are drawn.
-        two_walls: share of terrains with walls on both sides.
-        considered: number of transitions of a state that are labelled, and
-        children: number of those from which the search goes on.
-        expansions: number of states expanded on a terrain; slope_expansions: the same on a slope.
-        infeasible: wanted share of the label "infeasible" in every category and kind of ground.
-        com_spread: (3,) m; velocity_spread: (3,) m/s; standard deviations of a disturbance of the initial state in the
-            frame of the feet, before it is scaled.
-        far: range of the scale of large disturbances, of which there are as many as give the share `infeasible`.
-        near: share of small disturbances, scaled by a number drawn from [0, 1], among the other states.
-        run_share: share of the states on slopes that are replaced by a running one.
-        run_speed: m/s, range of its speed; run_spread: (3,) m; how far the CoM may lie from over the mean of the feet.
-        objective_limit: feasible transitions with a larger objective are left out, as in the original, whose limit of
-            50,000 is 35 to 1,000 times its mean objectives;
-        default_limit: the same with the paper's timing, where objectives are a tenth of the original's;
-        disturbed_limit: the same where a resting robot's state was disturbed by much: what can just be recovered, at
-            any price, is of no use to a planner.
+        robot: Name of the robot.
+        robots: Folder that holds the robot, None for the default one.
+        seed: Seed of every random draw.
+        samples_per_category: Least number of samples of each category.
+        per_shard: Least number of samples of each category in a shard.
+        slope_share: Number of samples that are added on slopes, as a share of `per_shard`.
+        default_share: Share of terrains with the paper's timing (1 s + 1 s), friction (0.5) and tiles. The other
+            terrains draw all three.
+        shift, swing: Ranges of the times of each transition, in s, drawn uniformly in their logarithm.
+        slope_shift, slope_swing: The same on slopes.
+        friction: Range of the coefficient, which is drawn for each state.
+        tilt: Range of the largest tilt of a terrain's tiles, in deg.
+        rise: Range of the largest height of a terrain's tiles, in m.
+        two_walls: Share of terrains with walls on both sides.
+        considered: Number of transitions of a state that are labelled.
+        children: Number of labelled transitions from which the search continues.
+        expansions: Number of states that are expanded on a terrain.
+        slope_expansions: The same on a slope.
+        infeasible: Wanted share of infeasible transitions in every category and on every kind of ground.
+        com_spread: (3,) Standard deviation of a disturbance of the initial CoM in the frame of the feet, in m. Each
+            disturbance is scaled by a random factor.
+        velocity_spread: (3,) The same of the CoM velocity, in m/s.
+        far: Range of the factor of large disturbances. Their number is controlled to reach the share `infeasible`.
+        near: Share of small disturbances, with a factor from [0, 1], among the other states.
+        run_share: Share of the states on slopes that are replaced by a running state.
+        run_speed: Range of the speed of a running state, in m/s.
+        run_spread: (3,) Largest distance of a running CoM from its place above the mean of the feet, in m.
+        objective_limit: Feasible transitions with a larger objective are left out. The limit of the original, 50,000,
+            is 35 to 1,000 times its mean objectives.
+        default_limit: The same with the paper's timing, where objectives are a tenth of the original's.
+        disturbed_limit: The same after a large disturbance. A planner has no use for states that can just be recovered.
     """
 
     robot: str
@@ -76,8 +78,3 @@ class CollectConfig:
     def shards(self) -> int:
         """Number of shards."""
         return -(-self.samples_per_category // self.per_shard)
-
-    @property
-    def per_slope(self) -> int:
-        """Steps on slopes in a shard, at least."""
-        return round(self.slope_share * self.per_shard)

@@ -4,8 +4,7 @@
     DIR/shard-000000.npz   per category c: features_c (n, d) float32, feasible_c (n,) bool, targets_c (n, 7) float32,
                            sensitivity_c (n, k) float32
 
-Shard i depends on the manifest and on i alone. So a collection that was killed goes on with the shards that are
-missing, and nothing is lost or doubled.
+Shard i depends only on the manifest and on i. So a collection that was killed continues with the missing shards.
 """
 
 from __future__ import annotations
@@ -31,14 +30,15 @@ PARTS = ("features", "feasible", "targets", "sensitivity")
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a data set was asked for.
+    """Description of a data set.
 
     Attributes:
-        schema: version of the files' layout.
-        robot: name of the robot; fingerprint: of its dynamics.
-        seed: seed of all shards.
-        settings: settings of the collection, as plain values.
-        versions: versions of the libraries at the start.
+        schema: Version of the layout of the files.
+        robot: Name of the robot.
+        fingerprint: Fingerprint of the robot's dynamics.
+        seed: Seed of all shards.
+        settings: Settings of the collection, as plain values.
+        versions: Versions of the libraries at the start.
     """
 
     schema: str
@@ -59,7 +59,7 @@ def read_manifest(folder: Path) -> Manifest:
     """Manifest of a data set.
 
     Raises:
-        DatasetError: there is none, or it cannot be read.
+        DatasetError: There is none, or it cannot be read.
     """
     path = folder / "manifest.json"
     if not path.is_file():
@@ -76,7 +76,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def plain_settings(config: Any, *without: str) -> dict:
-    """Fields of a configuration, but for some, as plain values that come back from a manifest unchanged."""
+    """Fields of a configuration except some, as plain values that a manifest can store and return unchanged."""
     fields = {name: value for name, value in asdict(config).items() if name not in without}
     return {name: list(value) if isinstance(value, tuple) else value for name, value in fields.items()}
 
@@ -85,7 +85,7 @@ def begin(folder: Path, wanted: Manifest) -> None:
     """Make the folder of a data set with its manifest, or check the manifest that is there.
 
     Raises:
-        DatasetError: the folder holds something else, or data of other settings or of another robot.
+        DatasetError: The folder holds something else, or data of other settings or of another robot.
     """
     if (folder / "manifest.json").is_file():
         found = read_manifest(folder)
@@ -103,14 +103,10 @@ def begin(folder: Path, wanted: Manifest) -> None:
 
 
 def shards_of(folder: Path, fingerprint: str) -> list[Path]:
-    """Files of the shards of a data set, in order.
-
-    Args:
-        folder: the data set.
-        fingerprint: of the robot that it must belong to.
+    """Files of the shards of a data set, in order; it must belong to the robot with this fingerprint.
 
     Raises:
-        DatasetError: no data set, another robot's, or one without shards.
+        DatasetError: There is no data set, it belongs to another robot, or it has no shards.
     """
     manifest = read_manifest(folder)
     if manifest.fingerprint != fingerprint:
@@ -150,7 +146,7 @@ def read_shard(path: Path) -> dict[Category, Samples]:
     """Samples of one shard by category.
 
     Raises:
-        DatasetError: the file is truncated, or its arrays do not fit.
+        DatasetError: The file is truncated, or its arrays do not fit.
     """
     remedy = "delete it and run the collection again to refill it"
     try:
@@ -186,16 +182,16 @@ def read_dataset(folder: Path, fingerprint: str, *, limit: int | None = None) ->
 def read_datasets(folders: list[Path], fingerprint: str, *, limit: int | None = None) -> dict[Category, Samples]:
     """All samples of data sets by category, in the order of the shards' numbers.
 
-    So a shard and the variations of its transitions (`learning.enrich`) come together, and what training holds out,
-    the last ones, has no variations among the others.
+    So the variations of a shard (`learning.enrich`) follow it. Training holds out the last samples, and these have no
+    variations among the others.
 
     Args:
-        folders: the data sets.
-        fingerprint: of the robot that they must belong to.
-        limit: at most so many samples per category.
+        folders: The data sets.
+        fingerprint: Fingerprint of the robot that the data sets must belong to.
+        limit: Largest number of samples per category.
 
     Raises:
-        DatasetError: another robot's data, no shards, or a broken one.
+        DatasetError: The data belong to another robot, there are no shards, or a shard is broken.
     """
     paths = [path for folder in folders for path in shards_of(folder, fingerprint)]
     groups: dict[Category, list[Samples]] = {}

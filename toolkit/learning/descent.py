@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import torch
 from torch import nn
 
 from toolkit.learning.layers import linear_layers
+from toolkit.learning.tasks import Classification, Regression
 
 WEIGHT_DECAY = 1e-4
-HELD_OUT = 0.05  # share of the samples that watch for early stopping: the last ones, which come from other terrain
-COARSE = 0.8  # share of the epochs that compute in bfloat16, twice as fast on processors that have it
+HELD_OUT = 0.05  # share of the samples that decide on early stopping: the last ones, which come from other terrain
+COARSE = 0.8  # share of the epochs that compute in bfloat16, which is twice as fast on processors that have it
 
 
 @dataclass(frozen=True)
@@ -22,15 +22,14 @@ class FitConfig:
     """Settings of the training.
 
     Attributes:
-        epochs: most passes over the data for the regressor; the learning rate falls to zero over them.
-        classifier_share: the same for the classifier, as a part of `epochs`: it learns faster.
-        batch: number of samples per gradient step.
-        learning_rate: peak of the one-cycle schedule.
-        sensitivity_weight: weight of the loss of the objective's derivatives, where samples have them: their mean,
-            scaled by the features' spreads, see `learning.tangent`. They tell as much as many more labels.
-        patience: epochs without a better validation loss before stopping.
-        device: torch's name of where to compute.
-        seed: seed of the initial weights and the shuffling.
+        epochs: Largest number of passes over the data; the learning rate falls to zero over them.
+        classifier_share: The share of `epochs` for the classifier, which learns faster.
+        batch: Number of samples per gradient step.
+        learning_rate: Peak of the one-cycle schedule.
+        sensitivity_weight: Weight of the loss of the objective's derivatives, see `tasks.Regression`.
+        patience: Number of epochs without a better validation loss before training stops.
+        device: The device that torch computes on.
+        seed: Seed of the initial weights and of the shuffling.
     """
 
     epochs: int = 120
@@ -52,26 +51,8 @@ class Curve:
     best: int
 
 
-class Task(Protocol):
-    """What a network learns from numbered samples.
-
-    Attributes:
-        share: (n,) share of the epochs that each sample takes part in.
-    """
-
-    share: torch.Tensor
-
-    def loss(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
-        """What training lowers."""
-        ...
-
-    def error(self, net: nn.Sequential, rows: torch.Tensor) -> torch.Tensor:
-        """What is watched on samples that were held out."""
-        ...
-
-
 def _optimisers(net: nn.Sequential, config: FitConfig, orthogonal: bool) -> list[torch.optim.Optimizer]:
-    """AdamW; Muon for the matrices of all layers but the last where that is asked for."""
+    """AdamW; where `orthogonal`, Muon for the matrices of all layers but the last."""
     hidden = [layer.weight for layer in linear_layers(net)[:-1]] if orthogonal else []
     others = [part for part in net.parameters() if not any(part is weight for weight in hidden)]
     rate, decay = config.learning_rate, WEIGHT_DECAY
@@ -82,7 +63,7 @@ def _optimisers(net: nn.Sequential, config: FitConfig, orthogonal: bool) -> list
 
 
 def draw(share: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
-    """Rows in random order, each with its share as probability; the sum of the shares, rounded down, or one more."""
+    """Random rows in random order, each with its share as probability; their number varies by one at most."""
     order = torch.randperm(len(share), generator=generator, device=share.device)
     wheel = share[order].cumsum(0) + torch.rand(1, generator=generator, device=share.device, dtype=share.dtype)
     return order[wheel.floor() > (wheel - share[order]).floor()]
@@ -90,7 +71,7 @@ def draw(share: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
 
 def descend(
     net: nn.Sequential,
-    task: Task,
+    task: Classification | Regression,
     config: FitConfig,
     progress: Callable[[int, float, float], None],
     *,
@@ -99,14 +80,11 @@ def descend(
     """Train in place with early stopping; the weights of the best epoch are kept.
 
     Args:
-        net: the network; on the processor and in evaluation mode afterwards.
-        task: what it learns.
-        config: settings.
-        progress: is told epoch, training loss and validation loss.
-        orthogonal: whether the hidden layers are trained with Muon, which needs fewer steps; else by AdamW.
-
-    Returns:
-        The learning curve.
+        net: The network. It is on the CPU and in evaluation mode afterwards.
+        task: What the network learns.
+        config: Settings.
+        progress: Is called with the epoch, the training loss and the validation loss.
+        orthogonal: Whether Muon trains the hidden layers, which needs fewer steps than AdamW.
     """
     samples = len(task.share)
     device = torch.device(config.device)

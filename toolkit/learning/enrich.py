@@ -1,14 +1,13 @@
-"""More samples of what is rare and costly: transitions put together from those of a data set, displaced and labelled.
+"""More samples of rare and costly transitions, made of those of a data set, displaced and labelled.
 
-What nearly fails costs a hundred times more than what a planner mostly meets. So it decides how far off predictions are
-on average, and it is rare. A data set is enriched by transitions made of its own, the costly ones most often:
+Transitions that nearly fail cost a hundred times more than most. They are rare, but they decide the mean error of
+predictions. So a data set is enriched by transitions that are made of its own, mostly of costly ones:
 
-- variations keep near a stored transition: its new contact is another's, contacts and state are displaced a little;
-- combinations take feet and state from any category, palms from the category itself. Where feet may stand is what
-  decides how far a network's errors on new terrain exceed those on what it has seen. Most of what is put together so
-  is infeasible or cheap; networks that were trained already tell which part is worth a label.
+- Variations stay near a stored transition. They take the new contact of another one and displace all parts a little.
+- Combinations take feet and state from any category and palms from the category itself, since errors on new terrain
+  depend on where feet may stand. Most of them are infeasible or cheap, so trained networks choose which to label.
 
-Both serve to learn from, never to test on.
+Both serve for training, never for tests.
 """
 
 from __future__ import annotations
@@ -45,20 +44,21 @@ from toolkit.prediction.network import TransitionNetwork, load_network, network_
 from toolkit.robot.model import RobotModel
 
 LIMIT = 5e3  # transitions with a larger objective are left out
-COSTLY = 0.7  # what is labelled is drawn in proportion to its objective to this power
-_CANDIDATES = 12  # combinations put together for each that is labelled
+COSTLY = 0.7  # transitions are chosen in proportion to their objective to this power
+_CANDIDATES = 12  # combinations that are made for each one that is labelled
 
 
 @dataclass(frozen=True)
 class EnrichConfig:
-    """What is made of a data set.
+    """What to make of a data set.
 
     Attributes:
-        robot: name of the robot; robots: folder that holds it.
-        seed: seed of every random draw.
-        categories: numbers of the categories.
-        draws: number of transitions that are labelled for each category and shard.
-        networks: folder of networks that choose among combinations; None for variations.
+        robot: Name of the robot.
+        robots: Folder that holds the robot.
+        seed: Seed of every random draw.
+        categories: Numbers of the categories.
+        draws: Number of transitions that are labelled for each category and shard.
+        networks: Folder of networks that choose among combinations; None for variations.
     """
 
     robot: str
@@ -71,15 +71,15 @@ class EnrichConfig:
 
 @dataclass(frozen=True)
 class Displacement:
-    """How far transitions lie from those that they are made of.
+    """How far new transitions lie from those that they are made of.
 
     Attributes:
-        power: transitions lend their parts in proportion to their objective to this power.
-        exchange: share of parts that come from another transition.
-        foot: standard deviations of a foot's displacement, m and rad.
-        palm: the same of a palm.
-        com: standard deviation of the CoM's displacement, m.
-        velocity: the same of its velocity, m/s.
+        power: Transitions are used in proportion to their objective to this power.
+        exchange: Share of parts that come from another transition.
+        foot: Standard deviations of a foot's displacement, in m and rad.
+        palm: Standard deviations of a palm's displacement, in m and rad.
+        com: Standard deviation of the CoM's displacement, in m.
+        velocity: Standard deviation of the change of the CoM velocity, in m/s.
     """
 
     power: float
@@ -96,17 +96,11 @@ COMBINED = Displacement(power=0.35, exchange=0.4, foot=(0.02, 0.08), palm=(0.05,
 
 @dataclass(frozen=True)
 class _Lenders:
-    """Transitions of one category that lend their parts.
-
-    Attributes:
-        contacts: (n, k, 3, 3) place, x and z axis of each contact.
-        state: (n, 2, 3) CoM and velocity.
-        chance: (n,) how likely each is drawn; the sum is one.
-    """
+    """Transitions whose parts are used: contacts (n, k, 3, 3) by place, x and z axis; CoM and velocity (n, 2, 3)."""
 
     contacts: np.ndarray
     state: np.ndarray
-    chance: np.ndarray
+    chance: np.ndarray  # (n,) probability of each
 
     @classmethod
     def of(cls, category: Category, samples: Samples, power: float) -> _Lenders:
@@ -132,7 +126,7 @@ class _Lenders:
 def varied(
     category: Category, samples: Samples, count: int, rng: np.random.Generator, how: Displacement = VARIED
 ) -> np.ndarray:
-    """(count, d) features of variations of samples of a category; no rows where none is feasible."""
+    """(count, d) features of variations of a category's samples; no rows where no sample is feasible."""
     own = _Lenders.of(category, samples, how.power)
     if not len(own):
         return np.zeros((0, feature_size(category)))
@@ -151,20 +145,17 @@ def combined(
     rng: np.random.Generator,
     how: Displacement = COMBINED,
 ) -> np.ndarray:
-    """Features of transitions put together from parts of those of all categories.
+    """(count, d) features of transitions that combine parts of all categories' transitions.
 
-    Feet and state come from any category, each as often, half of them mirrored; palms and new contacts come from the
-    category itself. Tiles are tilted each by itself, so feet may be turned as others are, each by itself.
+    Feet and state come from all categories alike, and half of them are mirrored; palms and new contacts come from the
+    category itself. Tiles are tilted independently, so each foot may take the rotation of another transition's foot.
 
     Args:
-        category: category of the result.
-        shard: labelled transitions by category.
-        count: number of transitions.
-        rng: source of every random draw.
-        how: how far they lie from their parts.
-
-    Returns:
-        (count, d) features; no rows where the shard has no feasible transition of the category.
+        category: Category of the result. There are no rows where the shard has no feasible transition of it.
+        shard: Labelled transitions by category.
+        count: Number of transitions.
+        rng: Source of every random draw.
+        how: How far the result lies from its parts.
     """
     lenders = {other: _Lenders.of(other, samples, how.power) for other, samples in shard.items()}
     lenders = {other: group for other, group in lenders.items() if len(group)}
@@ -221,7 +212,7 @@ def _displaced(
 
 
 def chosen(features: np.ndarray, network: TransitionNetwork, count: int, rng: np.random.Generator) -> np.ndarray:
-    """At most `count` of the features (n, d) that a network calls feasible, the costlier the likelier."""
+    """At most `count` of the features (n, d) that a network calls feasible; costly ones are more likely."""
     features = features[network.feasible(features)]
     objective = network.predict(features)[:, 0].astype(float)
     features, objective = features[objective <= LIMIT], objective[objective <= LIMIT]
@@ -231,7 +222,7 @@ def chosen(features: np.ndarray, network: TransitionNetwork, count: int, rng: np
 
 
 def labelled(robot: RobotModel, category: Category, features: np.ndarray) -> Samples:
-    """Samples of transitions with features (n, d): the feasible ones whose objective is not above the limit."""
+    """Samples of the transitions with features (n, d) that are feasible and whose objective is within the limit."""
     parts, mirrored = [no_samples(category)], not performs(robot, category)
     for row in features:
         stance, com, velocity, transition = decode(row, category, mirrored=mirrored)
@@ -242,7 +233,7 @@ def labelled(robot: RobotModel, category: Category, features: np.ndarray) -> Sam
 
 
 def _job(source: Path, folder: Path, config: EnrichConfig) -> int:
-    """Write what is made of one shard; the number of its transitions."""
+    """Enrich one shard and write the result; returns the number of its transitions."""
     index = shard_index(source)
     robot, shard = robot_of(config.robot, config.robots), read_shard(source)
     found = {}
@@ -268,22 +259,19 @@ def enrich(
     executor: Executor,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> int:
-    """Write a data set of what is made of another one; goes on where it was stopped, shard by shard.
+    """Write a new data set that is made of another one; returns the number of transitions that this call added.
 
     Args:
-        source: the data set that lends its transitions.
-        folder: the new one, or one begun with the same configuration.
-        robot: the robot that both are for.
-        config: what is made.
-        executor: where shards are worked on.
-        progress: is told how many shards of how many are done.
-
-    Returns:
-        Number of transitions that this call added.
+        source: The data set whose transitions are used.
+        folder: The new data set. One that was begun with the same configuration is continued.
+        robot: The robot of both data sets.
+        config: What to make.
+        executor: Where shards are made.
+        progress: Is called with the number of shards that are done, and the number of all shards.
 
     Raises:
-        DatasetError: another robot's data, no shards, a broken one, or a folder with something else in it.
-        NetworkError: a network that should choose is missing or another robot's.
+        DatasetError: The source is broken, has no shards or another robot, or the folder holds something else.
+        NetworkError: A network that should choose is missing or belongs to another robot.
     """
     paths, lent = shards_of(source, robot.fingerprint), read_manifest(source)
     how = plain_settings(VARIED if config.networks is None else COMBINED)

@@ -1,4 +1,4 @@
-"""How well the networks predict the optimiser, on transitions that they have not seen (paper, Fig. 8)."""
+"""How well the networks predict the optimiser on transitions that they have not seen (paper, Fig. 8)."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ class Score:
     """One row of the table.
 
     Attributes:
-        samples: transitions tested.
-        feasible_share: of them that are feasible.
-        accuracy: share whose feasibility is predicted right.
-        mean_objective: of the feasible ones.
-        objective_error: mean absolute error.
-        com_error: mean distance between predicted and optimised final CoM, m.
-        velocity_error: the same for the final CoM velocity, m/s.
+        samples: Number of test transitions.
+        feasible_share: Share of them that are feasible.
+        accuracy: Share of them whose feasibility is predicted correctly.
+        mean_objective: Mean objective of the feasible ones.
+        objective_error: Mean absolute error of the objective.
+        com_error: Mean distance between the predicted and the optimised final CoM, in m.
+        velocity_error: The same for the final CoM velocity, in m/s.
     """
 
     samples: int
@@ -41,10 +41,10 @@ class Score:
 
 
 def score(network: TransitionNetwork, samples: Samples) -> Score:
-    """Score a network; the regressor is judged on the transitions that are feasible.
+    """Score a network; the regressor is tested on the feasible transitions.
 
     Raises:
-        DatasetError: none of the samples is feasible.
+        DatasetError: None of the samples is feasible.
     """
     if not samples.feasible.any():
         raise DatasetError(f"category {int(network.category)}: no feasible transition to test on; collect more")
@@ -61,25 +61,22 @@ def score(network: TransitionNetwork, samples: Samples) -> Score:
     )
 
 
-def balanced(samples: Samples, count: int, rng: np.random.Generator, *, least_share: float = 0.25) -> Samples:
-    """A test set of `count` transitions in which neither label falls under `least_share`.
-
-    Takes the samples as they come and replaces only as many of the commoner label as it must.
-    """
+def balanced(samples: Samples, count: int, rng: np.random.Generator) -> Samples:
+    """A random test set of `count` transitions; the rarer label is raised to a share of 25 % where it has less."""
     order = rng.permutation(len(samples))
     labels = samples.feasible[order]
     head = labels[:count]
-    least = int(np.ceil(least_share * count))
+    least = int(np.ceil(0.25 * count))
     wanted = int(np.clip(head.sum(), least, count - least))
     return samples.select(np.concatenate([order[labels][:wanted], order[~labels][: count - wanted]]))
 
 
-def query_seconds(network: TransitionNetwork, batch: int, *, repeats: int = 200) -> float:
-    """Median seconds of judging a batch: feasibility, objective and CoM state of every transition in it."""
+def query_seconds(network: TransitionNetwork, batch: int) -> float:
+    """Median time in s to predict the feasibility, objective and CoM state of a batch of transitions."""
     features = np.random.default_rng(0).uniform(network.lower, network.upper, (batch, len(network.lower)))
     features = features.astype(np.float32)
     times = []
-    for _ in range(repeats):
+    for _ in range(200):
         start = time.perf_counter()
         network.feasible(features)
         network.predict(features)

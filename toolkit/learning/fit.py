@@ -31,35 +31,35 @@ from toolkit.prediction.network import (
     training_summary,
 )
 
-MINIMUM = 50  # fewest samples with each label
-OBJECTIVE_LIMIT = 5e4  # transitions with a larger objective do not teach the regressor
+MINIMUM = 50  # least number of samples with each label
+OBJECTIVE_LIMIT = 5e4  # the regressor does not learn from transitions with a larger objective
 
 Progress = Callable[[str, int, float, float], None]
-_SILENT: Progress = lambda name, epoch, training, validation: None  # noqa: E731
+"""Is called with "classifier" or "regressor", the epoch, the training loss and the validation loss."""
 
 
 @dataclass(frozen=True)
 class TrainedNetworks:
-    """A classifier and a regressor, and how they learnt."""
+    """A classifier and a regressor, and their learning curves."""
 
     classifier: Perceptron
     regressor: Perceptron
     curves: dict[str, Curve]
 
     def feasible(self, features: np.ndarray) -> np.ndarray:
-        """(n,) bool for features (n, d)."""
+        """(n,) bool; whether the transitions with features (n, d) are feasible."""
         return feasibility(self.classifier, features)
 
     def predict(self, features: np.ndarray) -> np.ndarray:
-        """(n, 7) objective, CoM and velocity for features (n, d)."""
+        """(n, 7) objective, CoM (m) and CoM velocity (m/s) of the transitions with features (n, d)."""
         return outcome(self.regressor, features)
 
 
 def check_device(device: str) -> None:
-    """Make sure that torch computes on a device.
+    """Make sure that torch can compute on a device.
 
     Raises:
-        InputError: it does not.
+        InputError: It cannot.
     """
     try:
         torch.zeros(1, device=device)
@@ -71,23 +71,24 @@ def check_device(device: str) -> None:
 def train_networks(
     samples: Samples,
     config: FitConfig,
-    progress: Progress = _SILENT,
+    progress: Progress = lambda *state: None,
     *,
     classifier: Perceptron | None = None,
     start: Perceptron | None = None,
 ) -> TrainedNetworks:
     """Train both networks on samples, in any encoding whose last columns are those of `features.encode`.
 
-    The classifier minimises the logistic loss, the regressor the smooth L1 loss of its scaled outputs: the
-    compressed objective, not centred, as in the original; way of the CoM and velocity z-scored. Where samples say how
-    their objective changes, the regressor learns that too (Sobolev training; only in the encoding of `features`).
+    The classifier minimises the logistic loss, the regressor the smooth L1 loss of its scaled outputs. These are the
+    compressed objective, not centred, as in the original, and the z-scored displacement and velocity of the CoM. Where
+    samples have derivatives of their objective, the regressor learns these too (Sobolev training). They help as much as
+    many more labels, but are known only in the encoding of `features`.
 
     Args:
-        samples: labelled transitions of one category.
-        config: settings.
-        progress: called with ("classifier" or "regressor", epoch, training loss, validation loss).
-        classifier: kept as it is where given; only the regressor is trained.
-        start: regressor to go on from; None: from random weights.
+        samples: Labelled transitions of one category.
+        config: Settings.
+        progress: See `Progress`.
+        classifier: A classifier that is kept, so that only the regressor is trained.
+        start: The regressor whose training continues; None for random weights.
     """
     torch.manual_seed(config.seed)
 
@@ -114,7 +115,7 @@ def train_networks(
     targets[:, 1:4] -= features[kept, COM]
     out_mean = np.concatenate([[0.0], targets[:, 1:].mean(0)])
     scaling = Scaling(mean, std, out_mean, np.maximum(targets.std(0), 1e-4))
-    per_target = (OBJECTIVE_SCALE + samples.targets[kept, :1]) * scaling.out_std[0]  # of the compressed objective
+    per_target = (OBJECTIVE_SCALE + samples.targets[kept, :1]) * scaling.out_std[0]  # d objective / d scaled output
     regressor = perceptron(size, TARGETS)
     if start is not None:
         scaling.unfold(start, regressor)
@@ -139,28 +140,28 @@ def fit_category(
     fingerprint: str,
     folder: Path,
     config: FitConfig,
-    progress: Progress = _SILENT,
+    progress: Progress = lambda *state: None,
     keep_classifier: bool = False,
     refine: bool = False,
 ) -> dict[str, Curve]:
     """Train both networks of a category and write its file.
 
     Args:
-        category: which one.
-        samples: labelled transitions.
-        fingerprint: fingerprint of the robot.
-        folder: where `category_<i>.safetensors` goes.
-        config: settings.
-        progress: called with ("classifier" or "regressor", epoch, training loss, validation loss).
-        keep_classifier: whether the classifier of the file that is there stays, and only the regressor is trained.
-        refine: the same, and training goes on from the regressor of that file.
+        category: The category.
+        samples: Labelled transitions of the category.
+        fingerprint: Fingerprint of the robot.
+        folder: Folder of the file `category_<i>.safetensors`.
+        config: Settings.
+        progress: See `Progress`.
+        keep_classifier: Whether to keep the classifier of the existing file and train only the regressor.
+        refine: Whether to do the same and to continue the training of the file's regressor.
 
     Returns:
         Learning curves by network.
 
     Raises:
-        DatasetError: too few samples of a label.
-        NetworkError: the file that should be there is missing or does not fit.
+        DatasetError: There are too few samples of a label.
+        NetworkError: The existing file is wanted, but is missing or does not fit.
     """
     feasible = int(samples.feasible.sum())
     if min(feasible, len(samples) - feasible) < MINIMUM:
@@ -193,11 +194,11 @@ def fit_category(
 
 
 def _summary(samples: Samples, config: FitConfig, curves: dict[str, Curve], before: dict) -> dict:
-    """What a file says of its training; what it says of a network that was kept comes from `before`."""
-
-    def losses(values: np.ndarray) -> list[float]:
-        return [float(f"{value:.3g}") for value in values]
-
+    """Summary of the training for the network file; `before` is the summary of a network that was kept."""
+    losses = {
+        name: [[float(f"{value:.3g}") for value in values] for values in (curve.training, curve.validation)]
+        for name, curve in curves.items()
+    }
     return {
         "samples": len(samples),
         "feasible": int(samples.feasible.sum()),
@@ -207,14 +208,13 @@ def _summary(samples: Samples, config: FitConfig, curves: dict[str, Curve], befo
         "epochs": before.get("epochs", {}) | {name: len(curve.training) for name, curve in curves.items()},
         "validation_loss": before.get("validation_loss", {})
         | {name: float(curve.validation.min()) for name, curve in curves.items()},
-        "curves": before.get("curves", {})
-        | {name: [losses(curve.training), losses(curve.validation)] for name, curve in curves.items()},
+        "curves": before.get("curves", {}) | losses,
         "torch": torch.__version__,
     }
 
 
 def is_trained(category: Category, folder: Path, fingerprint: str, config: FitConfig, samples: int) -> bool:
-    """Whether a folder holds networks of a category, trained with these settings on as many samples."""
+    """Whether a folder holds networks of a category that were trained with these settings on as many samples."""
     try:
         summary = training_summary(load_network(network_path(folder, category), category, fingerprint))
     except NetworkError:
@@ -223,10 +223,10 @@ def is_trained(category: Category, folder: Path, fingerprint: str, config: FitCo
 
 
 def saved_curves(folder: Path, fingerprint: str) -> dict[Category, dict]:
-    """Learning curves of the networks in a folder, also of those that were trained before."""
+    """Learning curves of all networks in a folder."""
     found = {}
     for category in Category:
-        with suppress(NetworkError):  # none, of another robot, or older than this format
+        with suppress(NetworkError):  # there is none, or it belongs to another robot or has an older format
             network = load_network(network_path(folder, category), category, fingerprint)
             found[category] = training_summary(network)["curves"]
     return found

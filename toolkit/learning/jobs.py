@@ -1,4 +1,4 @@
-"""Work in parallel: where jobs run, and how their results are taken."""
+"""Jobs in parallel: where they run, and how their results are taken."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def executor(workers: int, cluster: str | None = None) -> Iterator[Executor]:
     """Local processes, or the workers of a dask cluster.
 
     Args:
-        workers: number of local processes.
-        cluster: address of the cluster's scheduler; None for local processes.
+        workers: Number of local processes.
+        cluster: Address of the cluster's scheduler, None for local processes.
 
     Raises:
-        InputError: dask is not installed, or the cluster does not answer.
+        InputError: Dask is not installed, or the cluster does not answer.
     """
     if cluster is None:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
@@ -48,14 +48,14 @@ def run_jobs(
     *,
     ahead: int | None = None,
 ) -> None:
-    """Run jobs and take their results as they come, in any order; where something fails, what still waits is dropped.
+    """Run jobs and take their results as they come, in any order. After an error, the jobs that wait are cancelled.
 
     Args:
-        pool: where they run, through the `concurrent.futures` interface.
-        work: what a job does.
-        arguments: the arguments of each job.
-        take: is told each result, in this process.
-        ahead: jobs handed to the pool at a time; None for all.
+        pool: Where the jobs run.
+        work: The function that every job calls.
+        arguments: The arguments of each job.
+        take: Is called with each result in this process.
+        ahead: Number of jobs that wait in the pool at a time, None for all.
     """
     left = list(arguments)[::-1]
     waiting: set[Future[Result]] = set()

@@ -1,4 +1,4 @@
-"""Labels in bulk: what `OptimiserEvaluator` says of transitions, for less than half of its time."""
+"""Labels in bulk: the judgement of `OptimiserEvaluator` in less than half of its time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from toolkit.centroidal import fast
 from toolkit.centroidal.arrays import ProblemArrays
-from toolkit.centroidal.build import ProblemConfig, transition_problem
+from toolkit.centroidal.build import transition_problem
 from toolkit.centroidal.residual import evaluate
 from toolkit.contacts.category import category_of
 from toolkit.contacts.sequence import ContactTransition
@@ -23,44 +23,38 @@ from toolkit.robot.model import RobotModel
 
 @dataclass(frozen=True)
 class Labels(TransitionBatch):
-    """What the optimiser says of n transitions, and how its objective changes.
+    """The optimiser's judgement of n transitions, and the derivatives of its objective.
 
     Attributes:
-        sensitivity: n derivatives of the objective in the world; None where infeasible, or where the CoM had to be
-            moved to where it is within reach: what was solved is not quite what is asked for.
+        sensitivity: The n derivatives in the world. One is None where the transition is infeasible, or where the CoM
+            had to be moved within reach, so that a slightly different problem was solved.
     """
 
     sensitivity: tuple[fast.Sensitivity | None, ...]
 
 
 def label(
-    robot: RobotModel,
-    stance: Stance,
-    com: np.ndarray,
-    com_velocity: np.ndarray,
-    transitions: list[ContactTransition],
-    config: ProblemConfig | None = None,
+    robot: RobotModel, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
 ) -> Labels:
-    """Solve every transition; each "feasible" is confirmed by the compiled residual check.
+    """Solve n transitions out of a stance; the compiled residual check confirms each that is feasible.
 
     Args:
-        robot: the robot.
-        stance: the parent's.
-        com: (n, 3) m, initial CoM of each transition, world.
-        com_velocity: (n, 3) m/s.
-        transitions: n out of the stance.
-        config: of the problems.
+        robot: The robot.
+        stance: The stance before the transitions.
+        com: (n, 3) Initial CoM of each transition in the world, in m.
+        com_velocity: (n, 3) Initial CoM velocities in m/s.
+        transitions: The transitions.
 
     Returns:
-        As `OptimiserEvaluator.evaluate`: infinite objective where infeasible.
+        The labels; the objective is infinite where a transition is infeasible.
     """
     n = len(transitions)
     feasible, objective = np.zeros(n, bool), np.full(n, np.inf)
     final_com, velocity = np.array(com, float), np.zeros((n, 3))
     sensitivity: list[fast.Sensitivity | None] = [None] * n
-    start = within_reach(robot, stance, com, config)
+    start = within_reach(robot, stance, com)
     for row, transition in enumerate(transitions):
-        problem = transition_problem(robot, stance, start[row], com_velocity[row], transition, config=config)
+        problem = transition_problem(robot, stance, start[row], com_velocity[row], transition)
         found = fast.sensitive_wrenches(problem)
         if found is None:
             continue
@@ -77,15 +71,7 @@ def label(
 def samples_of(
     stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition], labels: Labels
 ) -> Samples:
-    """Labelled transitions of ONE category by the same limb, as a data set stores them.
-
-    Args:
-        stance: the parent's.
-        com: (n, 3) m, initial CoM of each transition, world.
-        com_velocity: (n, 3) m/s.
-        transitions: n out of the stance.
-        labels: of them.
-    """
+    """Labelled transitions of ONE category by the same limb, as a data set stores them; see `label` for arguments."""
     n, category = len(transitions), category_of(stance, transitions[0])
     frame, features = encode(stance, com, com_velocity, transitions)
     good = labels.feasible

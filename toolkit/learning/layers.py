@@ -1,4 +1,4 @@
-"""Perceptrons in torch: made, differentiated, and turned into the networks of `prediction` and back."""
+"""Perceptrons in torch: their layers, their gradient, and their exchange with the networks of `prediction`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from toolkit.prediction.network import HIDDEN, LAYERS, Perceptron
 
 
 def perceptron(inputs: int, outputs: int) -> nn.Sequential:
-    """Linear layers of the widths that networks have, ReLU units between them."""
+    """Linear layers with ReLU units between them, in the widths of `prediction.network`."""
     widths = [inputs, *[HIDDEN] * (LAYERS - 1), outputs]
     layers: list[nn.Module] = []
     for first, second in zip(widths[:-1], widths[1:], strict=True):
@@ -26,10 +26,9 @@ def linear_layers(net: nn.Sequential) -> list[nn.Linear]:
 
 
 def with_gradient(net: nn.Sequential, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Outputs (n, k) of a perceptron with ReLU units, and the gradient (n, d) of the first one in the inputs.
+    """Outputs (n, k) of a perceptron, and the gradient (n, d) of the first output in the inputs (n, d).
 
-    The gradient is a product of the layers' weights with the units that are on, so that a loss of it can be
-    differentiated like any other.
+    The gradient is computed from the weights and the active units, so that a loss of it can be differentiated.
     """
     linear = linear_layers(net)
     x, active = inputs, []
@@ -47,8 +46,8 @@ class Scaling:
     """How inputs and outputs are z-scored.
 
     Attributes:
-        mean, std: (d,) of the inputs.
-        out_mean, out_std: (k,) of the outputs.
+        mean, std: (d,) Mean and standard deviation of the inputs.
+        out_mean, out_std: (k,) Mean and standard deviation of the outputs.
     """
 
     mean: np.ndarray
@@ -57,7 +56,7 @@ class Scaling:
     out_std: np.ndarray
 
     def fold(self, net: nn.Sequential) -> Perceptron:
-        """The layers with both z-scorings folded in."""
+        """The network with the scaling of inputs and outputs folded into its layers."""
         linear = linear_layers(net)
         weights = [layer.weight.detach().double().numpy().T for layer in linear]
         biases = [layer.bias.detach().double().numpy() for layer in linear]
@@ -71,7 +70,7 @@ class Scaling:
         )
 
     def unfold(self, start: Perceptron, net: nn.Sequential) -> None:
-        """Give the layers the values of a trained network: `fold` the other way round."""
+        """Give the layers the values of a trained network: the inverse of `fold`."""
         weights = [weight.astype(np.float64) for weight in start.weights]
         biases = [bias.astype(np.float64) for bias in start.biases]
         biases[0] += self.mean @ weights[0]

@@ -1,8 +1,7 @@
-"""What a shard still wants: samples of every category, and the right share of infeasible ones."""
+"""Samples that a shard still needs: enough of every category, with the right share of infeasible ones."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from enum import Enum, auto
 
 import numpy as np
@@ -12,73 +11,57 @@ from toolkit.learning.samples import Samples, join, no_samples
 
 
 class Ground(Enum):
-    """Ground that transitions are collected on: the paper's tiles and timing, any tilts and timings, a slope."""
+    """Ground for collections: the paper's tiles and timing, tiles with random tilts and timings, or a slope."""
 
     DEFAULT = auto()
     VARIED = auto()
     SLOPE = auto()
 
 
-@dataclass
 class Quota:
-    """Samples of one shard as they come in.
+    """Samples of one shard as they come in; `wanted` of each of the `categories`."""
 
-    Attributes:
-        wanted: number of samples wanted of each category.
-        categories: categories that the robot can perform.
-        found: the samples by category, group by group.
-        counts: their numbers.
-    """
-
-    wanted: int
-    categories: list[Category]
-    found: dict[Category, list[Samples]] = field(default_factory=dict)
-    counts: dict[Category, int] = field(default_factory=dict)
-
-    def __post_init__(self):
-        for category in self.categories:
-            self.found[category], self.counts[category] = [no_samples(category)], 0
+    def __init__(self, wanted: int, categories: list[Category]):
+        self.categories = categories
+        self._wanted = wanted
+        self._found = {category: [no_samples(category)] for category in categories}
+        self._counts = dict.fromkeys(categories, 0)
 
     def lack(self, category: Category) -> int:
-        """Samples still wanted."""
-        return max(self.wanted - self.counts[category], 0) if category in self.counts else 0
+        """Number of samples that are still wanted."""
+        return max(self._wanted - self._counts[category], 0) if category in self._counts else 0
 
     @property
     def full(self) -> bool:
-        """Whether nothing is wanted any more."""
-        return all(count >= self.wanted for count in self.counts.values())
+        """Whether there are enough samples of every category."""
+        return not any(self.lack(category) for category in self.categories)
 
     def add(self, category: Category, samples: Samples) -> None:
-        """Enter samples; those of other categories are dropped."""
-        if category in self.counts:
-            self.found[category].append(samples)
-            self.counts[category] += len(samples)
+        """Add samples; those of other categories are dropped."""
+        if category in self._counts:
+            self._found[category].append(samples)
+            self._counts[category] += len(samples)
 
     def samples(self) -> dict[Category, Samples]:
-        """All samples by category, in the order of their coming."""
-        return {category: join(parts) for category, parts in self.found.items()}
+        """All samples by category, in the order in which they came."""
+        return {category: join(parts) for category, parts in self._found.items()}
 
 
-@dataclass
 class Balance:
-    """Decides which initial states to disturb, so that the label "infeasible" reaches its share.
+    """Decides which initial states to disturb, so that infeasible transitions reach the share `wanted`."""
 
-    Attributes:
-        wanted: that share.
-        counts: infeasible and all transitions so far, by category and ground.
-    """
-
-    wanted: float
-    counts: dict[tuple[Category, Ground], list[int]] = field(default_factory=dict)
+    def __init__(self, wanted: float):
+        self._wanted = wanted
+        self._counts: dict[tuple[Category, Ground], list[int]] = {}  # infeasible ones and all
 
     def probability(self, category: Category, ground: Ground) -> float:
-        """Probability with which the next state is disturbed by much."""
-        infeasible, total = self.counts.get((category, ground), (0, 0))
-        share = (infeasible + 1.0) / (total + 1.0 / self.wanted)
-        return float(np.clip(0.4 + 4.0 * (self.wanted - share), 0.02, 0.9))
+        """Probability of a large disturbance of the next state."""
+        infeasible, total = self._counts.get((category, ground), (0, 0))
+        share = (infeasible + 1.0) / (total + 1.0 / self._wanted)
+        return float(np.clip(0.4 + 4.0 * (self._wanted - share), 0.02, 0.9))
 
     def count(self, category: Category, ground: Ground, feasible: np.ndarray) -> None:
-        """Enter the labels (n,) of transitions."""
-        pair = self.counts.setdefault((category, ground), [0, 0])
+        """Count the labels (n,) of transitions."""
+        pair = self._counts.setdefault((category, ground), [0, 0])
         pair[0] += int((~feasible).sum())
         pair[1] += len(feasible)

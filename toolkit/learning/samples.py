@@ -11,8 +11,7 @@ from toolkit.learning.sensitivity import unknown_sensitivity
 from toolkit.prediction.features import TARGETS, TIMING_AND_FRICTION, feature_size
 from toolkit.world.timing import Timing
 
-DEFAULT_FRICTION = 0.5
-AT_DEFAULT = (Timing().shift, Timing().swing, DEFAULT_FRICTION)
+AT_DEFAULT = (Timing().shift, Timing().swing, 0.5)
 """Last features of transitions with the paper's timing and friction."""
 
 
@@ -21,10 +20,10 @@ class Samples:
     """Labelled transitions of one category.
 
     Attributes:
-        features: (n, d) float32, canonical, see `features.encode`.
-        feasible: (n,) bool.
-        targets: (n, 7) float32; objective, CoM (m), CoM velocity (m/s); zero where not feasible.
-        sensitivity: (n, k) float32, derivatives of the objective, see `learning.sensitivity`; NaN where unknown.
+        features: (n, d) float32 Canonical features, see `features.encode`.
+        feasible: (n,) bool Whether each transition is feasible.
+        targets: (n, 7) float32 Objective, CoM (m) and CoM velocity (m/s); zero where infeasible.
+        sensitivity: (n, k) float32 Derivatives of the objective, see `learning.sensitivity`; NaN where unknown.
     """
 
     features: np.ndarray
@@ -47,16 +46,12 @@ class Samples:
 
 
 def no_samples(category: Category) -> Samples:
-    """No samples of a category, with the columns that they have."""
+    """An empty set of samples with the columns of a category."""
     features, targets = np.zeros((0, feature_size(category)), np.float32), np.zeros((0, TARGETS), np.float32)
     return Samples(features, np.zeros(0, bool), targets, unknown_sensitivity(category, 0))
 
 
 def join(groups: list[Samples]) -> Samples:
-    """Samples of one category, one group after the other."""
-    return Samples(
-        np.concatenate([group.features for group in groups]),
-        np.concatenate([group.feasible for group in groups]),
-        np.concatenate([group.targets for group in groups]),
-        np.concatenate([group.sensitivity for group in groups]),
-    )
+    """All groups of samples of one category, one after the other."""
+    parts = [(group.features, group.feasible, group.targets, group.sensitivity) for group in groups]
+    return Samples(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))

@@ -1,7 +1,7 @@
-"""Derivatives of the optimiser's objective as the networks' features see them, and transitions back from features.
+"""Derivatives of the optimiser's objective in the canonical frame of features, and transitions decoded from features.
 
-Columns: for each contact, in the order of `features.encode`, its place (3) and a rotation vector (3); CoM, velocity,
-shift, swing, friction. All in canonical form; NaN where unknown.
+Derivatives are taken with respect to the place (3) and a rotation vector (3) of each contact, in the order of
+`features.encode`, then to the CoM (3), its velocity (3), shift, swing and friction. They are NaN where unknown.
 """
 
 from __future__ import annotations
@@ -27,23 +27,17 @@ def sensitivity_size(category: Category) -> int:
 
 
 def unknown_sensitivity(category: Category, count: int) -> np.ndarray:
-    """(count, sensitivity_size) float32; derivatives of which none is known."""
+    """(count, sensitivity_size) float32 derivatives that are all unknown."""
     return np.full((count, sensitivity_size(category)), np.nan, np.float32)
 
 
 def canonical(frame: Canonical, category: Category, found: fast.Sensitivity) -> np.ndarray:
-    """(sensitivity_size,) derivatives in canonical form.
-
-    Args:
-        frame: of the transition's features.
-        category: of the transition.
-        found: derivatives in the world.
-    """
+    """(sensitivity_size,) derivatives in the frame of a transition's features, from those in the world."""
     rows = [int(limb.mirrored if frame.mirrored else limb) for limb in category.before] + [_NEW] * category.makes
     parts = found.contacts[rows].reshape(-1, 2, 3)
     turned = frame.vector(parts)
     if frame.mirrored:
-        turned[:, 1] *= -1.0  # a mirror turns rotations round
+        turned[:, 1] *= -1.0  # a mirror reverses rotations
     others = found.others.copy()
     others[:3], others[3:6] = frame.vector(others[:3]), frame.vector(others[3:6])
     return np.concatenate([turned.ravel(), others])
@@ -52,15 +46,15 @@ def canonical(frame: Canonical, category: Category, found: fast.Sensitivity) -> 
 def decode(
     features: np.ndarray, category: Category, *, mirrored: bool = False
 ) -> tuple[Stance, np.ndarray, np.ndarray, ContactTransition]:
-    """The transition that has given features: `features.encode` the other way round.
+    """The transition that has given features: the inverse of `features.encode`.
 
     Args:
-        features: (d,) features of one transition; axes are made orthonormal again.
-        category: category of the transition.
-        mirrored: whether a right limb is to move: the mirror image, which has the same features.
+        features: (d,) Features of one transition. Axes are made orthonormal again.
+        category: Category of the transition.
+        mirrored: Whether a right limb moves. This is the mirror image, which has the same features.
 
     Returns:
-        Stance, CoM (3,) in m, its velocity (3,) in m/s, and the transition, in the canonical frame.
+        Stance, CoM (3,) in m, its velocity (3,) in m/s, and the transition, all in the canonical frame.
     """
     limbs = [limb.mirrored if mirrored else limb for limb in category.contact_limbs]
     values = np.asarray(features, float)

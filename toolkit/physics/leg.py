@@ -8,9 +8,8 @@ roll and pitch, the ankle one of pitch and roll (the usual humanoid leg). With
 all six joint angles follow: the ankle rolls until h lies in the plane of the leg, the cosine rule gives the knee and
 the shin, and the thigh's frame seen from the base gives the hip.
 
-The laws are written once, for numbers in compiled code, for arrays and for CasADi's symbols. A vector is anything whose
-components are v[0], v[1], v[2], and a rotation has the components r[i, j]; each component is a number, an array (n,) or
-a symbol.
+The laws serve numbers in compiled code, arrays and CasADi's symbols. A vector is anything with components v[0], v[1]
+and v[2], and a rotation has components r[i, j]. Each component is a number, an array (n,) or a symbol.
 """
 
 from __future__ import annotations
@@ -31,9 +30,9 @@ class ReachMargins:
     """How far inside its limits a leg must stay.
 
     Attributes:
-        length: m, off both ends of the hip-ankle distance.
-        ankle: rad, off both ends of ankle pitch and roll.
-        hip: rad, off both ends of hip yaw, roll and pitch; negative where the base may turn or lean to help.
+        length: m; taken off both ends of the hip-ankle distance.
+        ankle: rad; taken off both ends of ankle pitch and roll.
+        hip: rad; taken off both ends of hip yaw, roll and pitch; negative where the base may turn or lean to help.
     """
 
     length: float = 0.0
@@ -45,10 +44,10 @@ class LegLimit(NamedTuple):
     """A limit of legs.
 
     Attributes:
-        name: in reports.
-        quantity: what is limited: a field of `LegPosture`, and of `LegGeometry.ranges` where it is an angle.
-        margin: the field of `ReachMargins` that is taken off both ends.
-        planned: whether centroidal motions keep it; the base may turn to spare the hip's yaw.
+        name: Name in reports.
+        quantity: The limited field of `LegPosture`, and of `LegGeometry.ranges` where it is an angle.
+        margin: The field of `ReachMargins` that is taken off both ends.
+        planned: Whether centroidal motions keep it; the base may turn to spare the hip's yaw.
     """
 
     name: str
@@ -69,7 +68,7 @@ LIMITS = (
     LegLimit("hip roll", "hip_roll", "hip"),
     LegLimit("hip yaw", "hip_yaw", "hip", planned=False),
 )
-"""All limits of a leg; the screens, the optimiser and the checks keep those that stand here."""
+"""All limits of a leg, for the screens, the optimiser and the checks."""
 PLANNED = tuple(limit for limit in LIMITS if limit.planned)
 TORQUE_ROLES = ("knee", "hip_pitch", "hip_roll", "ankle_pitch", "ankle_roll")
 
@@ -78,9 +77,9 @@ class LegPosture(NamedTuple):
     """Joint angles in rad, signs as in `LegGeometry.ranges`, and points in m in the world, three components each.
 
     Attributes:
-        length: m; hip to ankle. Beyond what the two links can span the angles are those of a nearly straight leg.
+        length: m; hip to ankle. Where the two links are too short, the angles are those of a nearly straight leg.
         ankle_pitch, ankle_roll, hip_pitch, hip_roll, hip_yaw, knee: rad.
-        pitch_axis: unit vector; axis of hip pitch, knee and ankle pitch in the world.
+        pitch_axis: Unit vector; axis of hip pitch, knee and ankle pitch in the world.
         hip_point, knee_point, ankle_point: m.
     """
 
@@ -99,13 +98,13 @@ class LegPosture(NamedTuple):
 
 @law
 def quantities(posture):
-    """What can be limited: the fields of a `LegPosture` that are no vectors."""
+    """The scalar fields of a `LegPosture`: length and angles, which have limits."""
     return posture[:7]
 
 
 @law
 def turned(rotation, v):
-    """A vector of a frame in the world; `rotation` is world_from_frame."""
+    """A vector (3,) of a frame in the axes of the world; `rotation` is world_from_frame."""
     r = rotation
     return (
         r[0, 0] * v[0] + r[0, 1] * v[1] + r[0, 2] * v[2],
@@ -116,13 +115,7 @@ def turned(rotation, v):
 
 @law
 def hip_at(com, heading, hip_in_com):
-    """Hip in m in the world.
-
-    Args:
-        com: m in the world.
-        heading: cosine and sine of the base's heading.
-        hip_in_com: m; in the base's frame.
-    """
+    """Hip in m in the world, of a CoM in m, cosine and sine of the base's heading, and the hip in the base's frame."""
     c, s = heading[0], heading[1]
     x, y = c * hip_in_com[0] - s * hip_in_com[1], s * hip_in_com[0] + c * hip_in_com[1]
     return com[0] + x, com[1] + y, com[2] + hip_in_com[2]
@@ -150,16 +143,10 @@ def _kept(cosine):
 
 @law
 def posture_between(hip, ankle, rotation, heading, thigh, shin, tiny=0.0):
-    """Posture of a leg between two points.
+    """Posture of a leg of two links in m between a hip and an ankle in m in the world.
 
-    Args:
-        hip: m in the world.
-        ankle: m in the world.
-        rotation: world_from_sole.
-        heading: cosine and sine of the base's heading.
-        thigh: m.
-        shin: m.
-        tiny: m^2; added to squares under roots where derivatives are wanted, so that they stay finite.
+    The rotation is world_from_sole, the heading the cosine and sine of the base's. `tiny` in m^2 is added to squares
+    under roots where derivatives are needed, so that they stay finite.
     """
     r = rotation
     dx, dy, dz = hip[0] - ankle[0], hip[1] - ankle[1], hip[2] - ankle[2]
@@ -207,13 +194,8 @@ def _torque_about(axis, origin, point, force, moment):
 def joint_torques(posture, sole, rotation, force, moment, tiny=0.0):
     """Static torques of a stance leg about its joints, its own weight left out, in the order of `TORQUE_ROLES`.
 
-    Args:
-        posture: of the leg.
-        sole: m in the world; centre of the sole.
-        rotation: world_from_sole.
-        force: N on the sole, in the world.
-        moment: N m on the sole about its centre, in the world.
-        tiny: as in `posture_between`.
+    The sole is the position of its centre in m, and the rotation world_from_sole. The force in N acts on the sole, with
+    the moment in N m about its centre; all are in the world. `tiny` is as in `posture_between`.
     """
     w = posture.pitch_axis
     flat = np.sqrt(w[0] * w[0] + w[1] * w[1] + tiny)
@@ -230,17 +212,14 @@ def joint_torques(posture, sole, rotation, force, moment, tiny=0.0):
 def leg_posture(
     leg: LegGeometry, com: np.ndarray, yaw: np.ndarray, position: np.ndarray, rotation: np.ndarray
 ) -> LegPosture:
-    """Postures of n legs whose soles are placed.
+    """Postures of a leg in n configurations; each component is (n,).
 
     Args:
-        leg: geometry of the leg.
+        leg: Geometry of the leg.
         com: (n, 3) m; CoM in the world.
         yaw: (n,) rad; heading of the base.
         position: (n, 3) m; centre of the sole in the world.
         rotation: (n, 3, 3); world_from_sole.
-
-    Returns:
-        The postures; each component (n,).
     """
     heading, r = (np.cos(yaw), np.sin(yaw)), np.moveaxis(rotation, 0, -1)
     hip, ankle = hip_at(com.T, heading, leg.hip_in_com), ankle_at(position.T, r, leg.ankle_in_sole)
@@ -248,12 +227,7 @@ def leg_posture(
 
 
 def leg_clearances(leg: LegGeometry, posture: LegPosture, margins: ReachMargins) -> dict[str, np.ndarray]:
-    """Distance of each leg to each of its limits; negative where the limit, less its margin, is exceeded.
-
-    Args:
-        leg: geometry of the leg.
-        posture: of n legs.
-        margins: taken off each limit.
+    """Distance of n postures of a leg to each of its limits less its margin; negative where exceeded.
 
     Returns:
         Name of the limit -> (n,) m or rad: the smaller distance to the two ends of the range.
@@ -269,6 +243,6 @@ def leg_clearances(leg: LegGeometry, posture: LegPosture, margins: ReachMargins)
 def leg_torques(
     posture: LegPosture, sole: np.ndarray, rotation: np.ndarray, force: np.ndarray, moment: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Role -> (n,) N m of n stance legs; see `joint_torques` for the arguments, whose first axis is n here."""
+    """Role -> (n,) N m of n stance legs; the arguments are those of `joint_torques` with a first axis of n."""
     torques = joint_torques(posture, sole.T, np.moveaxis(rotation, 0, -1), force.T, moment.T)
     return dict(zip(TORQUE_ROLES, torques, strict=True))

@@ -1,15 +1,14 @@
 """Momentum dynamics under constant contact wrenches, integrated exactly over a step.
 
-Everything is per mass. The state (9,) is the CoM r, its velocity v and the angular momentum L about a fixed point, from
-which r counts too; k = L - r x v is the angular momentum about the CoM. Gravity g points down the z axis:
+Everything is per mass. The state (9,) is the CoM r, its velocity v and the angular momentum L about a fixed point, the
+origin of r too; k = L - r x v is the angular momentum about the CoM. Gravity g points down the z axis:
 
     r' = r + dt v + dt^2/2 a          a = F + g, with F the sum of the contact forces
     v' = v + dt a
     L' = L + dt M + (dt r + dt^2/2 v + dt^3/6 a) x g     M: the moment of the contact wrenches about the point
     k' = k + dt (M - rbar x F)        rbar = r + dt/2 v + dt^2/6 g; the mean of r, less a part along F
 
-The functions use nothing but arithmetic on entries: NumPy (entries may be arrays), compiled functions
-and CasADi call the same ones.
+The functions use only arithmetic on entries, so NumPy (also with arrays), compiled functions and CasADi share them.
 """
 
 from __future__ import annotations
@@ -31,17 +30,10 @@ def ballistic(dt, position, velocity, acceleration):
 
 @law
 def advanced(dt, gravity, state, acceleration, moment):
-    """The state after a step; linear in state, acceleration and moment, so it carries deviations too.
+    """The nine entries of the state after a step; linear in the last three arguments, so it carries deviations too.
 
-    Args:
-        dt: s.
-        gravity: m/s^2; its magnitude.
-        state: (9,) m, m/s, m^2/s.
-        acceleration: (3,) m/s^2; of the CoM.
-        moment: (3,) m^2/s^2; of the contact wrenches about the fixed point.
-
-    Returns:
-        Nine entries.
+    Of the state (9,), the acceleration (3,) of the CoM in m/s^2 and the moment (3,) of the contact wrenches about the
+    fixed point in m^2/s^2; dt is in s, and gravity a magnitude in m/s^2.
     """
     half, cube = dt**2 / 2, dt**3 / 6
     return (
@@ -69,14 +61,10 @@ def mean_com(dt, gravity, state):
 
 @law
 def spin_rate(dt, gravity, state, force, moment):
-    """The three entries of the rate of k, constant over a step.
+    """The three entries of the rate of k, which is constant over a step.
 
-    Args:
-        dt: s.
-        gravity: m/s^2; its magnitude.
-        state: (9,) at the step's beginning; its angular momentum does not count.
-        force: (3,) m/s^2; of the contacts, without gravity.
-        moment: (3,) m^2/s^2; of the contact wrenches about the fixed point.
+    Of the state (9,) at the beginning, whose angular momentum is not used, the force (3,) of the contacts without
+    gravity in m/s^2, and the moment (3,) as in `advanced`.
     """
     turned = cross(mean_com(dt, gravity, state), force)
     return moment[0] - turned[0], moment[1] - turned[1], moment[2] - turned[2]
@@ -91,12 +79,10 @@ def spin(state):
 
 @law
 def fill_wrench_map(rotation, lever, out):
-    """Fill the matrix that takes a wrench in a contact frame to its force and moment about the fixed point.
+    """Fill the matrix `out` (6, 6) that takes a wrench in a contact frame to force and moment about the fixed point.
 
-    Args:
-        rotation: (3, 3); world_from_contact.
-        lever: (3,) m; from the fixed point to the patch's centre.
-        out: (6, 6); its upper right block is left as it is.
+    The rotation (3, 3) is world_from_contact, and the lever (3,) in m leads from the fixed point to the patch's centre.
+    The upper right block is left as it is.
     """
     for b in range(3):
         axis = rotation[0, b], rotation[1, b], rotation[2, b]

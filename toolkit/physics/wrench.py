@@ -1,4 +1,4 @@
-"""The wrenches that a patch in contact can carry, and where on the patch they act.
+"""The wrenches that a patch in contact can carry, and the points at which they act.
 
 A wrench is force and moment about the centre of the patch in the contact frame, (fx, fy, fz, mx, my, mz), z along the
 surface's normal. A patch carries it where
@@ -7,8 +7,7 @@ surface's normal. A patch carries it where
     pressure   |mx| <= Y fz,  |my| <= X fz:  the centre of pressure is inside the half extents X and Y,
     yaw        |Y fx - mu mx| + |X fy - mu my| - mu (X + Y) fz <= mz <= mu (X + Y) fz - |Y fx + mu mx| - |X fy + mu my|.
 
-`pressure_rows`, `yaw_row` and `pressure` use nothing but arithmetic: NumPy, compiled functions and CasADi call the same
-ones.
+`pressure_rows`, `yaw_row` and `pressure` use only arithmetic, so NumPy, compiled functions and CasADi share them.
 
 Reference:
     Caron, Pham, Nakamura, "Stability of surface contacts for humanoid robots", ICRA 2015, Eqs. 17-19.
@@ -24,19 +23,13 @@ from toolkit.compiled import law
 
 SIGNS = tuple(itertools.product((-1.0, 1.0), repeat=3))
 """Signs of the eight yaw rows."""
+DIRECTIONS = 12
+"""Directions of the tangential force in `turning_rows`."""
 
 
 @law
 def pressure_rows(x, y):
-    """The four rows that keep the centre of pressure inside a patch.
-
-    Args:
-        x: m; half extent along x of the contact frame.
-        y: m; half extent along y.
-
-    Returns:
-        Four rows of six coefficients; `row @ wrench <= 0` inside.
-    """
+    """The four rows that keep the CoP inside a patch of half extents x and y in m; `row @ wrench <= 0` inside."""
     return (
         (0.0, 0.0, -y, 1.0, 0.0, 0.0),
         (0.0, 0.0, -y, -1.0, 0.0, 0.0),
@@ -47,32 +40,21 @@ def pressure_rows(x, y):
 
 @law
 def yaw_row(mu, x, y, a, b, side):
-    """One of the eight rows that bound the yaw moment of a patch; the signs a, b and side choose which.
+    """One of the eight rows that bound the yaw moment of a patch; `row @ wrench <= 0` inside.
 
-    Args:
-        mu: Coefficient of the friction that may be used for the yaw moment.
-        x: m; half extent along x of the contact frame.
-        y: m; half extent along y.
-        a: 1 or -1.
-        b: 1 or -1.
-        side: 1 for the upper bound, -1 for the lower.
-
-    Returns:
-        Six coefficients; `row @ wrench <= 0` inside.
+    Of a patch of half extents x and y in m, whose friction mu may be used for the yaw moment. The signs a, b and side
+    choose the row; a side of 1 is for the upper bound, -1 for the lower.
     """
     return a * y, b * x, -mu * (x + y), side * a * mu, side * b * mu, side
 
 
 @law
 def pressure(wrench, load):
-    """Where a wrench presses on the patch, and what is left of its yaw moment there.
+    """Centre of pressure, x and y, of a wrench (6,) on its patch, and the yaw moment about it.
 
     Args:
         wrench: (6,) about the centre of the patch.
-        load: Its normal force, or what is to stand in for one near zero.
-
-    Returns:
-        The centre of pressure, x and y, and the yaw moment about it.
+        load: Its normal force, or a substitute for one near zero.
     """
     x, y = -wrench[4] / load, wrench[3] / load
     return x, y, wrench[5] - x * wrench[1] + y * wrench[0]
@@ -83,7 +65,7 @@ def friction_rows(friction: float, sides: int = 24) -> np.ndarray:
 
     Args:
         friction: Coulomb coefficient.
-        sides: of the polygon.
+        sides: Number of sides of the polygon.
 
     Returns:
         (sides, 3); `rows @ f <= 0` implies |f_xy| <= friction * f_z.
@@ -103,8 +85,8 @@ def sole_rows(friction: float, half_size: np.ndarray, yaw: float = 1.0, sides: i
     Args:
         friction: Coulomb coefficient.
         half_size: (2,) m; X along x and Y along y of the contact frame.
-        yaw: factor on the friction that may be used for the yaw moment.
-        sides: of the friction polygon.
+        yaw: Factor on the friction that may be used for the yaw moment.
+        sides: Number of sides of the friction polygon.
 
     Returns:
         (sides + 12, 6); `rows @ wrench <= 0` inside.
@@ -115,7 +97,7 @@ def sole_rows(friction: float, half_size: np.ndarray, yaw: float = 1.0, sides: i
     return np.vstack([friction_part, pressure_rows(x, y), yaw_rows])
 
 
-def turning_rows(friction: float, half_size: np.ndarray, yaw: float = 1.0, sides: int = 12) -> np.ndarray:
+def turning_rows(friction: float, half_size: np.ndarray, yaw: float = 1.0) -> np.ndarray:
     """Rows that couple the tangential force and the yaw moment of a sole whose corners slide by circular cones.
 
     Corners at r_i with normal forces n_i hold, in any direction (a, c) of tangential force and yaw moment,
@@ -129,19 +111,19 @@ def turning_rows(friction: float, half_size: np.ndarray, yaw: float = 1.0, sides
     Args:
         friction: Coulomb coefficient.
         half_size: (2,) m; X along x and Y along y of the contact frame.
-        yaw: factor on the friction of rows for a pure yaw moment; the more a row is about force, the closer to 1.
-        sides: directions of the force.
+        yaw: Factor on the friction of rows for a pure yaw moment; the more a row is about force, the closer to 1.
 
     Returns:
-        (6 * sides + 2, 6); `rows @ [f, m] <= 0` as in `sole_rows`.
+        (6 * DIRECTIONS + 2, 6); `rows @ [f, m] <= 0` as in `sole_rows`.
 
     Reference:
         Goyal, Ruina, Papadopoulos, "Planar sliding with dry friction", Wear 143, 1991: limit surfaces.
     """
-    tilts, angles = np.radians([20.0, -20.0, 45.0, -45.0, 70.0, -70.0]), 2.0 * np.pi * np.arange(sides) / sides
+    tilts = np.radians([20.0, -20.0, 45.0, -45.0, 70.0, -70.0])
+    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     ahead = np.append(np.kron(np.cos(tilts), np.cos(angles)), [0.0, 0.0])
     aside = np.append(np.kron(np.cos(tilts), np.sin(angles)), [0.0, 0.0])
-    share = np.append(np.repeat(np.sin(tilts), sides), [1.0, -1.0])
+    share = np.append(np.repeat(np.sin(tilts), DIRECTIONS), [1.0, -1.0])
     turn = share / np.hypot(*half_size)
     signs = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     x, y = (signs * half_size).T
@@ -157,14 +139,14 @@ def foot_rows(friction: float, half_size: np.ndarray, yaw: float = 1.0) -> np.nd
 
 
 def corner_rays(friction: float, half_size: np.ndarray, sides: int) -> tuple[np.ndarray, np.ndarray]:
-    """Forces at the corners of a patch whose sums with factors of at least 0 are wrenches that it can carry.
+    """Forces at the corners of a patch; their combinations with nonnegative factors are wrenches that it can carry.
 
     They lie along the edges of a polygon inside the circular friction cone, with corners along the axes.
 
     Args:
         friction: Coulomb coefficient.
         half_size: (2,) m; X along x and Y along y of the contact frame.
-        sides: of the polygon.
+        sides: Number of sides of the polygon.
 
     Returns:
         (4 * sides, 3) forces with normal force 1 and (4 * sides, 3) m points at which they act, in the contact frame.

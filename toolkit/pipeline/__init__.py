@@ -1,10 +1,10 @@
-"""From a world to a verdict: the only package that knows all stages.
+"""From a world to a verdict: the package that joins all stages.
 
     world -> surfaces -> contact sequence -> centroidal motion -> whole-body trajectory -> execution -> verdict
 
-The search proposes contact sequences; each is tested from the newest (cheapest) to the oldest by the centroidal
-optimiser, by inverse kinematics and by the simulation, and the first that passes everything is the plan. Where all
-fail, the search starts again without the transitions at which they failed.
+The search proposes contact sequences. They are tested from the newest (cheapest) to the oldest by the centroidal
+optimiser, by inverse kinematics and by the simulation. The first that passes everything is the plan. Where all fail,
+the search starts again without the transitions at which they failed.
 """
 
 from toolkit.pipeline.config import PipelineConfig

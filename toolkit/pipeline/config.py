@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from toolkit.centroidal.sequence import SequenceConfig
 from toolkit.contacts.room import RoomConfig
 from toolkit.execution.config import ExecutionConfig
-from toolkit.wholebody.plan import WholeBodyConfig
 
 
 @dataclass(frozen=True)
@@ -16,16 +15,15 @@ class PipelineConfig:
 
     Attributes:
         seed: Seed of every random draw.
-        time_limit: s for the contact search; the search also ends after its own number of expansions, so that the
-            same seed gives the same plan on any machine fast enough.
-        candidates: Most contact sequences to test before giving up; those with palms at most half of them, after which
-            the search is run for the feet alone.
+        time_limit: s; for the contact search. The search also ends after a number of expansions, so that the same seed
+            gives the same plan on any machine that is fast enough.
+        candidates: Most contact sequences to test before giving up. At most half of them use palms; after those, only
+            sequences for the feet alone are searched.
         until: Last stage that tests a sequence: "dynamics" for the plan alone, "wholebody", or "execution".
-        initial_rest: s at rest before the first transition.
-        final_rest: s at rest after the last transition.
+        initial_rest: s; at rest before the first transition.
+        final_rest: s; at rest after the last transition.
         landing: How far feet may land from where the search put them, where margins are short; None for not at all.
         sequence: Settings of the centroidal optimiser.
-        wholebody: Settings of the whole-body stage.
         execution: Settings of the simulated run.
     """
 
@@ -37,5 +35,4 @@ class PipelineConfig:
     final_rest: float = 1.0
     landing: RoomConfig | None = field(default_factory=RoomConfig)
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
-    wholebody: WholeBodyConfig = field(default_factory=WholeBodyConfig)
     execution: ExecutionConfig = field(default_factory=ExecutionConfig)

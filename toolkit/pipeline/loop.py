@@ -10,7 +10,7 @@ from toolkit.contacts.failure import Failure
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.execution.check import Check
 from toolkit.pipeline.config import PipelineConfig
-from toolkit.pipeline.observer import Observer, SilentObserver
+from toolkit.pipeline.observer import Observer
 from toolkit.pipeline.planner import Planner
 from toolkit.pipeline.trial import Tester, Trial
 from toolkit.robot.model import RobotModel
@@ -21,14 +21,12 @@ from toolkit.world.world import World
 
 @dataclass(frozen=True)
 class PipelineResult:
-    """Everything a run made.
+    """The result of a run.
 
     Attributes:
-        robot: The robot.
-        world: The world.
-        config: Settings of the run.
-        search: Result of the contact search.
-        trial: The one that passed, or else the one that came furthest; None without a plan.
+        robot, world, config: As given to `run`.
+        search: Result of the contact search that found the trial's sequence, or of the last search without a trial.
+        trial: The trial that passed, or else the one that came furthest; None without a plan.
         tested: Number of contact sequences tested.
         reason: One line where the verdict is FAIL, else "".
     """
@@ -43,7 +41,7 @@ class PipelineResult:
 
     @property
     def passed(self) -> bool:
-        """The verdict."""
+        """Whether the verdict is PASS."""
         return self.trial is not None and self.trial.passed
 
     @property
@@ -61,20 +59,12 @@ def run(
 ) -> PipelineResult:
     """Plan, test and execute.
 
-    Args:
-        robot: The robot.
-        world: The world.
-        planner: The contact planner for both.
-        config: Settings.
-        observer: Told of every stage.
-
-    Returns:
-        The result, PASS or not; see `PipelineResult`.
+    The planner is made for the same robot and world; the observer is told of every stage.
 
     Raises:
-        ToolkitError: the input cannot be used at all (no start stance, nothing leads to the goal).
+        ToolkitError: The input cannot be used at all (no start stance, nothing leads to the goal).
     """
-    observer = observer or SilentObserver()
+    observer = observer or Observer()
     tester = Tester(robot, world, config, observer)
     search = _search(planner, config, observer, 0, [])
     best: Trial | None = None
@@ -108,7 +98,7 @@ def run(
 
 
 def _uses_palms(sequence: ContactSequence) -> bool:
-    """Whether palms are in contact after those of the start could have been let go."""
+    """Whether palms are in contact later than the transitions that could end the start's palm contacts."""
     return any(stance.palms for stance in sequence.stances[len(sequence.start.palms) :])
 
 
@@ -142,11 +132,9 @@ def _search(
 
 
 def _blamed(sequence: ContactSequence, failure: Failure) -> list[Exclusion]:
-    """The transition at which a trial failed, to keep the next search away from it; empty where none can be blamed.
+    """The transition at which a trial failed, for the next search to avoid; empty where it is unknown.
 
-    Args:
-        sequence: The contacts as the search proposed them, not where the optimiser moved landing points.
-        failure: Why the trial did not pass.
+    The sequence has the contacts as the search proposed them, not where the optimiser moved landing points.
     """
     if failure.transition is None or not sequence.transitions:
         return []

@@ -1,34 +1,16 @@
-"""Observer: whoever wants to know how a run goes."""
+"""The observer of a run, for display."""
 
 from __future__ import annotations
 
-from typing import Protocol
 
+class Observer:
+    """Is told how a run goes and never decides anything; this one ignores it."""
 
-class Observer(Protocol):
-    """Is told how a run goes, for display; never decides anything."""
-
-    def started(self, stage: str, detail: str = "") -> None:
+    def started(self, stage: str) -> None:
         """A stage begins."""
-        ...
 
     def progress(self, stage: str, fraction: float | None, detail: str = "") -> None:
-        """A stage goes on; `fraction` in [0, 1] where known."""
-        ...
+        """A stage goes on; `fraction` is in [0, 1], or None where it is unknown."""
 
     def finished(self, stage: str, passed: bool, seconds: float, detail: str = "") -> None:
         """A stage ended."""
-        ...
-
-
-class SilentObserver:
-    """Watches without a word."""
-
-    def started(self, stage: str, detail: str = "") -> None:
-        """Ignore."""
-
-    def progress(self, stage: str, fraction: float | None, detail: str = "") -> None:
-        """Ignore."""
-
-    def finished(self, stage: str, passed: bool, seconds: float, detail: str = "") -> None:
-        """Ignore."""

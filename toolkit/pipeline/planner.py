@@ -1,4 +1,4 @@
-"""Making the contact planner of a run."""
+"""The contact planner of a run."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from toolkit.search.moves.exclusion import Exclusion
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult
 from toolkit.world.world import World
-
-PLANNERS = ("auto", "learned", "optimiser", "kinematic", "quasi-static")
 
 
 class Planner(Protocol):
@@ -35,7 +33,7 @@ class Planner(Protocol):
 
 
 def planner_kind(robot: RobotModel, kind: str) -> str:
-    """The kind of planner that is meant: "auto" stands for "learned" where the robot has networks, else "kinematic"."""
+    """The kind of planner; "auto" stands for "learned" where the robot has networks, else for "kinematic"."""
     if kind != "auto":
         return kind
     return "learned" if (robot.folder / "networks").is_dir() else "kinematic"
@@ -46,14 +44,11 @@ def make_planner(
 ) -> ContactPlanner:
     """The contact planner whose transitions are judged by `kind`.
 
-    Args:
-        robot: The robot.
-        world: The world.
-        kind: One of `PLANNERS`; "auto" takes the networks where the robot has them, else leaves the dynamics out.
-        config: Settings; the default ones where None.
+    The kinds are "learned" for networks, "optimiser", "kinematic" without dynamics, "quasi-static" for the baseline,
+    and "auto" (see `planner_kind`).
 
     Raises:
-        NetworkError: "learned" was asked for and the networks are missing or do not fit.
+        NetworkError: `kind` is "learned" and the networks are missing or do not fit.
     """
     kind, config = planner_kind(robot, kind), config or PlannerConfig()
     if kind == "quasi-static":
@@ -62,7 +57,7 @@ def make_planner(
         return quasi_static_planner(robot, world, config)
     if kind == "kinematic":
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
-    # Imported here: the fast solver takes seconds to compile where its cache is cold, and only these kinds need it.
+    # Imported here: without a cache the fast solver takes seconds to compile, and only these kinds need it.
     from toolkit.prediction.optimiser import OptimiserEvaluator
 
     optimiser = OptimiserEvaluator(robot)

@@ -30,9 +30,9 @@ class Trial:
 
     Attributes:
         solution: The contact sequence as the search found it.
-        plan: What the stages made of it: a `WholeBodyPlan` where it came as far as that.
-        execution: What the simulation measured; None where an earlier stage rejected the plan or was the last one.
-        failure: Why it did not pass; None where every stage that was asked for passed, of the execution every check.
+        plan: The plan of the stages so far; a `WholeBodyPlan` from the whole-body stage on.
+        execution: Measurements of the simulation; None where an earlier stage rejected the plan or was the last one.
+        failure: Why it did not pass; None where every wanted stage passed, and every check of the execution.
     """
 
     solution: Solution
@@ -42,7 +42,7 @@ class Trial:
 
     @property
     def passed(self) -> bool:
-        """Whether every stage that was asked for passed."""
+        """Whether every wanted stage passed."""
         return self.failure is None
 
     @property
@@ -52,7 +52,7 @@ class Trial:
 
     @property
     def merit(self) -> tuple[int, bool, int]:
-        """How far it came, to keep the most telling failure: stages, then arrival, then checks passed."""
+        """How far it came, to compare failures: by stages, then by arrival, then by checks passed."""
         stages = 1 + sum(stage is not None for stage in (self.trajectory, self.execution)) + self.passed
         if self.execution is None:
             return stages, False, 0
@@ -63,14 +63,7 @@ class Tester:
     """Puts contact sequences through optimiser, inverse kinematics and simulation."""
 
     def __init__(self, robot: RobotModel, world: World, config: PipelineConfig, observer: Observer):
-        """Prepare for a robot in a world.
-
-        Args:
-            robot: The robot.
-            world: The world.
-            config: Settings of the stages.
-            observer: Told of every stage.
-        """
+        """Prepare for a robot in a world; the observer is told of every stage."""
         self._robot, self._world, self._config, self._observer = robot, world, config, observer
 
     @cached_property
@@ -100,7 +93,7 @@ class Tester:
             return Trial(solution, plan)
 
         observer.started("wholebody")
-        plan = whole_body(plan, self._scene, config.wholebody)
+        plan = whole_body(plan, self._scene)
         trajectory = plan.trajectory
         observer.finished("wholebody", trajectory.feasible, trajectory.seconds, trajectory.reason)
         if not trajectory.feasible:
@@ -124,5 +117,5 @@ class Tester:
 
 
 def _because(reason: str, failure: Failure | None) -> Failure:
-    """A stage's failure in the words of the verdict."""
+    """A stage's failure with the reason of the verdict."""
     return Failure(reason) if failure is None else replace(failure, reason=reason)

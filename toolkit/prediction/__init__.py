@@ -1,1 +1,1 @@
-"""Networks that predict what the centroidal optimiser would say: features, inference, data, training."""
+"""Judges of transitions: by networks (features and inference), by the centroidal optimiser, or without dynamics."""

@@ -1,4 +1,4 @@
-"""The place where transitions are judged: by networks, by the optimiser, by static balance, or on kinematics alone."""
+"""The interface of all judges of transitions: networks, optimiser, static balance, or kinematics alone."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class TransitionBatch:
     Attributes:
         feasible: (n,) bool.
         objective: (n,) dynamics objective, >= 0.
-        com: (n, 3) m, world frame, after the transition.
-        com_velocity: (n, 3) m/s.
+        com: (n, 3) m; CoM after the transition, world frame.
+        com_velocity: (n, 3) m/s; its velocity, world frame.
         untrained: How many of the transitions lay outside what the judge was trained for.
     """
 
@@ -32,13 +32,13 @@ class TransitionBatch:
 
 
 class TransitionEvaluator(ABC):
-    """Judges all candidate transitions of one parent state together; this is all that a judge can be asked.
+    """Judges all candidate transitions of one parent state together.
 
     Attributes:
-        costly: Whether a search had better ask about one transition at a time, since each takes about a millisecond.
-        rejection: What it means where a transition is infeasible, for messages.
-        stand_in: The judge of what this one was not trained for. It also has a say on ground that holds no resting
-            foot, where the last bit of feasibility counts. None where there is no such judge.
+        costly: Whether a search should ask about one transition at a time, since each takes about a millisecond.
+        rejection: What it means that a transition is infeasible, for messages.
+        stand_in: The judge of what this one was not trained for. It also judges on ground that holds no resting foot,
+            where feasibility must be exact. None where there is no such judge.
     """
 
     costly: bool = False
@@ -65,10 +65,10 @@ class TransitionEvaluator(ABC):
             stance: The stance before the first transition.
             com: (3,) m, world; the CoM before the first transition.
             com_velocity: (3,) m/s, world; its velocity.
-            transitions: In their order.
-            rest: Seconds on the last stance, at whose end the CoM is at rest.
+            transitions: The transitions in their order.
+            rest: Time in s on the last stance, at whose end the CoM is at rest.
 
         Returns:
-            The objective; None where that is infeasible, and from a judge that only judges single transitions.
+            The objective; None where that is infeasible, or the judge only judges single transitions.
         """
         return None

@@ -1,4 +1,4 @@
-"""Features: a contact transition as the vector that the networks see, and back.
+"""Features: the vector by which the networks see a contact transition, and the way back.
 
 Every transition is brought into one canonical form: the frame of the parent stance (mean of the feet, yaw only), and
 mirrored where a right limb moves, so that the moving limb is always a left one (paper, Sec. VI). Each contact enters
@@ -42,8 +42,8 @@ class Canonical:
     """The change of frame that brought transitions into canonical form.
 
     Attributes:
-        world_from_parent: upright frame at the mean of the parent's feet.
-        mirrored: whether y was negated afterwards.
+        world_from_parent: Upright frame at the mean of the parent's feet.
+        mirrored: Whether y was negated afterwards.
     """
 
     world_from_parent: Pose
@@ -68,9 +68,9 @@ class Canonical:
         return self.vector_back(points) + self.world_from_parent.position
 
     def contacts(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        """Contacts at (n, 3) with frames (n, 3, 3) as rows (n, 9): position, x axis, z axis, canonical.
+        """Contacts at (n, 3) with frames (n, 3, 3) as canonical rows (n, 9): position, x axis, z axis.
 
-        A mirrored contact frame keeps its x and z axes mirrored; y follows from them.
+        The x and z axes of a mirrored contact are mirrored; y follows from them.
         """
         rows = np.empty((len(position), 3, 3))
         rows[:, 0] = position - self.world_from_parent.position
@@ -78,8 +78,8 @@ class Canonical:
         return self.vector(rows).reshape(-1, CONTACT)
 
 
-def parent_frame(stance: Stance) -> Pose:
-    """`stance.mean_feet` in plain floats, which is several times faster: it is needed for every query."""
+def _parent_frame(stance: Stance) -> Pose:
+    """`stance.mean_feet`, computed in plain floats, which is several times faster; every query needs it."""
     left, right = (contact.pose for contact in stance.feet)
     x, y = joint_heading(left.rotation, right.rotation)
     length = math.hypot(x, y)
@@ -94,23 +94,23 @@ def encode(
     """Features of transitions of ONE category by the same limb out of one parent state.
 
     Args:
-        stance: the parent's stance.
-        com: (3,) m, world, or (n, 3) for each transition its own.
+        stance: The parent's stance.
+        com: (3,) m, world, or (n, 3) with one CoM for each transition.
         com_velocity: (3,) or (n, 3) m/s, world.
-        transitions: n transitions, all of one category and limb.
+        transitions: The n transitions.
 
     Returns:
         The canonical frame and (n, feature_size) float64 features.
 
     Raises:
-        ValueError: the transitions are of several categories or limbs.
+        ValueError: The transitions are of several categories or limbs.
     """
     new = TransitionRows.of(transitions)
     numbers = category_rows(stance, new)
     limb, category = Limb(new.limb[0]), Category(numbers[0])
     if (new.limb != limb).any() or (numbers != category).any():
         raise ValueError("transitions of one call must share their limb and category")
-    frame = Canonical(parent_frame(stance), not limb.is_left)
+    frame = Canonical(_parent_frame(stance), not limb.is_left)
     contacts = [stance[limb.mirrored if frame.mirrored else limb] for limb in category.before]
     before = frame.contacts(
         np.array([contact.pose.position for contact in contacts]),

@@ -21,11 +21,11 @@ _LENGTH_MARGIN = 0.01  # m; the CoM is low enough for legs this much shorter tha
 
 @dataclass(frozen=True)
 class KinematicConfig:
-    """Settings; the objective is a stand-in for the dynamics objective, of its order of magnitude.
+    """Settings. The objective replaces the dynamics objective and has its order of magnitude.
 
     Attributes:
         friction: The part of the friction coefficient that a sole at rest may need; steeper surfaces hold no foot.
-        stride: Objective of moving the mean of the feet by 0.3 m; it grows with the square, as all of these do.
+        stride: Objective of moving the mean of the feet by 0.3 m. It grows with the square, like the next three.
         rise: Objective of a step 0.1 m up or down.
         tilt: Objective of a foot on a tilt of 0.2 rad.
         spread: Objective of feet 0.1 m wider or narrower than at home, or turned 0.3 rad apart.
@@ -41,12 +41,7 @@ class KinematicConfig:
 
 
 class KinematicEvaluator(TransitionEvaluator):
-    """Judges without dynamics: the CoM rests above the mean of the feet, and surfaces within their friction angle hold.
-
-    Args:
-        robot: the robot.
-        config: settings.
-    """
+    """Judges without dynamics: the CoM rests above the mean of the feet, and ground within its friction angle holds."""
 
     rejection = "ground too steep for a foot to rest on with its friction"
 
@@ -91,7 +86,7 @@ class KinematicEvaluator(TransitionEvaluator):
         return TransitionBatch(feasible, objective, self._com(position, rotation, mean, yaw), np.zeros((n, 3)))
 
     def _com(self, position: np.ndarray, rotation: np.ndarray, mean: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """(n, 3) m; above the mean of the feet, as high as at home or as both legs reach."""
+        """(n, 3) m; CoM above the mean of the feet, as high as at home or as both legs reach."""
         com = mean + [0.0, 0.0, self._robot.com_height]
         turn = rotation_about_z(yaw)
         for side, limb in enumerate(FEET):

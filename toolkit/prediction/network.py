@@ -25,8 +25,8 @@ class Perceptron:
     """ReLU layers; the z-scoring of the inputs is folded into the first one, that of the outputs into the last.
 
     Attributes:
-        weights: layer by layer, (inputs, outputs) float32.
-        biases: layer by layer, (outputs,) float32.
+        weights: Weights of each layer, (inputs, outputs) float32.
+        biases: Biases of each layer, (outputs,) float32.
     """
 
     weights: tuple[np.ndarray, ...]
@@ -43,25 +43,25 @@ class Perceptron:
 
 
 def feasibility(classifier: Perceptron, features: np.ndarray) -> np.ndarray:
-    """(n,) bool; whether the classifier calls transitions (n, d) feasible."""
+    """(n,) bool; whether the classifier predicts that transitions (n, d) are feasible."""
     return classifier(features)[:, 0] > 0.0
 
 
 def compressed(objective: np.ndarray) -> np.ndarray:
-    """What the regressor gives for an objective: log(1 + objective / scale)."""
+    """The regressor's output for an objective: log(1 + objective / scale)."""
     return np.log1p(objective / OBJECTIVE_SCALE)
 
 
 def expanded(output: np.ndarray) -> np.ndarray:
-    """The objective (not negative) of what the regressor gives."""
+    """The objective (not negative) for an output of the regressor."""
     return OBJECTIVE_SCALE * np.expm1(np.clip(output, 0.0, 20.0))
 
 
 def outcome(regressor: Perceptron, features: np.ndarray) -> np.ndarray:
     """(n, 7) float32 objective, CoM and velocity of transitions (n, d), canonical.
 
-    The regressor gives the compressed objective and where the CoM goes from where it is: what spans four orders of
-    magnitude, or hardly changes, is easier to learn so.
+    The regressor gives the compressed objective, which spans four orders of magnitude, and the change of the CoM, which
+    is small. Both are easier to learn in this form.
     """
     outputs = regressor(features)
     outputs[:, 0] = expanded(outputs[:, 0])
@@ -74,11 +74,11 @@ class TransitionNetwork:
     """The two networks of one category.
 
     Attributes:
-        category: which transitions they judge.
-        classifier: features -> (n, 1) log-odds of being feasible (a softmax over two classes is their logistic).
-        regressor: features -> (n, 7), see `outcome`.
+        category: Category of the transitions that they judge.
+        classifier: Features -> (n, 1) log-odds of being feasible (a softmax over two classes is their logistic).
+        regressor: Features -> (n, 7), see `outcome`.
         lower, upper: (d,) range of the training features; timing and friction outside it are extrapolation.
-        metadata: what the file says of its training.
+        metadata: The file's notes on its training.
     """
 
     category: Category
@@ -101,7 +101,7 @@ class TransitionNetwork:
         return np.all((values >= least) & (values <= most), axis=1)
 
     def feasible(self, features: np.ndarray) -> np.ndarray:
-        """(n,) bool for features (n, d)."""
+        """(n,) bool; whether transitions with features (n, d) are feasible."""
         return feasibility(self.classifier, features)
 
     def predict(self, features: np.ndarray) -> np.ndarray:
@@ -118,12 +118,12 @@ def load_network(path: Path, category: Category, fingerprint: str) -> Transition
     """Load and check one file.
 
     Args:
-        path: the safetensors file.
-        category: expected category.
-        fingerprint: of the robot that will use it.
+        path: The safetensors file.
+        category: The expected category.
+        fingerprint: Fingerprint of the robot that will use it.
 
     Raises:
-        NetworkError: missing or truncated file, wrong schema, category, robot or shapes, values that are not finite.
+        NetworkError: Missing or truncated file, wrong schema, category, robot or shapes, values that are not finite.
     """
     remedy = "train it with: python -m toolkit.train collect, then fit"
     if not path.is_file():
@@ -163,5 +163,5 @@ def _tensor(path: Path, tensors: dict[str, np.ndarray], name: str, shape: tuple[
 
 
 def training_summary(network: TransitionNetwork) -> dict:
-    """What the file says of its training, as a dictionary."""
+    """The file's notes on its training, as a dictionary."""
     return json.loads(network.metadata.get("training", "{}"))

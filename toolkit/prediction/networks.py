@@ -24,11 +24,11 @@ def load_networks(robot: RobotModel, folder: Path | None = None) -> dict[Categor
     """The networks of every category that the robot can perform.
 
     Args:
-        robot: whose `networks/` folder is read unless `folder` is given.
-        folder: another folder of networks.
+        robot: The robot, whose `networks/` folder is read unless `folder` is given.
+        folder: Another folder of networks.
 
     Raises:
-        NetworkError: see `load_network`.
+        NetworkError: See `load_network`.
     """
     folder = folder or robot.folder / "networks"
     return {
@@ -42,8 +42,8 @@ class NetworkEvaluator(TransitionEvaluator):
     """Judges by networks; hands transitions that lie outside the trained timings and frictions to another judge.
 
     Attributes:
-        networks: By category.
-        stand_in: Judges what the networks have not been trained for; None: the networks judge all the same.
+        networks: Networks by category.
+        stand_in: Judges what the networks have not been trained for; None: the networks judge this as well.
     """
 
     networks: dict[Category, TransitionNetwork]
@@ -55,7 +55,7 @@ class NetworkEvaluator(TransitionEvaluator):
         """Judge transitions; see `TransitionEvaluator`.
 
         Raises:
-            NetworkError: the state or a contact is not finite, or there is no network for a category.
+            NetworkError: The state or a contact is not finite, or there is no network for a category.
         """
         all_rows, n = TransitionRows.of(transitions), len(transitions)
         feasible, objective = np.zeros(n, bool), np.zeros(n)

@@ -1,8 +1,8 @@
 """CoMs that are out of reach by rounding only.
 
-The optimiser likes to end a transition with an arm or a leg stretched to its limit. The search rounds that CoM to
-1 mm, and networks predict it within some millimetres, so that the next transition would begin just out of reach, for
-no reason of dynamics. Such a CoM is moved back to where all limbs reach their contacts.
+The optimiser often ends a transition with an arm or a leg stretched to its limit. The search rounds that CoM to 1 mm,
+and networks predict it within some millimetres. The next transition would then begin just out of reach, though its
+dynamics allow it. Such a CoM is moved back to where all limbs reach their contacts.
 """
 
 from __future__ import annotations
@@ -15,25 +15,16 @@ from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 
 SLACK = 0.01
-"""m; about what networks err in the CoM. Further out is out of reach."""
-_INSIDE = 1e-6  # m; by so much a moved CoM is within reach
+"""m; about the error of networks in the CoM. A CoM that violates a bound by more is out of reach."""
+_INSIDE = 1e-6  # m by which a moved CoM is within reach
 _ROUNDS = 20
 
 
-def within_reach(
-    robot: RobotModel, stance: Stance, com: np.ndarray, config: ProblemConfig | None = None, *, slack: float = SLACK
-) -> np.ndarray:
-    """CoMs moved by little so that every limb reaches its contact and none is too low.
+def within_reach(robot: RobotModel, stance: Stance, com: np.ndarray, config: ProblemConfig | None = None) -> np.ndarray:
+    """CoMs (n, 3) m, world, moved by little so that every limb reaches its contact and none is too low.
 
-    Args:
-        robot: reach of its limbs.
-        stance: contacts.
-        com: (n, 3) m, world.
-        config: of the problems, for the least height.
-        slack: m; a CoM that violates a bound by more stays as it is.
-
-    Returns:
-        (n, 3) m; unchanged rows where nothing is violated, or where no such place was found.
+    Rows that violate nothing, violate a bound by more than `SLACK` m or find no such place stay unchanged. The settings
+    `config` of the problems say how low a CoM may be.
     """
     com = np.asarray(com, float)
     feet = stance.mean_feet
@@ -57,7 +48,7 @@ def within_reach(
         return np.maximum(distances.max(1), least - points[:, 2])
 
     before = violation(com)
-    rows = np.flatnonzero((before > 0.0) & (before <= slack))
+    rows = np.flatnonzero((before > 0.0) & (before <= SLACK))
     if not len(rows):
         return com
     moved = com[rows]

@@ -6,8 +6,8 @@ step enter through their sum w_t alone, hard rows on each wrench, and soft rows 
     min  sum_t 1/2 x_t' Q_t x_t + q_t' x_t + sum_j 1/2 u_j' R_j u_j + sum_k price (v_k + v_k^2 / (2 softness))
     s.t. x_{t+1} = A_t x_t + B_t sum_j E_j u_j + b_t,    G_j u_j <= g_j,    S_k x_{t(k)} <= s_k + v_k,  v_k >= 0
 
-with the last states of x_0 free. It always has a solution where g > 0. Mehrotra's predictor and corrector; the Newton
-step of all steps by one Riccati sweep over w (see `sweep`).
+with the last states of x_0 free. It always has a solution where g > 0. The method is Mehrotra's predictor and
+corrector; one Riccati sweep over w gives the Newton step (see `sweep`).
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ class Program(NamedTuple):
     """The program's arrays for N steps, C contacts with m rows each, K soft rows and n states.
 
     Attributes:
-        a: (N, n, n), b: (N, n, 6), drift: (N, n).
-        cost: (N + 1, n, n), slope: (N + 1, n).
+        a, b, drift: (N, n, n) A, (N, n, 6) B and (N, n) b.
+        cost, slope: (N + 1, n, n) Q and (N + 1, n) q.
         first: (N + 1,) first contact of each step, and C.
         spread: (C, 6, 6) E.
         weight: (C, 6) diagonal of R.
-        rows: (C, m, 6), bound: (C, m).
-        knot: (K,) int, soft_rows: (K, n), soft_bound: (K,).
-        price: (K,); softness: m or rad by which a violation's price doubles.
-        start: (12,).
+        rows, bound: (C, m, 6) G and (C, m) g.
+        knot, soft_rows, soft_bound: (K,) t(k), (K, n) S and (K,) s.
+        price, softness: (K,) prices, and the violation in m or rad that doubles them.
+        start: (12,) given states of x_0.
     """
 
     a: np.ndarray
@@ -54,12 +54,9 @@ class Program(NamedTuple):
 
 
 class _Point(NamedTuple):
-    """Where an iteration is, or its step.
+    """An iterate or its step: wrenches (C, 6), states (N + 1, n), and complementary pairs (C m + 2 K,).
 
-    Attributes:
-        u: (C, 6) wrenches.
-        x: (N + 1, n) states.
-        slack, dual: (C m + 2 K,) complementary pairs: hard rows, soft rows, and the soft rows' violations.
+    The pairs belong to the hard rows, the soft rows, and the soft rows' violations.
     """
 
     u: np.ndarray
@@ -83,14 +80,14 @@ def solve(p, u, free, max_iterations, tolerance):
     """Solve a program.
 
     Args:
-        p: the `Program`.
-        u: (C, 6) start, overwritten with the solution.
-        free: (n - 12,) start of the free states.
-        max_iterations: bound.
-        tolerance: on rows' residuals and on the mean complementarity.
+        p: The `Program`.
+        u: Wrenches (C, 6) to start from; the solution replaces them.
+        free: Free states (n - 12,) to start from.
+        max_iterations: Largest number of iterations.
+        tolerance: Bound on the rows' residuals and on the mean complementarity.
 
     Returns:
-        (N + 1, n) states, iterations, last residual and complementarity.
+        States (N + 1, n), number of iterations, last residual and last complementarity.
     """
     return _solve(p, u, free, max_iterations, tolerance)
 
@@ -169,7 +166,7 @@ def _residuals(p, u, x, violation, slack, residual):
 
 @compiled(reordered=True)
 def _curve(p, point, curvature):
-    """Fill in what the rows add to the Hessians."""
+    """Fill in the curvature that the rows add to the Hessians."""
     slack, dual, scale, soft_scale = point.slack, point.dual, curvature.hard, curvature.soft
     contacts, rows = scale.shape
     hard, soft = contacts * rows, soft_scale.size

@@ -1,4 +1,4 @@
-"""What a replan pays for deviating from the plan at its knots."""
+"""The costs of a replan for deviating from the plan at its knots."""
 
 from __future__ import annotations
 
@@ -8,31 +8,27 @@ from toolkit.control.corrector import PENDULUM_RATE
 from toolkit.replanning.linear_motion import FreeLandings, Window
 from toolkit.replanning.sweep import GIVEN
 
-# Weights: of the CoM per m^2 s and its velocity per m^2/s, horizontal and vertical: the height
-# has no landing point to help it.
+# Weights of the CoM per m^2 s, and of its velocity per m^2/s, horizontal and vertical (no landing point helps there).
 COM, VELOCITY, CLIMB = 200.0, 5.0, 40.0
-# Of the angular momentum per mass, per (m^2/s)^2 s, and of its rate, per (m^2/s^2)^2 s: arms and trunk must follow.
+# Weights of the angular momentum per mass, per (m^2/s)^2 s, and of its rate, which arms and trunk must follow.
 SPIN, SPIN_RATE = 100.0, 8.0
-FINAL = 2000.0  # per m^2; of the divergence at the end of the horizon, beyond which nothing is seen
-LANDING = 30.0  # per m^2; of a landing point's shift: the plan's places were chosen for what follows
-LANDING_CHANGE = 4.0  # per m^2; of its change since the last replan: a foot that is sent to and fro lands badly
+FINAL = 2000.0  # per m^2 of divergence at the end of the horizon
+LANDING = 30.0  # per m^2 of a landing point's shift: the plan chose its places for what follows
+LANDING_CHANGE = 4.0  # per m^2 of its change since the last replan, which would disturb the swing
 
 
 def knot_costs(
     window: Window, free: FreeLandings, shift: np.ndarray, share: np.ndarray, goal: dict[int, np.ndarray], size: int
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Quadratic costs of the states at the knots.
+    """Quadratic costs of n states: Hessians (N + 1, n, n), gradients (N + 1, n) and a constant.
 
     Args:
-        window: the plan at the knots.
-        free: the landing points that may move.
-        shift: (N, 4, 3) m; of contacts already made.
-        share: (N, 2) of the feet in the load.
-        goal: swings -> (3,) m shift that was decided last.
-        size: n, number of states.
-
-    Returns:
-        Hessians (N + 1, n, n), gradients (N + 1, n) and the constant.
+        window: The plan at the knots.
+        free: The landing points that may move.
+        shift: Shifts (N, 4, 3) in m of contacts already made.
+        share: Shares (N, 2) of the feet in the load.
+        goal: By swing, the shift (3,) in m that was decided last.
+        size: Number n of states.
     """
     dt = window.dt
     spin = window.spin_rows(size)[1:]

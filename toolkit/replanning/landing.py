@@ -1,4 +1,4 @@
-"""Landings: where the contacts to be made may go, as half planes in their own planes."""
+"""Landings: half planes that bound where the contacts to be made may go."""
 
 from __future__ import annotations
 
@@ -11,30 +11,18 @@ from toolkit.replanning.situation import Situation
 from toolkit.world.surface import Surface
 
 CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-MARGIN = 0.01  # m; of the sole from the edge of its surface: what the swing's tracking may miss by
+MAX_SHIFT = 0.15  # m; largest shift of a landing point along each axis of its plane
+MARGIN = 0.01  # m; distance of the sole from the edge of its surface, for errors of the swing's tracking
 GAP = 0.02  # m; between a landing sole and the other one
-SLEW = 0.8  # m/s; by how much a landing point may still move per second that is left: a foot is not faster sideways
+SLEW = 0.8  # m/s; how far a landing point may still move per second that is left: a foot is not faster sideways
 
 
 class Landings:
-    """The contacts that feet are to make, and how far each may be shifted.
+    """The contacts that feet are to make, by their swings, and how far each may be shifted."""
 
-    Attributes:
-        contacts: swing -> the contact that it makes.
-    """
-
-    def __init__(
-        self, swings: tuple[Swing, ...], half_sizes: np.ndarray, surfaces: tuple[Surface, ...], max_shift: float
-    ):
-        """Collect the contacts.
-
-        Args:
-            swings: the planned moves.
-            half_sizes: (4, 2) m; of the patches.
-            surfaces: that contacts lie on, by their index.
-            max_shift: m; along each axis of a landing point's plane.
-        """
-        self._swings, self._half_sizes, self._surfaces, self._max_shift = swings, half_sizes, surfaces, max_shift
+    def __init__(self, swings: tuple[Swing, ...], half_sizes: np.ndarray, surfaces: tuple[Surface, ...]):
+        """Collect the contacts of swings on surfaces; the patches' half sizes are (4, 2) in m."""
+        self._swings, self._half_sizes, self._surfaces = swings, half_sizes, surfaces
         self.contacts: dict[int, Contact] = {
             event: swing.contact
             for event, swing in enumerate(swings)
@@ -43,15 +31,9 @@ class Landings:
         self._regions: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def region(self, event: int, situation: Situation, end: float) -> tuple[np.ndarray, np.ndarray]:
-        """Half planes of a landing point's shift.
+        """Rows (k, 2) and bounds (k,) of at least 0 of a landing point's shift: `rows @ shift <= bounds`.
 
-        Args:
-            event: the swing that makes the contact.
-            situation: what is measured.
-            end: s; when the swing ends.
-
-        Returns:
-            (k, 2) rows and (k,) bounds of at least 0: `rows @ shift <= bounds`.
+        The swing `event` makes the contact and ends at `end` in s.
         """
         swing, contact = self._swings[event], self.contacts[event]
         half = self._half_sizes[swing.limb]
@@ -59,7 +41,7 @@ class Landings:
             self._regions[event] = landing_rows(contact, half, self._surfaces[contact.surface], MARGIN)
         region, room = self._regions[event]
         axes = np.concatenate([np.eye(2), -np.eye(2)])
-        reach = np.full(4, self._max_shift)
+        reach = np.full(4, MAX_SHIFT)
         if event in situation.moving:
             moved = contact.pose.rotation[:, :2].T @ situation.moving[event]
             left = SLEW * max(end - situation.time - 0.05, 0.0)
@@ -76,16 +58,12 @@ class Landings:
 def landing_rows(
     contact: Contact, half_size: np.ndarray, surface: Surface, margin: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shifts of a contact that keep its whole patch on one convex piece of its surface.
+    """Shifts of a contact that keep its whole patch (half sizes (2,) in m) on one convex piece of its surface.
 
-    Args:
-        contact: as planned.
-        half_size: (2,) m; of the patch.
-        surface: that it lies on.
-        margin: m; distance to the piece's edges. Where the planned contact is closer, it may not come closer still.
+    The margin is the distance in m to the piece's edges. Where the planned contact is closer, it may not come closer.
 
     Returns:
-        (k, 2) unit rows and (k,) bounds of at least 0: `rows @ shift <= bounds`, with the shift in m along x and y of
+        Unit rows (k, 2) and bounds (k,) of at least 0: `rows @ shift <= bounds`, with the shift in m along x and y of
         the contact frame.
     """
     corners = (CORNERS * half_size) @ contact.pose.rotation[:, :2].T + contact.pose.position
@@ -108,17 +86,12 @@ def landing_rows(
 def apart_row(
     pose: Pose, half_size: np.ndarray, other: Pose, other_half: np.ndarray, gap: float
 ) -> tuple[np.ndarray, float]:
-    """The half plane that keeps a patch beside another one, seen along its normal.
+    """The half plane that keeps a patch beside another one that rests, seen along the normal of the first.
 
-    Args:
-        pose: of the patch that may be shifted.
-        half_size: (2,) m; of that patch.
-        other: pose of the patch that rests.
-        other_half: (2,) m.
-        gap: m between them; where the planned gap is smaller, it may not shrink.
+    The half sizes are (2,) in m. Where the planned gap is smaller than `gap` in m, it may not shrink.
 
     Returns:
-        (2,) row and bound of at least 0: `row @ shift <= bound`.
+        Row (2,) and bound of at least 0: `row @ shift <= bound`.
     """
     own = CORNERS * half_size
     corners = (CORNERS * other_half) @ other.rotation[:, :2].T + other.position

@@ -1,4 +1,4 @@
-"""The linear dynamics of a replan about the plan: its knots, its contacts, and how wrenches move the states."""
+"""The linear dynamics of a replan about the plan: its knots, its landing points and its contacts."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ class Window:
     """The plan at the N + 1 knots of a replan, the first one at the time of the measured state.
 
     Attributes:
-        first, last: knots of the plan that it begins (or is inside the step of) and ends with.
+        first, last: Knots of the plan: the one before the first time, and the last one.
         times: (N + 1,) s.
-        com, velocity: (N + 1, 3) of the plan.
-        spin: (N + 1, 3) angular momentum about the CoM per mass; of the postures.
-        wrench_spin: (N + 1, 3) the same as the plan's wrenches make it.
+        com, velocity: Each (N + 1, 3); the planned CoM. The state's angular momentum is about the first one.
+        spin, wrench_spin: Each (N + 1, 3); angular momentum about the CoM per mass, of postures and wrenches.
     """
 
     first: int
@@ -54,41 +53,31 @@ class Window:
 
     @property
     def steps(self) -> int:
-        """N."""
+        """The number N of steps."""
         return self.last - self.first
 
     @property
-    def span(self) -> slice:
-        """The steps in the plan's arrays."""
-        return slice(self.first, self.last)
-
-    @property
     def dt(self) -> np.ndarray:
-        """(N,) s."""
+        """Lengths (N,) of the steps in s."""
         return np.diff(self.times)
 
-    @property
-    def origin(self) -> np.ndarray:
-        """(3,) the point about which the state's angular momentum is."""
-        return self.com[0]
-
     def deviation(self, situation: Situation) -> np.ndarray:
-        """(12,) deviation of a measured state from the plan, as the states of `replan_problem` have it."""
+        """Deviation (12,) of a measured state from the plan, in the order of a replan's states."""
         com, velocity = situation.com - self.com[0], situation.velocity - self.velocity[0]
-        spin = situation.spin - self.spin[0] + np.cross(situation.com - self.origin, situation.velocity)
+        spin = situation.spin - self.spin[0] + np.cross(situation.com - self.com[0], situation.velocity)
         return np.concatenate([com - situation.com_shift, velocity, spin, np.zeros(3)])
 
     def spin_rows(self, size: int) -> np.ndarray:
-        """(N + 1, 3, size) the change of angular momentum about the CoM, linear in the states."""
+        """Rows (N + 1, 3, size) of the change of angular momentum about the CoM, linear in the states."""
         rows, axis = np.zeros((self.steps + 1, 3, size)), np.arange(3)
-        rows[:, :, :3], rows[:, :, 3:6] = _skew(self.velocity), -_skew(self.com - self.origin)
+        rows[:, :, :3], rows[:, :, 3:6] = _skew(self.velocity), -_skew(self.com - self.com[0])
         rows[:, axis, 6 + axis] = 1.0
         return rows
 
     def spin_of(self, states: np.ndarray) -> np.ndarray:
-        """(N + 1, 3) the change of angular momentum about the CoM, exactly."""
-        turned = states[:, 6:9] + np.cross(self.com - self.origin, self.velocity)
-        return turned - np.cross(self.com + states[:, :3] - self.origin, self.velocity + states[:, 3:6])
+        """The exact change (N + 1, 3) of angular momentum about the CoM."""
+        turned = states[:, 6:9] + np.cross(self.com - self.com[0], self.velocity)
+        return turned - np.cross(self.com + states[:, :3] - self.com[0], self.velocity + states[:, 3:6])
 
 
 @dataclass(frozen=True)
@@ -96,9 +85,9 @@ class FreeLandings:
     """Landing points that a replan may move.
 
     Attributes:
-        events: swings, the next one first.
-        planes: (3, 2) axes of each landing point's plane.
-        column: (N, 4) which of them a limb stands on in each step; -1 where on none.
+        events: The swings, the next one first.
+        planes: The axes (3, 2) of each landing point's plane.
+        column: (N, 4) index of the landing point that a limb stands on in each step; -1 where on none.
     """
 
     events: list[int]
@@ -109,7 +98,7 @@ class FreeLandings:
     def of(
         cls, events: list[int], planes: list[np.ndarray], nominal: Nominal, contacts: HorizonContacts
     ) -> FreeLandings:
-        """Find where limbs stand on the landing points of these swings."""
+        """Find the steps in which limbs stand on the landing points of these swings."""
         column = np.full(contacts.active.shape, -1)
         for index, event in enumerate(events):
             limb = nominal.swings[event].limb
@@ -117,16 +106,13 @@ class FreeLandings:
         return cls(events, planes, column)
 
     def states(self, index: int) -> slice:
-        """Where the shifts of a landing point stand in the states."""
+        """The states that are the shifts of a landing point."""
         return slice(GIVEN + 2 * index, GIVEN + 2 * index + 2)
 
     def offset_of_feet(self, shift: np.ndarray, share: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-        """Where the CoM should follow shifted feet: rows (N, 3, size) of the states, and a constant (N, 3).
+        """The CoM less the shift of the feet that it should follow: rows (N, 3, size) and a constant (N, 3).
 
-        Args:
-            shift: (N, 4, 3) m; of contacts already made.
-            share: (N, 4) how much of the CoM each foot takes along.
-            size: number of states.
+        Contacts already made have shifts (N, 4, 3) in m; each foot takes its share (N, 2) of the CoM along.
         """
         follow, offset = np.zeros((len(shift), 3, size)), np.zeros((len(shift), 3))
         follow[:, np.arange(3), np.arange(3)] = 1.0
@@ -143,10 +129,10 @@ class Dynamics:
     """x_{t+1} = a x_t + b sum_j spread_j u_j + drift, for C contacts of N steps.
 
     Attributes:
-        step, limb: (C,) of each contact.
+        step, limb: Each (C,); step and limb of each contact.
         first: (N + 1,) first contact of each step, and C.
-        wrench: (C, 6) planned, in the contact frame, in weights.
-        a: (N, n, n), b: (N, n, 6), drift: (N, n), spread: (C, 6, 6).
+        wrench: (C, 6) planned wrenches in the contact frames, in weights.
+        a, b, drift, spread: (N, n, n), (N, n, 6), (N, n) and (C, 6, 6).
     """
 
     step: np.ndarray
@@ -162,16 +148,8 @@ class Dynamics:
     def of(
         cls, window: Window, planned: np.ndarray, contacts: HorizonContacts, landings: FreeLandings, size: int
     ) -> Dynamics:
-        """Linearise about the plan.
-
-        Args:
-            window: the plan at the knots.
-            planned: (N, 4, 6) its wrenches in the contact frames, in weights.
-            contacts: where limbs stand.
-            landings: what is free.
-            size: n, number of states.
-        """
-        steps, dt, origin = window.steps, window.dt, window.origin
+        """Linearise about the plan and its wrenches (N, 4, 6) in the contact frames, in weights, for n states."""
+        steps, dt, origin = window.steps, window.dt, window.com[0]
         step, limb = np.nonzero(contacts.active)
         first = np.concatenate([[0], np.cumsum(contacts.active.sum(1))]).astype(np.int64)
         turn, wrench = contacts.rotation[step, limb], planned[step, limb]
@@ -185,7 +163,7 @@ class Dynamics:
         pulls[:, 2] -= G
 
         a, b = np.tile(np.eye(size), (steps, 1, 1)), np.zeros((steps, size, 6))
-        unit = np.eye(15)[:, None]  # of state, acceleration and moment
+        unit = np.eye(15)[:, None]  # states, acceleration and moment
         moved = np.broadcast_arrays(*advanced(dt[:, None], G, unit[:9], unit[9:12], unit[12:]))
         a[:, :9, :9], b[:, :9] = np.split(np.stack(moved, 1), [9], 2)
         column = landings.column[step, limb]
@@ -198,11 +176,8 @@ class Dynamics:
 
 
 def _planned_rates(window: Window) -> np.ndarray:
-    """(N, 6) the rates that the plan's wrenches make: its acceleration, and its angular momentum about the origin.
-
-    That the postures have another angular momentum is left to the controller.
-    """
-    dt, origin = window.dt, window.origin
+    """Planned acceleration, and rate of angular momentum about the first CoM as the wrenches make it (N, 6)."""
+    dt, origin = window.dt, window.com[0]
     about = window.wrench_spin + np.cross(window.com - origin, window.velocity)
     rates = np.zeros((window.steps, 6))
     rates[:, :3] = np.diff(window.velocity, axis=0) / dt[:, None]
@@ -214,7 +189,7 @@ def _planned_rates(window: Window) -> np.ndarray:
 
 
 def _skew(v: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) matrices of the cross product with (n, 3) vectors."""
+    """Matrices (n, 3, 3) of the cross product with vectors (n, 3)."""
     matrix = np.zeros((len(v), 3, 3))
     matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
     matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = v[:, 2], -v[:, 1], v[:, 0]

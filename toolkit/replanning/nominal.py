@@ -15,10 +15,11 @@ from toolkit.physics.leg import PLANNED, TORQUE_ROLES, leg_clearances, leg_postu
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.motion_dynamics import planned_wrench
 
-DIFFERENCE = 1e-5  # m; of the CoM, for gradients of clearances
+HORIZON = 1.6  # s; how far a replan looks ahead
+DIFFERENCE = 1e-5  # m; step of the CoM for gradients of clearances
 MAX_DT = 0.1  # s; longest step of the grid: a swing has a few of them
 BODY = BodyMargins(length=0.007, ankle=0.05, hip=0.025, height=0.01, torque=0.92)
-"""Margins kept inside the body's limits; smaller than the plan's, so that there is something to correct with."""
+"""Margins kept inside the body's limits. They are smaller than the plan's, so that a correction has some room."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +27,9 @@ class BodyRows:
     """Clearances of K limits of legs and arms, to first order in the CoM, in order of knots.
 
     Attributes:
-        knot: (K,). limb: (K,) whose contact counts; -1 for a leg in the air.
-        clearance: (K,) m or rad, at the plan, margins taken off; at least 0.
-        gradient: (K, 3) with the CoM relative to the contact.
+        knot, limb: Each (K,); the knot, and the limb whose contact counts, or -1 for a leg in the air.
+        clearance: (K,) m or rad at the plan less the margins; at least 0.
+        gradient: (K, 3) with respect to the CoM relative to the contact.
     """
 
     knot: np.ndarray
@@ -42,19 +43,18 @@ class Nominal:
     """A planned motion in M steps, ending with a rest as long as a horizon. SI units, world frame.
 
     Attributes:
-        mass: kg.
+        mass: Mass in kg.
         times: (M + 1,) s.
-        com, velocity: (M + 1, 3).
-        spin: (M + 1, 3) m^2/s; angular momentum about the CoM per mass, that of the postures.
-        wrench_spin: (M + 1, 3) m^2/s; the one that the wrenches make: the optimiser's.
-        acceleration: (M, 3); of the CoM.
-        active: (M, 4) bool. position: (M, 4, 3). rotation: (M, 4, 3, 3). friction: (M, 4). half_size: (4, 2) m.
+        com, velocity, acceleration: (M + 1, 3), (M + 1, 3) and (M, 3).
+        spin, wrench_spin: Each (M + 1, 3) m^2/s; angular momentum about the CoM per mass, of the postures and of the
+            wrenches (the optimiser's).
+        active, position, rotation, friction: Contacts (M, 4), (M, 4, 3), (M, 4, 3, 3) and (M, 4).
         wrench: (M, 4, 6) about the centre of the patch in the contact frame, in weights and weights times 1 m.
-        share: (M, 2) of the feet in the load.
+        share: (M, 2) shares of the feet in the load.
         landing: (M, 4) index of the swing that made the contact; -1 for those of the start.
         torque: (M, 2, 5, 6) torques of the legs' joints per unit of wrench over their limits.
-        rows: limits of the body.
-        swings: the planned moves.
+        rows: Limits of the body.
+        swings: The planned moves.
     """
 
     mass: float
@@ -68,7 +68,6 @@ class Nominal:
     position: np.ndarray
     rotation: np.ndarray
     friction: np.ndarray
-    half_size: np.ndarray
     wrench: np.ndarray
     share: np.ndarray
     landing: np.ndarray
@@ -77,16 +76,9 @@ class Nominal:
     swings: tuple[Swing, ...]
 
     @classmethod
-    def of(cls, motion: CentroidalMotion, reference: Reference, robot: RobotModel, horizon: float) -> Nominal:
-        """The grid of a planned motion.
-
-        Args:
-            motion: the plan.
-            reference: the same at the control ticks; its moves, and the angular momentum of its postures.
-            robot: for the limits of its body.
-            horizon: s; how long the motion rests at its end.
-        """
-        fine, swings = _refined(motion, horizon), reference.swings
+    def of(cls, motion: CentroidalMotion, reference: Reference, robot: RobotModel) -> Nominal:
+        """The grid of a planned motion, with the moves and the postures' angular momentum of its reference."""
+        fine, swings = _refined(motion), reference.swings
         problem, mass = fine.problem, fine.problem.mass
         weight = mass * float(np.linalg.norm(GRAVITY))
         moving = problem.times[:-1] < motion.problem.times[-1] - 1e-9
@@ -110,7 +102,6 @@ class Nominal:
             position=problem.position,
             rotation=problem.rotation,
             friction=problem.friction,
-            half_size=problem.half_size,
             wrench=planned_wrench(fine) / weight,
             share=load / np.maximum(load.sum(1, keepdims=True), 1e-9),
             landing=landing,
@@ -120,7 +111,7 @@ class Nominal:
         )
 
 
-def _refined(motion: CentroidalMotion, horizon: float) -> CentroidalMotion:
+def _refined(motion: CentroidalMotion) -> CentroidalMotion:
     """The same motion on a finer grid, with a rest at its end."""
     problem = motion.solved
     count = np.maximum(np.ceil(problem.dt / MAX_DT - 1e-9).astype(int), 1)
@@ -133,7 +124,7 @@ def _refined(motion: CentroidalMotion, horizon: float) -> CentroidalMotion:
     com = motion.com[step] + inside * (motion.linear_momentum[step] / problem.mass + 0.5 * inside * acceleration)
     share = inside / problem.dt[step, None]
     spin = (1.0 - share) * motion.angular_momentum[step] + share * motion.angular_momentum[step + 1]
-    rest = int(np.ceil(horizon / MAX_DT)) + 1
+    rest = int(np.ceil(HORIZON / MAX_DT)) + 1
     step = np.append(step, np.full(rest, problem.steps - 1))
     zero = np.zeros((rest + 1, 3))
     fine: CentroidalProblem = replace(
@@ -160,7 +151,7 @@ def _refined(motion: CentroidalMotion, horizon: float) -> CentroidalMotion:
 
 
 def _torque_rows(motion: CentroidalMotion, robot: RobotModel, weight: float) -> np.ndarray:
-    """(M, 2, 5, 6) torque of the joints of each stance leg over its limit, per unit wrench in the contact frame."""
+    """Torques (M, 2, 5, 6) of each stance leg's joints over their limits, per unit wrench in the contact frame."""
     problem = motion.problem
     rows = np.zeros((problem.steps, 2, len(TORQUE_ROLES), 6))
     middle, yaw = (motion.com[:-1] + motion.com[1:]) / 2, (problem.yaw[:-1] + problem.yaw[1:]) / 2
@@ -179,14 +170,14 @@ def _torque_rows(motion: CentroidalMotion, robot: RobotModel, weight: float) -> 
 
 
 def _body_rows(motion: CentroidalMotion, robot: RobotModel) -> BodyRows:
-    """Limits of legs and arms at the knots where they count."""
+    """Limits of legs and arms at the knots where they apply."""
     problem = motion.problem
     knots, limbs, positions, rotations = knot_contacts(problem)
     base = rotation_about_z(problem.yaw)
     tables = []
 
     def enter(at: np.ndarray, limb: int, clearances) -> None:
-        """Enter functions of the CoM at knots by differences."""
+        """Enter clearances at knots, and their gradients by central differences."""
         value = clearances(motion.com[at])
         slopes = []
         for axis in range(3):

@@ -1,10 +1,9 @@
 """ReplanProblem: the quadratic program of a replan.
 
-States are deviations from the plan: of the CoM, of its velocity, of the angular momentum per mass about a fixed point
-near it; of the spin (about the CoM) at the knot before; then two shifts along its plane for each landing point that is
-free. Wrenches are deviations too, in weights.
-The dynamics are those of `toolkit.centroidal.problem`, exact but for the product of a landing's shift with the change
-of its force; the limits of the body are linear about the plan.
+The states are deviations from the plan: of the CoM, of its velocity, of the angular momentum per mass about a fixed
+point near it, and of the spin (about the CoM) at the knot before. Each free landing point adds two shifts along its
+plane. The wrenches are deviations too, in weights. The dynamics are those of `toolkit.centroidal.problem`, exact but
+for the product of a landing's shift with the change of its force. The limits of the body are linear about the plan.
 """
 
 from __future__ import annotations
@@ -15,29 +14,30 @@ import numpy as np
 
 from toolkit.control.corrector import PENDULUM_RATE, Cones
 from toolkit.physics.wrench import friction_rows, sole_rows
-from toolkit.replanning.config import ReplanConfig
 from toolkit.replanning.kernel import Program, solve
 from toolkit.replanning.knot_costs import knot_costs
 from toolkit.replanning.landing import Landings
 from toolkit.replanning.linear_motion import Dynamics, FreeLandings, Window
-from toolkit.replanning.nominal import BODY, Nominal
+from toolkit.replanning.nominal import BODY, HORIZON, Nominal
 from toolkit.replanning.situation import HorizonContacts, Situation
 from toolkit.replanning.sweep import GIVEN
 from toolkit.robot.model import RobotModel
 from toolkit.world.surface import Surface
 
+MOVABLE = 2  # contacts to be made whose places are free, at most
+DEADBAND = 0.01  # m; divergence that the controller's gains settle, where every foot is as near to its planned place
 SIDES = 8
 ROWS = SIDES + 12 + 10 + 1
-PRICE = 10.0  # of exceeding the body's limits by 1 m or 1 rad: a small excess is better than a fall
+PRICE = 10.0  # price of exceeding the body's limits, per m or rad: a small excess is better than a fall
 HARD = 1e4  # price of a landing point outside its region, per m
 SOFTNESS = 0.05  # m or rad; excess by which a price doubles
-ROOM = 1e-3  # of the plan's own wrenches inside their rows
-FORCE, MOMENT = 1.0, 5.0  # weights of the wrenches' deviations, per weight and per weight times 1 m, squared, and s
-PALM_MOMENT = 1e3  # weight that keeps a palm's moments as planned: the controller has none
-MAX_ITERATIONS, TOLERANCE = 25, 1e-6  # of the solver
+ROOM = 1e-3  # least distance of the plan's own wrenches to their rows
+FORCE, MOMENT = 1.0, 5.0  # costs per s of the wrenches' squared deviations in weights and weights times 1 m
+PALM_MOMENT = 1e3  # cost that keeps a palm's moments as planned: the controller gives palms none
+MAX_ITERATIONS, TOLERANCE = 25, 1e-6  # limits of the solver
 
 # Landing points stay where they are planned while the divergence left when the next foot lands is at most SETTLED m
-# and the body's limits exceeded on the way cost at most EXCESS: the controller's gains bring that back by themselves.
+# and the body's limits exceeded on the way cost at most EXCESS: the controller's gains suffice for that.
 SETTLED, EXCESS = 0.01, 0.02
 # Swings end early only where the objective exceeds EARLY_OBJECTIVE and falls by EARLY_GAIN; 1 s earlier costs EARLY.
 EARLY_OBJECTIVE, EARLY_GAIN, EARLY = 0.3, 0.3, 3.0
@@ -49,14 +49,13 @@ class Replan:
 
     Attributes:
         times: (N + 1,) s.
-        com, velocity, spin: (N + 1, 3). acceleration, spin_rate: (N, 3).
-        wrench: (N, 4, 6) in the contact frames, in weights; with the contacts' own planned wrenches.
-        landing: swing -> (3,) m shift of its contact.
-        ends: swing -> s; when it ends, where that is before its planned end.
-        objective: reached; excess: its part for limits of the body exceeded.
-        divergence: m; (N + 1,) from the plan.
-        next_landing: knot at which the next foot lands; the last one where none does.
-        iterations: of the solver.
+        com, velocity, spin, acceleration, spin_rate: Each (N + 1, 3), but (N, 3) for the last two.
+        wrench: (N, 4, 6) whole wrenches in the contact frames, in weights.
+        landing: By swing, the shift (3,) of its contact in m.
+        ends: By swing, its end in s where that is before its planned end.
+        objective, excess: The objective reached, and its part for exceeded limits of the body.
+        divergence: (N + 1,) m from the plan.
+        next_landing: Knot at which the next foot lands; the last one where none does.
     """
 
     times: np.ndarray
@@ -72,29 +71,30 @@ class Replan:
     excess: float
     divergence: np.ndarray
     next_landing: int
-    iterations: int
 
 
 class ReplanProblem:
     """Builds and solves the programs of one run."""
 
-    def __init__(self, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...], config: ReplanConfig):
-        self._nominal, self._config = nominal, config
-        self._landings = Landings(nominal.swings, robot.half_sizes, surfaces, config.max_shift)
+    def __init__(self, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...]):
+        self._nominal = nominal
+        self._landings = Landings(nominal.swings, robot.half_sizes, surfaces)
         self._cone_rows: dict[tuple, np.ndarray] = {}
-        self._size = GIVEN + 2 * config.landings
+        self._size = GIVEN + 2 * MOVABLE
 
     def solve(self, situation: Situation) -> Replan | None:
         """The best motion from a measured state; None where the solver gives no answer.
 
-        Landing points move only where the motion cannot be brought back to the plan without that; and where not even
-        that is enough, swings under way may also end earlier, at any of a few times.
+        Landing points move only where the motion cannot return to the plan otherwise. Where even that is not enough,
+        swings under way may also end earlier, at one of a few times.
         """
         if not situation.displaced:
-            kept = self._solve(situation, {}, landings=0)
-            if kept is not None and self._is_settled(kept):
+            kept = self._solve(situation, {}, movable=0)
+            # This suffices if the motion is back at the plan when the next foot lands.
+            if kept and kept.divergence[kept.next_landing] <= SETTLED and kept.excess <= EXCESS:
                 return kept
-        decided = {event: time for event, time in situation.landing.items() if self._is_early(event, time)}
+        swings = self._nominal.swings
+        decided = {event: time for event, time in situation.landing.items() if time < swings[event].end - 1e-3}
         best = self._solve(situation, decided)
         if best is None or best.objective < EARLY_OBJECTIVE:
             return best
@@ -105,29 +105,23 @@ class ReplanProblem:
                     best = found
         return best
 
-    def _is_settled(self, kept: Replan) -> bool:
-        """Whether a motion with the planned landing points is back at the plan when the next foot lands."""
-        return kept.divergence[kept.next_landing] <= SETTLED and kept.excess <= EXCESS
-
-    def _is_early(self, event: int, time: float) -> bool:
-        return time < self._nominal.swings[event].end - 1e-3
-
     def _early_times(self, event: int, earliest: float) -> np.ndarray:
         """The first, middle and last knot between the earliest end of a swing and its planned end."""
         knots = self._nominal.times
         knots = knots[(knots >= earliest - 1e-9) & (knots < self._nominal.swings[event].end - 1e-3)]
         return knots[np.unique([0, len(knots) // 2, len(knots) - 1])] if len(knots) else knots
 
-    def _solve(self, situation: Situation, early: dict[int, float], landings: int | None = None) -> Replan | None:
-        """The best motion with given ends of the swings under way, and at most so many landing points free."""
-        nominal, config, size = self._nominal, self._config, self._size
-        window = Window.of(nominal, situation.time, config.horizon)
+    def _solve(self, situation: Situation, early: dict[int, float], movable: int = MOVABLE) -> Replan | None:
+        """The best motion with given earlier ends of swings, and at most so many movable landing points."""
+        nominal, size = self._nominal, self._size
+        window = Window.of(nominal, situation.time, HORIZON)
         contacts = HorizonContacts.of(nominal, situation, window.first, window.times, early)
-        events = self._free_landings(situation, window, config.landings if landings is None else landings)
+        events = self._free_landings(situation, window, movable)
         planes = [self._landings.contacts[event].pose.rotation[:, :2] for event in events]
         free = FreeLandings.of(events, planes, nominal, contacts)
-        dynamics = Dynamics.of(window, nominal.wrench[window.span], contacts, free, size)
-        share = nominal.share[window.span]
+        span = slice(window.first, window.last)
+        dynamics = Dynamics.of(window, nominal.wrench[span], contacts, free, size)
+        share = nominal.share[span]
         cost, slope, constant = knot_costs(window, free, contacts.shift, share, situation.goal, size)
         rows, bound = self._contact_rows(window, contacts, dynamics, situation.cones)
         knot, soft, soft_bound, price = self._soft_rows(window, contacts, free, situation, early)
@@ -157,7 +151,7 @@ class ReplanProblem:
         guess = np.zeros(size - GIVEN)
         for index, (event, plane) in enumerate(zip(events, planes, strict=True)):
             guess[2 * index : 2 * index + 2] = plane.T @ situation.goal.get(event, np.zeros(3))
-        x, iterations, residual, gap = solve(program, u, guess, MAX_ITERATIONS, TOLERANCE)
+        x, _, residual, gap = solve(program, u, guess, MAX_ITERATIONS, TOLERANCE)
         if not (np.isfinite(x).all() and np.isfinite(u).all() and residual < 1e-3 and gap < 1e-3):
             return None
         excess = price * np.maximum(np.einsum("ki,ki->k", soft, x[knot]) - soft_bound, 0.0)
@@ -183,14 +177,13 @@ class ReplanProblem:
             excess=float(excess.sum()),
             divergence=np.linalg.norm(x[:, :3] + x[:, 3:6] / PENDULUM_RATE, axis=1),
             next_landing=int(np.searchsorted(times, next_end) if next_end < times[-1] else window.steps),
-            iterations=iterations,
         )
 
     def _start(self, window: Window, situation: Situation) -> np.ndarray:
-        """(12,) the measured deviation from the plan, less what is too small to be worth a reaction."""
+        """The measured deviation (12,) from the plan, less a deadband that needs no reaction."""
         start = window.deviation(situation)
         divergence = float(np.linalg.norm(start[:3] + start[3:6] / PENDULUM_RATE))
-        start *= max(1.0 - self._config.deadband / max(divergence, 1e-9), 0.0)
+        start *= max(1.0 - DEADBAND / max(divergence, 1e-9), 0.0)
         start[:3] += situation.com_shift
         return start
 
@@ -209,7 +202,7 @@ class ReplanProblem:
         return free
 
     def _contact_rows(self, window: Window, contacts: HorizonContacts, dynamics: Dynamics, cones: Cones):
-        """Rows and bounds of the wrenches' deviations."""
+        """Rows (C, ROWS, 6) and bounds (C, ROWS) of the wrenches' deviations."""
         step, limb = dynamics.step, dynamics.limb
         friction = contacts.friction[step, limb]
         rows, limit = np.zeros((len(step), ROWS, 6)), np.zeros((len(step), ROWS))
@@ -223,7 +216,7 @@ class ReplanProblem:
         return rows, np.maximum(limit - np.einsum("cri,ci->cr", rows, dynamics.wrench), ROOM)
 
     def _cone(self, limb: int, friction: float, cones: Cones) -> np.ndarray:
-        """(SIDES + 12, 6) rows of a contact's cone."""
+        """Rows (SIDES + 12, 6) of a contact's cone."""
         key = limb, friction, cones.friction, cones.yaw, float(cones.half_size[limb, 0])
         rows = self._cone_rows.get(key)
         if rows is None:
@@ -236,7 +229,7 @@ class ReplanProblem:
         return rows
 
     def _soft_rows(self, window: Window, contacts: HorizonContacts, free: FreeLandings, situation: Situation, early):
-        """Limits of the body after the first knot, then regions of the landing points."""
+        """Knots, rows, bounds and prices of the body's limits after the first knot, then of the landing regions."""
         nominal, size, first = self._nominal, self._size, window.first
         table = nominal.rows
         begin, end = np.searchsorted(table.knot, [first + 1, window.last + 1])
@@ -244,7 +237,7 @@ class ReplanProblem:
         gradient, clearance = table.gradient[begin:end], table.clearance[begin:end]
         rows = np.zeros((end - begin, size))
         rows[:, :3] = -gradient
-        # The contact of the step before the knot, or where there is none of the one after it.
+        # The contact of the step before the knot or, where there is none, of the step after it.
         step = np.where(nominal.active[first + knot - 1, limb] | (knot >= window.steps), knot - 1, knot)
         contact = limb >= 0
         bound = clearance - np.where(contact, (gradient * contacts.shift[step, limb]).sum(1), 0.0)

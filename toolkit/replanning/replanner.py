@@ -14,17 +14,17 @@ from toolkit.control.limb_target import LimbTargets
 from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.replanning.config import ReplanConfig
-from toolkit.replanning.nominal import Nominal
-from toolkit.replanning.replan import Replan, ReplanProblem
+from toolkit.replanning.nominal import HORIZON, Nominal
+from toolkit.replanning.replan import DEADBAND, Replan, ReplanProblem
 from toolkit.replanning.situation import Situation
-from toolkit.robot.model import RobotModel
-from toolkit.world.surface import Surface
+from toolkit.wholebody.plan import WholeBodyPlan
 
-PACE = 1.9  # of the plan's; a swing goes on at most so much faster where its contact is needed earlier...
-PACE_RATE = 12.0  # 1/s; ... changing its pace by this much per second...
-SHORTEST = 0.3  # s; ... unless the whole swing would be shorter than this: legs are not faster
-KEPT_FROM = 0.75  # of the swing, after which the landing point is kept: the foot comes down
+MAX_FRICTION = 0.9  # largest friction margin of plans to replan: a descent at the limit of friction is better followed
+PERIOD = 0.04  # s; time between replans
+PACE = 1.9  # largest pace, relative to the plan, of a swing whose contact is needed earlier
+PACE_RATE = 12.0  # 1/s; rate at which the pace changes
+SHORTEST = 0.3  # s; least duration of a whole swing at that pace
+KEPT_FROM = 0.75  # part of the swing after which the landing point is kept, because the foot comes down
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,11 @@ class ReplanCounts:
     """How a run was replanned.
 
     Attributes:
-        replans: how many.
-        replan_failures: those that gave no answer, so that the one before went on.
-        replan_departures: those that had to leave the plan.
-        replan_landings: those that moved a landing point.
-        replan_seconds: of the processor for one that departs, on average (never decides anything).
+        replans: Number of replans.
+        replan_failures: Replans that gave no answer, so that the one before went on.
+        replan_departures: Replans that had to leave the plan.
+        replan_landings: Replans that moved a landing point.
+        replan_seconds: Mean processor time in s of one that departs. It decides nothing.
     """
 
     replans: int = 0
@@ -47,34 +47,21 @@ class ReplanCounts:
 
 
 class Replanner:
-    """Solves a tracking problem over the next contacts at a fixed rate and says what to track.
+    """Solves a tracking problem over the next contacts at a fixed rate and moves what the controller tracks.
 
-    Where the robot is within the deadband of its plan, with its feet where they should be, nothing deviates: the plan
-    itself is the optimum, which needs no solving.
+    Where the robot is within the deadband of its plan and its feet are in their places, the plan itself is the
+    optimum, and nothing is solved.
 
     Attributes:
-        com_shift: (3,) m; by how much the feet that bear the plan stand off it, where that is more than the deadband.
+        com_shift: (3,) m; shift of the plan with the feet that bear it, where they are off by more than the deadband.
     """
 
-    def __init__(
-        self,
-        reference: Reference,
-        nominal: Nominal,
-        robot: RobotModel,
-        surfaces: tuple[Surface, ...],
-        config: ReplanConfig,
-    ):
-        """Prepare for a run.
-
-        Args:
-            reference: the plan at the control ticks.
-            nominal: the plan on the grid of the replans.
-            robot: the robot.
-            surfaces: that contacts lie on, by their index.
-            config: settings.
-        """
-        self._reference, self._nominal, self._config = reference, nominal, config
-        self._problem = ReplanProblem(nominal, robot, surfaces, config)
+    def __init__(self, reference: Reference, plan: WholeBodyPlan):
+        """Prepare for a run of a plan, whose reference is sampled at the control ticks."""
+        self._reference = reference
+        self._period = float(reference.times[1] - reference.times[0])
+        self._nominal = nominal = Nominal.of(plan.motion, reference, plan.robot)
+        self._problem = ReplanProblem(nominal, plan.robot, plan.world.surfaces)
         self._mass = nominal.mass
         self._weight = self._mass * STANDARD_GRAVITY
         self._due = 0.0
@@ -88,48 +75,39 @@ class Replanner:
         self.com_shift = np.zeros(3)
 
     def update(
-        self,
-        index: int,
-        period: float,
-        dynamics: RobotDynamics,
-        tracker: ContactTracker,
-        targets: LimbTargets,
-        cones: Cones,
-        aim: MotionTarget,
+        self, index: int, dynamics: RobotDynamics, targets: LimbTargets, cones: Cones, aim: MotionTarget
     ) -> None:
-        """Replan where it is due, then say what to track.
+        """Replan where it is due, then move what to track.
 
         Args:
-            index: row of the reference.
-            period: s since the last tick.
-            dynamics: measured state.
-            tracker: contact states at this tick.
-            targets: whose landing points are moved.
-            cones: what the controller allows now.
-            aim: overwritten where a replan says otherwise.
+            index: Row of the reference.
+            dynamics: The measured state.
+            targets: Contact states at this tick, and the landing points to move.
+            cones: What the controller allows now.
+            aim: The plan at this row; it is moved by the last replan.
         """
-        time = float(self._reference.times[index])
+        time, period, tracker = float(self._reference.times[index]), self._period, targets.tracker
         for limb in dynamics.limbs:
             if tracker.made[limb]:
                 swing = tracker.current[limb]
                 self._made[limb] = self._nominal.swings.index(swing) if swing is not None else -1
                 if swing is not None and swing.contact is not None:
                     off = dynamics.limb_position[limb] - swing.contact.pose.position
-                    self._moved[limb] = off if np.linalg.norm(off) > self._config.deadband else 0.0
+                    self._moved[limb] = off if np.linalg.norm(off) > DEADBAND else 0.0
         if time >= self._due - 1e-9:
-            self._due = time + self._config.period
+            self._due = time + PERIOD
             self._replan(index, dynamics, tracker, cones)
         self._follow_feet(index, period)
         self._track(time, aim)
         self._move_landings(time, period, tracker, targets)
 
     def _replan(self, index: int, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones) -> None:
-        """Solve once, where the plan is left at all; where that fails the last answer goes on."""
+        """Solve once where the plan is left; where that fails the last answer goes on."""
         time, displaced = float(self._reference.times[index]), self._displaced(tracker)
-        if time >= self._nominal.times[-1] - self._config.horizon:
+        if time >= self._nominal.times[-1] - HORIZON:
             return
         self._replans += 1
-        if not displaced and self._divergence(index, dynamics) <= self._config.deadband:
+        if not displaced and self._divergence(index, dynamics) <= DEADBAND:
             self._plan, self._ends = None, {}
             self._goal.clear()
             return
@@ -146,7 +124,7 @@ class Replanner:
         self._seconds += process_time() - began
 
     def _displaced(self, tracker: ContactTracker) -> bool:
-        """Whether feet stand elsewhere than planned, or are on their way there, or to come earlier."""
+        """Whether feet stand elsewhere than planned, are on their way elsewhere, or are to land earlier."""
         if self._ends or np.linalg.norm(self._moved[:2], axis=1).any():
             return True
         for foot in FEET:
@@ -155,18 +133,18 @@ class Replanner:
                 continue
             shift: np.ndarray = self._shift[foot]
             goal: np.ndarray = self._goal.get(self._nominal.swings.index(swing), shift)
-            if max(np.linalg.norm(goal), np.linalg.norm(shift)) > self._config.deadband:
+            if max(np.linalg.norm(goal), np.linalg.norm(shift)) > DEADBAND:
                 return True
-        return bool(np.linalg.norm(self.com_shift) > self._config.deadband)
+        return bool(np.linalg.norm(self.com_shift) > DEADBAND)
 
     def _divergence(self, index: int, dynamics: RobotDynamics) -> float:
-        """In m, from the plan moved with the feet that bear it."""
+        """Divergence in m from the plan moved with the feet that bear it."""
         off = dynamics.com - self._reference.com[index] - self.com_shift
         speed = dynamics.com_velocity - self._reference.com_velocity[index]
         return float(np.linalg.norm(off + speed / PENDULUM_RATE))
 
     def _follow_feet(self, index: int, period: float) -> None:
-        """Let the plan's shift follow the feet that bear it."""
+        """Move the plan's shift towards that of the feet that bear it."""
         load = np.maximum(self._reference.wrench[index, :2, 2], 0.0)
         total = float(load.sum())
         if total > 0.0:
@@ -175,14 +153,14 @@ class Replanner:
 
     @property
     def counts(self) -> ReplanCounts:
-        """What was done so far."""
+        """How the run was replanned so far."""
         mean = self._seconds / max(self._departures, 1)
         return ReplanCounts(self._replans, self._failures, self._departures, self._landings, mean)
 
     def _situation(
         self, time: float, displaced: bool, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones
     ) -> Situation:
-        """What is measured, as the problem wants it."""
+        """The measured situation."""
         standing, fixed, moving, landing, earliest = {}, {}, {}, {}, {}
         for limb in dynamics.limbs:
             if tracker.in_contact[limb]:
@@ -223,7 +201,7 @@ class Replanner:
         return min(max((swing.end - swing.start) / SHORTEST, 1.0), PACE)
 
     def _track(self, time: float, target: MotionTarget) -> None:
-        """Move what to track by the last replan, where it reaches so far; else with the feet that bear it."""
+        """Move the target by the last replan, or beyond its horizon with the feet that bear the plan."""
         plan = self._plan
         if plan is None or time >= plan.times[-1]:
             target.com += self.com_shift
@@ -239,7 +217,7 @@ class Replanner:
         target.wrench[:] = self._weight * plan.wrench[k]
 
     def _move_landings(self, time: float, period: float, tracker: ContactTracker, targets: LimbTargets) -> None:
-        """Move the landing points of the feet in the air smoothly to where and when the last replan wants them."""
+        """Move landing points and paces of feet in the air smoothly to those of the last replan."""
         for foot in FEET:
             if tracker.begun[foot]:
                 self._shift[foot] = self._rate[foot] = 0.0

@@ -1,4 +1,4 @@
-"""What a replan starts from: the measured situation, and which contacts hold in its steps."""
+"""The measured situation that a replan starts from, and the contacts in its steps."""
 
 from __future__ import annotations
 
@@ -16,17 +16,16 @@ class Situation:
     """Measured state at a replan, world frame, SI units.
 
     Attributes:
-        time: s.
-        com, velocity, spin: (3,); spin: angular momentum about the CoM per mass.
-        standing: limbs in contact: the swing that made it (-1: none), (3,) position and (3, 3) rotation of the patch.
-        fixed: swings under way whose landing point is kept -> (3,) m shift from the plan.
-        moving: swings under way whose landing point may still move -> (3,) m shift of the limb by now.
-        goal: swings -> (3,) m shift that was decided last.
-        landing: swings under way -> s; when they end as decided last.
-        earliest: swings under way -> s; when they may end at the earliest.
-        com_shift: (3,) m; of the plan with the feet that bear it.
-        displaced: whether feet stand or go elsewhere than planned, or come earlier.
-        cones: what the controller allows.
+        time: Time in s.
+        com, velocity, spin: Each (3,); `spin` is the angular momentum about the CoM per mass.
+        standing: By limb in contact, the swing that made it (-1: none), position (3,) and rotation (3, 3) of the patch.
+        fixed: By swing under way whose landing point is kept, its shift (3,) from the plan in m.
+        moving: By swing under way whose landing point may still move, the limb's present shift (3,) in m.
+        goal: By swing, the shift (3,) in m that was decided last.
+        landing, earliest: By swing under way, its end in s as decided last, and its earliest possible end.
+        com_shift: (3,) m; shift of the plan with the feet that bear it.
+        displaced: Whether feet stand or go elsewhere than planned, or land earlier.
+        cones: What the controller allows.
     """
 
     time: float
@@ -49,9 +48,10 @@ class HorizonContacts:
     """Contacts in N steps of a horizon.
 
     Attributes:
-        active: (N, 4) bool. position: (N, 4, 3) m as planned. rotation: (N, 4, 3, 3). friction: (N, 4).
+        active, rotation, friction: (N, 4), (N, 4, 3, 3) and (N, 4).
+        position: (N, 4, 3) m, as planned.
         event: (N, 4) swing that makes or made the contact; -1 for those of the start.
-        shift: (N, 4, 3) m; of the contacts that stand or whose landing point is kept, from the plan.
+        shift: (N, 4, 3) m from the plan, of contacts that stand or whose landing point is kept.
     """
 
     active: np.ndarray
@@ -66,11 +66,11 @@ class HorizonContacts:
         """The contacts of a situation.
 
         Args:
-            nominal: the plan.
-            situation: what is measured.
-            first: step of the plan that the horizon begins in.
-            times: (N + 1,) s; knots of the horizon.
-            early: swings -> s; when they end, where that is before their planned end.
+            nominal: The plan.
+            situation: The measured situation.
+            first: Step of the plan in which the horizon begins.
+            times: Knots (N + 1,) of the horizon in s.
+            early: By swing, its end in s where that is before its planned end.
         """
         steps, middle = len(times) - 1, (times[:-1] + times[1:]) / 2
         span = slice(first, first + steps)
@@ -88,7 +88,7 @@ class HorizonContacts:
             friction[here, limb] = swing.contact.friction
         for limb in range(4):
             if active[0, limb] and limb not in situation.standing:
-                active[0, limb] = False  # late: it bears nothing yet
+                active[0, limb] = False  # the limb is late and bears nothing yet
         for limb, (number, place, turned) in situation.standing.items():
             here = event[:, limb] == number
             rotation[here, limb] = turned

@@ -14,12 +14,11 @@ from toolkit.centroidal.kernels import elimination
 from toolkit.centroidal.kernels.elimination import cholesky, solve_lower, solve_upper
 from toolkit.compiled import compiled
 
-GIVEN = 12
-"""Number of states that are given at the start; the ones after them are free."""
+GIVEN = 12  # number of states that are given at the start; the ones after them are free
 
 
 class Curvature(NamedTuple):
-    """What the barrier adds to the Hessian along the rows: hard (C, m) and soft (K,)."""
+    """Curvature that the barrier adds to the Hessian along the rows: hard (C, m) and soft (K,)."""
 
     hard: np.ndarray
     soft: np.ndarray
@@ -29,13 +28,10 @@ class Sweep(NamedTuple):
     """Factors of one iteration.
 
     Attributes:
-        hessian: (C, 6, 6) lower factors.
-        half: (C, 6, 6) hessian^-1/2 E'.
-        total: (N, 6, 6) lower factor K of sum half' half.
-        bk: (N, n, 6) B K.
-        value: (N + 1, n, n).
-        theta: (N, 6, 6) lower factor of I + BK' V BK.
-        gain: (N, 6, n) theta^-1/2 BK' V A.
+        hessian, half: Lower factors (C, 6, 6) of the wrenches' Hessians, and hessian^-1/2 E' (C, 6, 6).
+        total, bk: Lower factor K (N, 6, 6) of the sum of half' half, and B K (N, n, 6).
+        value: Hessians V (N + 1, n, n) of the cost-to-go.
+        theta, gain: Lower factor (N, 6, 6) of I + BK' V BK, and theta^-1/2 BK' V A (N, 6, n).
     """
 
     hessian: np.ndarray
@@ -49,7 +45,7 @@ class Sweep(NamedTuple):
 
 @compiled(reordered=True)
 def allocate(steps, contacts, n):
-    """Room for the factors."""
+    """Allocate the factors."""
     return Sweep(
         np.empty((contacts, 6, 6)),
         np.empty((contacts, 6, 6)),
@@ -122,7 +118,7 @@ def factor(p, curvature, s):
 
 @compiled(reordered=True)
 def _multiply(a, b, out):
-    """Out = a b."""
+    """Write the product of two matrices into a third."""
     for i in range(a.shape[0]):
         for c in range(b.shape[1]):
             out[i, c] = 0.0

@@ -1,1 +1,1 @@
-"""What a person looks at: recording, tables, plots, pictures, files."""
+"""Output for people: recording, tables, plots, pictures, files."""

@@ -11,16 +11,13 @@ from toolkit.report.views import best_direction
 
 
 def blueprint(model: mujoco.MjModel, way: np.ndarray, *, executed: bool, momenta: bool) -> rrb.Blueprint:
-    """Big 3D view with the contact lanes below it on the left; curves in tabs and the text on the right.
+    """A large 3D view with the contact lanes below it on the left; curves in tabs and the text on the right.
 
     Args:
-        model: the world alone, for a camera that it does not hide the robot from.
-        way: (k, 3) m, k >= 2, points on the ground from start to goal.
-        executed: whether there are measured curves.
-        momenta: whether there are planned or measured momenta.
-
-    Returns:
-        The blueprint, on the run's timeline, playing.
+        model: The world alone; the camera is on the side where it hides least.
+        way: (k, 3) m, k >= 2; points on the ground from start to goal.
+        executed: Whether there are measured curves.
+        momenta: Whether there are planned or measured momenta.
     """
     scene = rrb.Spatial3DView(
         origin="world",
@@ -35,10 +32,8 @@ def blueprint(model: mujoco.MjModel, way: np.ndarray, *, executed: bool, momenta
         errors = _curves("tracking", "Tracking error [mm]"), _curves("slip", "Slip of each stance [mm]")
         tabs.append(rrb.Vertical(*errors, name="Tracking"))
     if momenta:
-        linear, angular = "Linear momentum [N s]", "Angular momentum [N m s]"
-        tabs.append(
-            rrb.Vertical(_curves("linear_momentum", linear), _curves("angular_momentum", angular), name="Momenta")
-        )
+        linear = _curves("linear_momentum", "Linear momentum [N s]")
+        tabs.append(rrb.Vertical(linear, _curves("angular_momentum", "Angular momentum [N m s]"), name="Momenta"))
     if executed:
         contacts = _curves("cop_margin", "CoP to the edge [mm]"), _curves("force", "Contact force [N]")
         tabs.append(rrb.Vertical(*contacts, name="Contacts"))
@@ -63,7 +58,7 @@ def _curves(entity: str, name: str) -> rrb.TimeSeriesView:
 
 
 def _eye(model: mujoco.MjModel, way: np.ndarray) -> rrb.EyeControls3D:
-    """A camera beside the way that has all of it in view, on the side that the world hides least."""
+    """A camera that sees the whole way, from the side where the world hides least."""
     ahead = way[-1, :2] - way[0, :2]
     length = float(np.linalg.norm(ahead))
     heading = float(np.arctan2(ahead[1], ahead[0])) if length > 0.1 else 0.0

@@ -1,4 +1,4 @@
-"""Colours that every drawing shares, 0..255."""
+"""Colours that every drawing shares, in 0..255."""
 
 from __future__ import annotations
 
@@ -25,5 +25,5 @@ AXES: tuple[Color, Color, Color] = ((228, 80, 80), (90, 190, 90), (90, 140, 240)
 
 
 def unit(color: Color) -> tuple[float, float, float]:
-    """The colour in 0..1, as matplotlib wants it."""
+    """The colour in 0..1, as matplotlib needs it."""
     return (color[0] / 255, color[1] / 255, color[2] / 255)

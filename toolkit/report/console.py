@@ -1,4 +1,4 @@
-"""What a run shows on the terminal: a row per stage, progress while it works, the checks, the verdict."""
+"""The terminal display of a run: a row per stage, progress of the current stage, the checks, the verdict."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from rich.text import Text
 
 from toolkit.errors import InputError
 from toolkit.execution.check import Check, Result
+from toolkit.pipeline.observer import Observer
 from toolkit.search.result import SearchResult, Solution
 
 STYLES = {Result.PASS: "bold green", Result.FAIL: "bold red", Result.NOT_CHECKED: "yellow"}
@@ -54,7 +55,7 @@ def make_console() -> Console:
 
 
 def progress_bar(console: Console) -> Progress:
-    """A progress bar for counted work; nothing where the output is no terminal."""
+    """A progress bar for counted work; it shows nothing where the output is no terminal."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -66,10 +67,10 @@ def progress_bar(console: Console) -> Progress:
     )
 
 
-class StageConsole:
-    """Shows a run as it goes: an observer of the pipeline.
+class StageConsole(Observer):
+    """Shows a run as it goes.
 
-    On a terminal the stage at work has a line with a spinner, a bar where its share is known, and the time; a stage
+    On a terminal the current stage has a line with a spinner, a bar where its progress is known, and the time. A stage
     that ended leaves a row. Where the output is no terminal, only the rows are printed.
     """
 
@@ -88,17 +89,17 @@ class StageConsole:
         )
         self._task: TaskID | None = None
         self._headed = False
-        weakref.finalize(self, self._progress.stop)  # gives the cursor back however the run ends
+        weakref.finalize(self, self._progress.stop)  # shows the cursor again, even after an error
 
-    def started(self, stage: str, detail: str = "") -> None:
-        """A stage begins."""
+    def started(self, stage: str) -> None:
+        """A stage begins: show its line."""
         self._clear()
         if self.console.is_terminal:
             self._progress.start()
-            self._task = self._progress.add_task(f"{stage:<10}", total=None, detail=detail)
+            self._task = self._progress.add_task(f"{stage:<10}", total=None, detail="")
 
     def progress(self, stage: str, fraction: float | None, detail: str = "") -> None:
-        """A stage goes on; `fraction` in [0, 1] where known."""
+        """A stage goes on; `fraction` is in [0, 1], or None where it is unknown."""
         if self._task is None:
             return
         if fraction is None:
@@ -116,45 +117,32 @@ class StageConsole:
         row = Text(f"{stage:<11}").append(f"{result.value:<8}", style=STYLES[result]).append(f"{seconds:>7.2f} s  ")
         self._line(row.append(" ".join(detail.split())))
 
-    def verdict(
-        self,
-        checks: Sequence[Check],
-        passed: bool,
-        reason: str,
-        folder: Path | None = None,
-        seconds: float | None = None,
-    ) -> None:
-        """Print the checks, then `PASS` or `FAIL: reason` on a line of its own, then where the files are.
+    def verdict(self, checks: Sequence[Check], passed: bool, reason: str, folder: Path, seconds: float) -> None:
+        """Print the checks, then `PASS` or `FAIL: reason` on its own line, then the folder of the run's files.
 
-        Args:
-            checks: of the verdict; no table where there is none.
-            passed: the verdict.
-            reason: one line where it did not pass.
-            folder: of the run's files.
-            seconds: from command to verdict.
+        The table is left out without checks. `seconds` is the time from the command to the verdict.
         """
         self._clear()
         if checks:
-            self.console.print(check_table(checks))
+            self.console.print(_check_table(checks))
         text = "PASS" if passed else f"FAIL: {' '.join(reason.split())}"
         self._line(Text(text, style=STYLES[Result.PASS if passed else Result.FAIL]))
-        if folder is not None:
-            self._line(Text(f"written to {folder}" + ("" if seconds is None else f", {seconds:.1f} s in all")))
+        self._line(Text(f"written to {folder}, {seconds:.1f} s in all"))
 
     def _line(self, text: Text) -> None:
         """Print one line, never wrapped."""
         self.console.print(text, soft_wrap=True)
 
     def _clear(self) -> None:
-        """Take the line of the stage at work away."""
+        """Remove the line of the current stage."""
         if self._task is not None:
             self._progress.remove_task(self._task)
             self._progress.stop()
             self._task = None
 
 
-def check_table(checks: Sequence[Check]) -> Table:
-    """The checks with value, limit and result."""
+def _check_table(checks: Sequence[Check]) -> Table:
+    """A row per check, with its value, limit, unit and result."""
     table = Table(box=box.SIMPLE, pad_edge=False)
     table.add_column("check")
     for name in ("value", "limit"):
@@ -169,7 +157,7 @@ def check_table(checks: Sequence[Check]) -> Table:
 
 
 def solution_table(search: SearchResult, chosen: Solution | None) -> Table:
-    """The sequences that a search found, oldest first, the chosen one marked."""
+    """A row per sequence that a search found, oldest first; the chosen one is marked."""
     table = Table(box=box.SIMPLE, pad_edge=False)
     for name in ("found after", "transitions", "with palms", "cost", "at most x optimal"):
         table.add_column(name, justify="right")

@@ -18,10 +18,8 @@ Losses = tuple[Sequence[float], Sequence[float]]
 def draw_curves(curves: Mapping[Category, Mapping[str, Losses]], path: Path) -> None:
     """Write a picture of learning curves: a row per category, a column per network.
 
-    Args:
-        curves: category -> name of the network -> its losses per epoch on the training and on the validation set; the
-            weights of the epoch with the lowest of the latter were kept.
-        path: file; the ending gives the format (png, pdf, svg).
+    Each network has its losses per epoch on the training and on the validation set. The weights of the epoch with the
+    lowest validation loss were kept. The ending of `path` gives the format (png, pdf, svg).
     """
     columns = sorted({name for networks in curves.values() for name in networks})
     rows = max(len(curves), 1)
@@ -39,7 +37,7 @@ def draw_curves(curves: Mapping[Category, Mapping[str, Losses]], path: Path) -> 
 
 
 def _draw(axes, losses: Losses) -> None:
-    """One panel."""
+    """Draw one panel."""
     training, validation = losses
     axes.semilogy(training, color=unit(OPTIMISED), label="training")
     axes.semilogy(validation, color=unit(EXECUTED), label="validation")

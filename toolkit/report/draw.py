@@ -1,4 +1,4 @@
-"""Drawing helpers that every recording shares: colours, the scene, the robot's bodies, surfaces, contact patches."""
+"""Drawings that every recording shares: the scene, the robot's bodies, surfaces, the goal, contact patches."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from toolkit.report.meshes import TriangleMesh, geom_rgba, mesh_of_geom, name_of
 from toolkit.world.surface import Surface
 from toolkit.world.world import Goal
 
-ROBOT_ALPHA = 140  # of 255, so that the CoM and the forces inside the robot are seen
-SCENE_SHADE = 0.8  # darkens the scene a little, so that what is drawn on a bright floor stands out
-
+ROBOT_ALPHA = 140  # of 255, so that the CoM and the forces inside the robot are visible
+SCENE_SHADE = 0.8  # darkens the scene a little, so that drawings on a bright floor are clear
 SURFACE_OFFSET = 0.002  # m along the normal, so that a surface does not flicker with the geom it lies on
+PATCH_ALPHA = 150  # of 255, for the fill of contact patches
 
 
 @contextmanager
@@ -47,8 +47,8 @@ def recording(
         stream.disconnect()
 
 
-def draw_scene(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "world/scene") -> None:
-    """Draw every geom that cannot move, one entity each, where the compiled `model` puts it."""
+def draw_scene(stream: rr.RecordingStream, model: mujoco.MjModel) -> None:
+    """Draw every geom that cannot move, one entity each, where the compiled `model` has it."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     geoms = np.flatnonzero(static_bodies(model)[model.geom_bodyid])
@@ -61,16 +61,15 @@ def draw_scene(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "w
     for geom in shown_geoms(model, geoms):
         mesh = mesh_of_geom(model, geom, plane_extent=extent)
         pose = Pose(data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom])
-        entity = rr.new_entity_path([*path.split("/"), name_of(model, mujoco.mjtObj.mjOBJ_GEOM, geom)])
+        entity = rr.new_entity_path(["world", "scene", name_of(model, mujoco.mjtObj.mjOBJ_GEOM, geom)])
         shade = geom_rgba(model, geom) * [SCENE_SHADE, SCENE_SHADE, SCENE_SHADE, 1.0]
-        stream.log(entity, mesh_archetype(_moved(mesh, pose), shade), static=True)
+        stream.log(entity, _mesh_archetype(_moved(mesh, pose), (shade * 255).astype(np.uint8)), static=True)
 
 
-def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "world/robot") -> dict[int, str]:
+def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel) -> dict[int, str]:
     """Draw the shape of every body that can move, one mesh each, in the body's frame.
 
-    Returns:
-        Body index -> entity path, to which the caller logs `world_from_body` transforms.
+    Returns the entity path of each body index; the caller logs `world_from_body` transforms to it.
     """
     entities = {}
     moving = np.flatnonzero(~static_bodies(model))
@@ -87,21 +86,18 @@ def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel, path: str = "
             [np.tile(geom_rgba(model, g), (len(m.vertices), 1)) for g, m in zip(parts, meshes, strict=True)]
         )
         offsets = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
-        entities[int(body)] = rr.new_entity_path([*path.split("/"), name_of(model, mujoco.mjtObj.mjOBJ_BODY, body)])
-        shape = rr.Mesh3D(
-            vertex_positions=np.concatenate([mesh.vertices for mesh in meshes]).astype(np.float32),
-            triangle_indices=np.concatenate([m.triangles + o for m, o in zip(meshes, offsets, strict=True)]),
-            vertex_normals=np.concatenate([mesh.normals for mesh in meshes]).astype(np.float32),
-            vertex_colors=(colors * 255).astype(np.uint8),
-            albedo_factor=[255, 255, 255, ROBOT_ALPHA],
+        entities[int(body)] = rr.new_entity_path(["world", "robot", name_of(model, mujoco.mjtObj.mjOBJ_BODY, body)])
+        whole = TriangleMesh(
+            np.concatenate([mesh.vertices for mesh in meshes]),
+            np.concatenate([m.triangles + o for m, o in zip(meshes, offsets, strict=True)]),
+            np.concatenate([mesh.normals for mesh in meshes]),
         )
+        shape = _mesh_archetype(whole, [255, 255, 255, ROBOT_ALPHA], (colors * 255).astype(np.uint8))
         stream.log(entities[int(body)], shape, static=True)
     return entities
 
 
-def draw_surfaces(
-    stream: rr.RecordingStream, surfaces: Iterable[Surface], path: str = "world/surfaces", *, alpha: int = 50
-) -> None:
+def draw_surfaces(stream: rr.RecordingStream, surfaces: Iterable[Surface], alpha: int = 50) -> None:
     """Draw extracted surfaces: outlines with their index, and a translucent fill; blue for feet, amber for palms."""
     groups: dict[str, list[Surface]] = {"foot": [], "palm": [], "other": []}
     for surface in surfaces:
@@ -115,20 +111,18 @@ def draw_surfaces(
                 strips.append(_on_surface(surface, np.vstack([ring, ring[:1]])))
                 labels.append(f"{surface.index}: {surface.geom}" if index == 0 else "")
         outline = rr.LineStrips3D(strips, radii=0.003, colors=color, labels=labels, show_labels=False)
-        stream.log(f"{path}/{name}/outline", outline, static=True)
+        stream.log(f"world/surfaces/{name}/outline", outline, static=True)
         fill = _fill([_on_surface(surface, piece) for surface in group for piece in surface.pieces])
         if len(fill.triangles):
-            rgba = np.array([*color, alpha]) / 255
-            stream.log(f"{path}/{name}/fill", mesh_archetype(fill, rgba), static=True)
+            stream.log(f"world/surfaces/{name}/fill", _mesh_archetype(fill, [*color, alpha]), static=True)
 
 
-def draw_goal(stream: rr.RecordingStream, goal: Goal, path: str = "world/goal") -> None:
+def draw_goal(stream: rr.RecordingStream, goal: Goal) -> None:
     """Draw the goal as a circle with its label."""
     angle = np.linspace(0, 2 * np.pi, 65)
-    ring = (
-        np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], -1) * goal.radius + goal.position + [0, 0, 0.01]
-    )
-    stream.log(path, rr.LineStrips3D([ring], radii=0.008, colors=GOAL, labels=["goal"]), static=True)
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], -1)
+    ring = circle * goal.radius + goal.position + [0, 0, 0.01]
+    stream.log("world/goal", rr.LineStrips3D([ring], radii=0.008, colors=GOAL, labels=["goal"]), static=True)
 
 
 def draw_patches(
@@ -136,53 +130,40 @@ def draw_patches(
     path: str,
     contacts: Sequence[Contact],
     half_sizes: np.ndarray,
-    *,
-    labels: Sequence[str] | None = None,
-    alpha: int = 150,
-    static: bool = True,
+    labels: Sequence[str],
 ) -> None:
-    """Draw contact patches as filled rectangles coloured by limb.
+    """Draw contact patches as labelled, filled rectangles coloured by limb, at all times.
 
-    Args:
-        stream: the recording.
-        path: entity; the outline goes to `path`, the fill to `path`/fill.
-        contacts: any number.
-        half_sizes: (4, 2) m, by limb.
-        labels: one text per contact.
-        alpha: 0..255, of the fill.
-        static: whether the patches hold at all times (else at the stream's current time).
+    The outline goes to the entity `path`, the fill to `path`/fill. Half sizes are (4, 2) m, by limb.
     """
-    corners = [patch_corners(contact.pose, half_sizes[contact.limb]) for contact in contacts]
     colors = [LIMB_COLORS[contact.limb] for contact in contacts]
-    strips = [np.vstack([quad, quad[:1]]) for quad in corners]
-    outline = rr.LineStrips3D(strips, radii=0.004, colors=colors, labels=labels, show_labels=labels is not None)
-    stream.log(path, outline, static=static)
-    fill = _fill(corners)
+    strips = patch_outlines(contacts, half_sizes)
+    outline = rr.LineStrips3D(strips, radii=0.004, colors=colors, labels=labels, show_labels=True)
+    stream.log(path, outline, static=True)
     shades = np.repeat([[*color, 255] for color in colors], 4, axis=0).reshape(-1, 4).astype(np.uint8)
-    mesh = rr.Mesh3D(
-        vertex_positions=fill.vertices.astype(np.float32),
-        triangle_indices=fill.triangles,
-        vertex_normals=fill.normals.astype(np.float32),
-        vertex_colors=shades,
-        albedo_factor=[255, 255, 255, alpha],
-    )
-    stream.log(f"{path}/fill", mesh, static=static)
+    fill = _fill([strip[:4] for strip in strips])
+    stream.log(f"{path}/fill", _mesh_archetype(fill, [255, 255, 255, PATCH_ALPHA], shades), static=True)
 
 
-def patch_corners(pose: Pose, half_size: np.ndarray) -> np.ndarray:
-    """(4, 3) m corners in the world of a patch with half extents (2,), lifted off the surface a little."""
-    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], float)
-    local = np.concatenate([signs * half_size, np.full((4, 1), 2 * SURFACE_OFFSET)], axis=1)
-    return pose @ local
+def patch_outlines(contacts: Sequence[Contact], half_sizes: np.ndarray) -> list[np.ndarray]:
+    """Closed outline (5, 3) m of each contact in the world."""
+    return [patch_outline(contact.pose, half_sizes[contact.limb]) for contact in contacts]
 
 
-def mesh_archetype(mesh: TriangleMesh, rgba: np.ndarray) -> rr.Mesh3D:
-    """A mesh in one colour (4,) of 0..1."""
+def patch_outline(pose: Pose, half_size: np.ndarray) -> np.ndarray:
+    """(5, 3) m; closed outline in the world of a patch with half extents (2,) m, lifted off the surface a little."""
+    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]], float)
+    return pose @ np.concatenate([signs * half_size, np.full((5, 1), 2 * SURFACE_OFFSET)], axis=1)
+
+
+def _mesh_archetype(mesh: TriangleMesh, rgba: list[int] | np.ndarray, colors: np.ndarray | None = None) -> rr.Mesh3D:
+    """A mesh in one colour (4,), times a colour (n, 4) per vertex where given, all in 0..255."""
     return rr.Mesh3D(
         vertex_positions=mesh.vertices.astype(np.float32),
         triangle_indices=mesh.triangles,
         vertex_normals=mesh.normals.astype(np.float32),
-        albedo_factor=(np.asarray(rgba) * 255).astype(np.uint8),
+        vertex_colors=colors,
+        albedo_factor=rgba,
     )
 
 
@@ -192,7 +173,7 @@ def _moved(mesh: TriangleMesh, pose: Pose) -> TriangleMesh:
 
 
 def _on_surface(surface: Surface, points: np.ndarray) -> np.ndarray:
-    """(k, 3) world points of (k, 2) points in the surface frame, lifted off it a little."""
+    """(k, 3) world points of (k, 2) points in the surface frame, lifted off the surface a little."""
     return surface.pose @ np.concatenate([points, np.full((len(points), 1), SURFACE_OFFSET)], axis=1)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-SHOWN_GROUPS = range(3)  # MuJoCo's viewer shows geom groups 0-2; by custom collision-only geoms are in group 3
+SHOWN_GROUPS = range(3)  # MuJoCo's viewer shows geom groups 0-2; collision-only geoms are usually in group 3
 FLAT_SHADED = 2000  # triangles; a finer mesh is shaded smoothly
 
 
@@ -27,7 +27,7 @@ class TriangleMesh:
 
 
 def shown_geoms(model: mujoco.MjModel, geoms: np.ndarray) -> np.ndarray:
-    """Those of `geoms` (k,) int that a viewer shows: visible groups, not fully transparent; all where none is left."""
+    """The `geoms` (k,) int in visible groups that are not fully transparent; all of them where there is none."""
     geoms = np.asarray(geoms, int)
     shown = np.isin(model.geom_group[geoms], list(SHOWN_GROUPS))
     shown &= np.array([geom_rgba(model, geom)[3] > 0.01 for geom in geoms], bool)
@@ -35,12 +35,12 @@ def shown_geoms(model: mujoco.MjModel, geoms: np.ndarray) -> np.ndarray:
 
 
 def static_bodies(model: mujoco.MjModel) -> np.ndarray:
-    """(nbody,) bool: bodies that cannot move, the world body among them."""
+    """(nbody,) bool; bodies that cannot move, with the world body."""
     return model.body_weldid == 0
 
 
 def geom_rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """(4,) float in 0..1: the geom's colour, or its material's times its texture's mean where it kept the default."""
+    """(4,) float in 0..1; colour of a geom. Where it is the default, it is the material's times its texture's mean."""
     material = model.geom_matid[geom]
     if material < 0 or not np.allclose(model.geom_rgba[geom], [0.5, 0.5, 0.5, 1.0]):
         return np.array(model.geom_rgba[geom], float)
@@ -60,15 +60,9 @@ def name_of(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
 
 
 def mesh_of_geom(model: mujoco.MjModel, geom: int, *, plane_extent: float = 10.0) -> TriangleMesh:
-    """Mesh of a geom in the geom's own frame.
+    """Mesh of a geom in the geom's own frame; empty for a kind of geom without a shape.
 
-    Args:
-        model: compiled model.
-        geom: index of the geom.
-        plane_extent: m; half size drawn for a plane that is infinite.
-
-    Returns:
-        The mesh; empty for a kind of geom that has no shape of its own.
+    A plane that is infinite is drawn with half size `plane_extent` in m.
     """
     kind, size = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom]
     if kind == mujoco.mjtGeom.mjGEOM_PLANE:
@@ -106,7 +100,7 @@ def mesh_of_geom(model: mujoco.MjModel, geom: int, *, plane_extent: float = 10.0
 
 
 def _box(half: np.ndarray) -> TriangleMesh:
-    """Box with four vertices a face, so that its edges look sharp."""
+    """Box with four vertices per face, so that its edges look sharp."""
     vertices, normals = [], []
     square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], float)
     for axis in range(3):
@@ -123,7 +117,7 @@ def _box(half: np.ndarray) -> TriangleMesh:
 def _revolve(
     radius: np.ndarray, height: np.ndarray, normal_r: np.ndarray, normal_z: np.ndarray, sides: int = 24
 ) -> TriangleMesh:
-    """Surface of revolution about z of a profile (k,) given from bottom to top."""
+    """Surface of revolution about z of a profile (k,) and its normals, given from bottom to top."""
     angle = np.arange(sides) * 2 * np.pi / sides
     c, s = np.cos(angle), np.sin(angle)
 
@@ -143,13 +137,12 @@ def _flat_shaded(vertices: np.ndarray, triangles: np.ndarray) -> TriangleMesh:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1)
     corners, normal = corners[length > 0], normal[length > 0] / length[length > 0, None]
-    return TriangleMesh(
-        corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), np.repeat(normal, 3, axis=0)
-    )
+    triangles = np.arange(3 * len(corners)).reshape(-1, 3)
+    return TriangleMesh(corners.reshape(-1, 3), triangles, np.repeat(normal, 3, axis=0))
 
 
 def _smooth_shaded(vertices: np.ndarray, triangles: np.ndarray) -> TriangleMesh:
-    """A mesh whose triangles share vertices, with the mean of their normals: a sixth of the size."""
+    """A mesh whose triangles share vertices, with the mean of their normals: a sixth of the size of a flat one."""
     corners = vertices[triangles]
     face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal = np.zeros_like(vertices)
@@ -177,7 +170,5 @@ def _height_field(model: mujoco.MjModel, field: int) -> TriangleMesh:
     x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
     row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
     a = (row * columns + column).ravel()
-    triangles = np.concatenate(
-        [np.stack([a, a + 1, a + columns + 1], -1), np.stack([a, a + columns + 1, a + columns], -1)]
-    )
-    return _flat_shaded(np.stack([x, y, z], -1).reshape(-1, 3), triangles)
+    halves = np.stack([a, a + 1, a + columns + 1], -1), np.stack([a, a + columns + 1, a + columns], -1)
+    return _flat_shaded(np.stack([x, y, z], -1).reshape(-1, 3), np.concatenate(halves))

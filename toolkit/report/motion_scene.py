@@ -1,4 +1,4 @@
-"""What moves in a recording: the robot, centres of mass, planned and made contacts, contact forces, the search."""
+"""Drawings that move in a recording: the robot, centres of mass, planned and made contacts, forces, the search."""
 
 from __future__ import annotations
 
@@ -11,29 +11,28 @@ import rerun as rr
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.contacts.stance import Contact
 from toolkit.execution.result import Execution
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.report.colors import EXECUTED, LIMB_COLORS, OPTIMISED, PREDICTED
-from toolkit.report.draw import draw_bodies, draw_patches, patch_corners
+from toolkit.report.draw import draw_bodies, draw_patches, patch_outline, patch_outlines
 from toolkit.robot.model import RobotModel
 from toolkit.search.result import SearchResult
 
 TIMELINE = "time"
 SEARCH_TIMELINE = "search"
-NEWTON_PER_METRE = 1000.0
-"""Scale of the force arrows."""
+NEWTON_PER_METRE = 1000.0  # scale of the force arrows
 LEAST_FORCE = 1.0  # N; smaller forces are not drawn
+MOST_STATES = 5000  # drawn states of a search; more are thinned evenly
 
 
 def at(times: np.ndarray) -> list[rr.TimeColumn]:
-    """Index of columns: (n,) s on the run's timeline."""
+    """Time index of columns for (n,) s on the run's timeline."""
     return [rr.TimeColumn(TIMELINE, duration=np.asarray(times, float))]
 
 
 def frames(times: np.ndarray, rate: float) -> np.ndarray:
-    """Indices of samples `rate` per second apart, the first and the last one included."""
+    """Indices of `rate` samples per second, with the first and the last sample."""
     if not len(times):
         return np.zeros(0, int)
     wanted = np.arange(times[0], times[-1], 1 / rate)
@@ -72,7 +71,10 @@ def draw_com(
     times: np.ndarray | None,
     moving: np.ndarray | None = None,
 ) -> None:
-    """Draw a CoM as a line along `path` (k, 3) and as a moving point (n, 3) at (n,) s; `moving` None for `path`."""
+    """Draw a CoM as a line along `path` (k, 3) m and, with times (n,) s, as a point that moves along (n, 3) m.
+
+    Where `moving` is None the point moves along `path`.
+    """
     line = rr.LineStrips3D([path], radii=0.006, colors=color)
     stream.log(f"world/com/{name}/path", line, static=True)
     if times is None:
@@ -91,7 +93,7 @@ def draw_centres(
     execution: Execution | None,
     rate: float,
 ) -> None:
-    """Draw the CoM as the search predicted it, as optimised, and as executed."""
+    """Draw the CoM as predicted by the search, as optimised, and as executed, at `rate` Hz."""
     if predicted is not None:
         times = stance_times(schedule) if schedule is not None else None
         if times is not None and len(times) == len(predicted):
@@ -121,34 +123,26 @@ def draw_plan(
     schedule: ContactSchedule | None,
     half_sizes: np.ndarray,
 ) -> None:
-    """Draw the planned contacts, numbered by transition (0: the start), and the ones that hold at each time."""
+    """Draw the planned contacts, numbered by transition (0 for the start), and those that hold at each time."""
     numbered = [(contact, "0") for contact in sequence.start.contacts]
     numbered += [(t.contact, str(i + 1)) for i, t in enumerate(sequence.transitions) if t.contact is not None]
     for limb in Limb:
         mine = [(contact, label) for contact, label in numbered if contact.limb == limb]
         if mine:
             contacts, labels = zip(*mine, strict=True)
-            draw_patches(stream, f"world/plan/{limb.label}", contacts, half_sizes, labels=labels)
+            draw_patches(stream, f"world/plan/{limb.label}", contacts, half_sizes, labels)
     if schedule is None:
         return
     for phase in schedule.phases:
+        colors = [LIMB_COLORS[contact.limb] for contact in phase.contacts]
+        strips = rr.LineStrips3D(patch_outlines(phase.contacts, half_sizes), radii=0.008, colors=colors)
         stream.set_time(TIMELINE, duration=phase.start)
-        draw_held(stream, "world/plan/held", phase.contacts, half_sizes)
+        stream.log("world/plan/held", strips)
     stream.reset_time()
 
 
-def draw_held(
-    stream: rr.RecordingStream, path: str, contacts: tuple[Contact, ...], half_sizes: np.ndarray, radius: float = 0.008
-) -> None:
-    """Draw the outlines of contacts that hold from the stream's current time on."""
-    quads = [patch_corners(contact.pose, half_sizes[contact.limb]) for contact in contacts]
-    strips = [np.vstack([quad, quad[:1]]) for quad in quads]
-    colors = [LIMB_COLORS[contact.limb] for contact in contacts]
-    stream.log(path, rr.LineStrips3D(strips, radii=radius, colors=colors))
-
-
 def draw_made_contacts(stream: rr.RecordingStream, execution: Execution, half_sizes: np.ndarray) -> None:
-    """Draw where limbs really made contact, white outlines that appear at each touchdown and stay."""
+    """Draw where limbs really made contact, as orange outlines that appear at each touchdown and stay."""
     made: list[np.ndarray] = []
     times = execution.samples.tick_times
     start = [limb for limb in Limb if np.linalg.norm(execution.samples.wrench[:1, limb, :3]) > LEAST_FORCE]
@@ -159,8 +153,7 @@ def draw_made_contacts(stream: rr.RecordingStream, execution: Execution, half_si
         pose = execution.samples.limb_pose[row, limb]
         if not np.isfinite(pose).all():
             continue
-        quad = patch_corners(Pose.from_quaternion(pose[:3], pose[3:]), half_sizes[limb])
-        made.append(np.vstack([quad, quad[:1]]))
+        made.append(patch_outline(Pose.from_quaternion(pose[:3], pose[3:]), half_sizes[limb]))
         stream.set_time(TIMELINE, duration=time)
         stream.log("world/executed/contacts", rr.LineStrips3D(made, radii=0.003, colors=EXECUTED))
     stream.reset_time()
@@ -172,12 +165,12 @@ def draw_forces(
     """Draw contact forces as arrows at the centre of pressure, `NEWTON_PER_METRE` to the metre.
 
     Args:
-        stream: the recording.
-        name: part of the entity path, `planned` or `measured`.
+        stream: The recording.
+        name: Part of the entity path, `planned` or `measured`.
         times: (n,) s.
-        wrench: (n, 4, 6) force and moment about the patch centre, world frame.
-        pose: (n, 4, 7) patch poses, position and quaternion wxyz.
-        radius: m of the arrows.
+        wrench: (n, 4, 6) N and N m; force and moment about the patch's centre, in the world.
+        pose: (n, 4, 7) patch poses: position in m and quaternion wxyz.
+        radius: m; of the arrows.
     """
     for limb in Limb:
         force, moment = wrench[:, limb, :3], wrench[:, limb, 3:]
@@ -204,19 +197,14 @@ def _centre_of_pressure(pose: Pose, force: np.ndarray, moment: np.ndarray) -> np
     return pose @ np.array([-local_moment[1] / local_force[2], local_moment[0] / local_force[2], 0.0])
 
 
-def draw_search(
-    stream: rr.RecordingStream, search: SearchResult, ground: Callable[[np.ndarray], np.ndarray], most: int = 5000
-) -> None:
+def draw_search(stream: rr.RecordingStream, search: SearchResult, ground: Callable[[np.ndarray], np.ndarray]) -> None:
     """Draw the expanded states as points and the cost of the solutions over the search's own time.
 
-    Args:
-        stream: the recording.
-        search: its result.
-        ground: heights (n,) m at which to draw points (n, 2).
-        most: points at most; evenly thinned beyond.
+    `ground` maps points (n, 2) m to the heights (n,) m at which they are drawn.
     """
     if len(search.expanded):
-        rows = np.unique(np.linspace(0, len(search.expanded) - 1, min(most, len(search.expanded))).astype(int))
+        count = min(MOST_STATES, len(search.expanded))
+        rows = np.unique(np.linspace(0, len(search.expanded) - 1, count).astype(int))
         states = search.expanded[rows]
         points = np.column_stack([states[:, :2], ground(states[:, :2]) + 0.02])
         age = np.linspace(0, 1, len(points))[:, None]

@@ -9,7 +9,6 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 
 import mujoco
@@ -33,12 +32,12 @@ REMEDY = "apt-get install -y libegl1 libgl1-mesa-dri libosmesa6, or leave pictur
 
 
 def working_backend(backends: Sequence[str] = BACKENDS) -> str:
-    """The first of MuJoCo's context modules that renders without a screen; MUJOCO_GL is tried first where it names one.
+    """The first of MuJoCo's context modules that renders without a screen; one that MUJOCO_GL names is tried first.
 
-    Each is tried in a process of its own: once one that does not work has been loaded, no other can be.
+    Each is tried in its own process: after a module that does not work, no other can be loaded.
 
     Raises:
-        InputError: none works; the message says what to install.
+        InputError: No module works; the message says what to install.
     """
     wanted = os.environ.get("MUJOCO_GL", "").lower()
     reasons = []
@@ -57,7 +56,7 @@ def open_context(width: int, height: int) -> Any:
     """An OpenGL context without a screen, made current.
 
     Raises:
-        InputError: this machine cannot render.
+        InputError: This machine cannot render.
     """
     loaded = [backend for backend in BACKENDS if f"mujoco.{backend}" in sys.modules]
     backend = loaded[0] if loaded else working_backend()
@@ -70,22 +69,17 @@ def open_context(width: int, height: int) -> Any:
 
 
 def require_rendering() -> None:
-    """Find out early whether pictures can be made here.
+    """Check early that this machine can render.
 
     Raises:
-        InputError: they cannot; the message says what to install.
+        InputError: It cannot; the message says what to install.
     """
     open_context(16, 16).free()
 
 
 @dataclass(frozen=True)
 class Patches:
-    """Contact patches to draw as thin plates coloured by limb.
-
-    Attributes:
-        contacts: any number.
-        half_sizes: (4, 2) m, by limb.
-    """
+    """Contact patches to draw as thin plates coloured by limb, with half sizes (4, 2) in m by limb."""
 
     contacts: Sequence[Contact]
     half_sizes: np.ndarray
@@ -95,16 +89,12 @@ class OffscreenRenderer:
     """Renders configurations of one model; close it, or use it as a context manager."""
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int, *, shadows: bool = True):
-        """Open a renderer.
+        """Open a renderer of pictures with `width` and `height` in pixels, for a copy of the model.
 
-        Args:
-            model: compiled scene; copied, not changed.
-            width: pixels.
-            height: pixels.
-            shadows: whether to draw shadows and reflections (about twice the time on a software renderer).
+        Shadows and reflections double the time on a software renderer.
 
         Raises:
-            InputError: this machine cannot render.
+            InputError: This machine cannot render.
         """
         self._model = copy.copy(model)
         self._model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
@@ -121,24 +111,9 @@ class OffscreenRenderer:
         self._pixels = np.empty((height, width, 3), np.uint8)
 
     def render(
-        self,
-        qpos: np.ndarray,
-        camera: mujoco.MjvCamera,
-        *,
-        patches: Patches | None = None,
-        text: str = "",
+        self, qpos: np.ndarray, camera: mujoco.MjvCamera, *, patches: Patches | None = None, text: str = ""
     ) -> np.ndarray:
-        """Picture of a configuration.
-
-        Args:
-            qpos: (nq,).
-            camera: the view.
-            patches: drawn into the scene.
-            text: written into the lower left corner.
-
-        Returns:
-            (height, width, 3) uint8.
-        """
+        """(height, width, 3) uint8; picture of a configuration (nq,), with a text in the lower left corner."""
         self._gl.make_current()
         self._data.qpos[:] = qpos
         mujoco.mj_forward(self._model, self._data)
@@ -156,22 +131,17 @@ class OffscreenRenderer:
         return self._pixels[::-1].copy()
 
     def _add_patch(self, contact: Contact, half_size: np.ndarray) -> None:
-        """Add one plate to the scene about to be rendered."""
+        """Add one plate to the scene."""
         if self._scene.ngeom >= self._scene.maxgeom:
             return
         rgba = np.array([*np.array(LIMB_COLORS[contact.limb]) / 255, 0.7], np.float32)
-        mujoco.mjv_initGeom(
-            self._scene.geoms[self._scene.ngeom],
-            mujoco.mjtGeom.mjGEOM_BOX.value,
-            np.array([*half_size, 0.003]),
-            contact.pose.position,
-            contact.pose.rotation.ravel(),
-            rgba,
-        )
+        geom, size, pose = self._scene.geoms[self._scene.ngeom], np.array([*half_size, 0.003]), contact.pose
+        box = mujoco.mjtGeom.mjGEOM_BOX.value
+        mujoco.mjv_initGeom(geom, box, size, pose.position, pose.rotation.ravel(), rgba)
         self._scene.ngeom += 1
 
     def close(self) -> None:
-        """Give the graphics memory back; the renderer cannot be used afterwards."""
+        """Free the graphics memory; the renderer cannot be used afterwards."""
         self._gl.make_current()
         self._context.free()
         self._gl.free()
@@ -179,7 +149,5 @@ class OffscreenRenderer:
     def __enter__(self) -> OffscreenRenderer:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()

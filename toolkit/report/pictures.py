@@ -15,6 +15,7 @@ from toolkit.report.views import best_direction
 
 DISTANCE = 2.7  # m from the robot to the camera
 ELEVATIONS = (14.0, 35.0, 60.0)  # degrees
+SMOOTHING = 1.0  # s over which the robot's position is averaged for the camera
 
 
 def strip(
@@ -27,19 +28,19 @@ def strip(
     size: tuple[int, int] = (320, 420),
     patches: Patches | None = None,
 ) -> None:
-    """Write a row of pictures at evenly spaced times, the camera following the robot.
+    """Write a PNG file with a row of pictures at evenly spaced times; the camera follows the robot.
 
     Args:
-        scene: compiled scene.
+        scene: Compiled scene.
         qpos: (C, nq) configurations.
         times: (C,) s.
-        path: PNG file.
-        count: number of pictures.
-        size: (width, height) of one, pixels.
-        patches: contact patches to draw.
+        path: The file.
+        count: Number of pictures.
+        size: Width and height of one picture in pixels.
+        patches: Contact patches to draw.
 
     Raises:
-        InputError: this machine cannot render; the message says what to install.
+        InputError: This machine cannot render; the message says what to install.
     """
     rows = np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))
     cameras = follow(scene, qpos, times)
@@ -58,20 +59,13 @@ def video(
     size: tuple[int, int] = (848, 480),
     patches: Patches | None = None,
 ) -> None:
-    """Write an H.264 video in real time, the camera following the robot.
+    """Write an MP4 file with an H.264 video in real time, `fps` pictures per second; else as `strip`.
 
-    Args:
-        scene: compiled scene.
-        qpos: (C, nq) configurations.
-        times: (C,) s.
-        path: MP4 file.
-        fps: pictures per second.
-        size: (width, height) in pixels, multiples of 16.
-        patches: contact patches to draw.
+    Width and height must be multiples of 16 pixels.
 
     Raises:
-        InputError: this machine cannot render; the message says what to install.
-        OSError: the file cannot be written.
+        InputError: This machine cannot render.
+        OSError: The file cannot be written.
     """
     rows = np.searchsorted(times, np.arange(times[0], times[-1] + 1e-9, 1 / fps) - 1e-9)
     cameras = follow(scene, qpos, times)
@@ -93,48 +87,29 @@ def video(
             raise OSError(errno.EIO, f"{path.name} is not whole, the disk may be full")
 
 
-class follow:
-    """Cameras that follow the robot, `follow(...)[i]` for sample i; the side least hidden by the world is taken."""
-
-    def __init__(self, scene: mujoco.MjModel, qpos: np.ndarray, times: np.ndarray, smoothing: float = 1.0):
-        """Choose the view.
-
-        Args:
-            scene: compiled scene with one free joint.
-            qpos: (C, nq).
-            times: (C,) s.
-            smoothing: s over which the robot's position is averaged.
-        """
-        self._target = _smoothed(qpos[:, _base(scene)], times, smoothing) - [0.0, 0.0, 0.15]
-        way = self._target[-1, :2] - self._target[0, :2]
-        if np.linalg.norm(way) < 0.3:
-            w, x, y, z = qpos[0, _base(scene).stop : _base(scene).stop + 4]
-            way = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z)])
-        heading = float(np.arctan2(way[1], way[0]))
-        samples = self._target[:: max(len(times) // 12, 1)]
-        seen = np.concatenate([samples, samples - [0.0, 0.0, 0.5]])
-        way = best_direction(scene, seen, np.tile(samples, (2, 1)), heading, DISTANCE, ELEVATIONS)
+def follow(scene: mujoco.MjModel, qpos: np.ndarray, times: np.ndarray) -> list[mujoco.MjvCamera]:
+    """A camera for each configuration (C, nq) at (C,) s of a scene; it is beside the robot, where least is hidden."""
+    base = int(scene.jnt_qposadr[np.flatnonzero(scene.jnt_type == mujoco.mjtJoint.mjJNT_FREE)[0]])
+    target = _smoothed(qpos[:, base : base + 3], times) - [0.0, 0.0, 0.15]
+    way = target[-1, :2] - target[0, :2]
+    if np.linalg.norm(way) < 0.3:
+        w, x, y, z = qpos[0, base + 3 : base + 7]
+        way = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z)])
+    heading = float(np.arctan2(way[1], way[0]))
+    samples = target[:: max(len(times) // 12, 1)]
+    seen = np.concatenate([samples, samples - [0.0, 0.0, 0.5]])
+    way = best_direction(scene, seen, np.tile(samples, (2, 1)), heading, DISTANCE, ELEVATIONS)
+    cameras = [mujoco.MjvCamera() for _ in target]
+    for camera, place in zip(cameras, target, strict=True):
+        camera.lookat[:], camera.distance = place, DISTANCE
         # MuJoCo's azimuth and elevation are those of the direction in which the camera looks.
-        self.azimuth = np.degrees(np.arctan2(-way[1], -way[0]))
-        self.elevation = -np.degrees(np.arcsin(way[2]))
-
-    def __getitem__(self, index: int) -> mujoco.MjvCamera:
-        camera = mujoco.MjvCamera()
-        camera.lookat[:] = self._target[index]
-        camera.distance, camera.azimuth, camera.elevation = DISTANCE, self.azimuth, self.elevation
-        return camera
+        camera.azimuth, camera.elevation = np.degrees(np.arctan2(-way[1], -way[0])), -np.degrees(np.arcsin(way[2]))
+    return cameras
 
 
-def _base(scene: mujoco.MjModel) -> slice:
-    """Where the position of the first free joint is in qpos."""
-    free = np.flatnonzero(scene.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    first = int(scene.jnt_qposadr[free[0]])
-    return slice(first, first + 3)
-
-
-def _smoothed(position: np.ndarray, times: np.ndarray, span: float) -> np.ndarray:
-    """(C, 3) positions averaged over `span` s around each sample."""
+def _smoothed(position: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """(C, 3) positions averaged over `SMOOTHING` around each sample."""
     total = np.vstack([np.zeros(3), np.cumsum(position, axis=0)])
-    first = np.searchsorted(times, times - span / 2)
-    last = np.searchsorted(times, times + span / 2, side="right")
+    first = np.searchsorted(times, times - SMOOTHING / 2)
+    last = np.searchsorted(times, times + SMOOTHING / 2, side="right")
     return (total[last] - total[first]) / (last - first)[:, None]

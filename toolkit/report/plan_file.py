@@ -1,4 +1,4 @@
-"""plan.json: a contact sequence in words that another program can read."""
+"""plan.json: a contact sequence that another program can read."""
 
 from __future__ import annotations
 
@@ -24,13 +24,7 @@ LARGEST = 1e4
 
 
 def write_plan(path: Path, plan: MotionPlan, solution: Solution) -> None:
-    """Write plan.json.
-
-    Args:
-        path: The file.
-        plan: The contacts and when they hold.
-        solution: The search's solution, for its cost and the predicted CoM.
-    """
+    """Write plan.json: the plan's contacts and times, with the cost and the predicted CoM of the search's solution."""
     entries: list[dict[str, Any]] = []
     stances, transitions = plan.sequence.stances, plan.sequence.transitions
     # The first phase is the first transition's shift, with the rest before it.
@@ -72,7 +66,7 @@ def read_plan(path: Path) -> ContactSequence:
     """Read plan.json.
 
     Raises:
-        InputError: the file cannot be read, or an entry is missing or wrong; the message names it.
+        InputError: The file cannot be read, or an entry is missing or wrong; the message names it.
     """
     plan = read_json(path)
     where = "the file"
@@ -108,7 +102,7 @@ def _contact_entry(contact: Contact) -> dict[str, Any]:
 
 
 def _read_contact(entry: dict[str, Any]) -> Contact:
-    """Inverse of `_contact_entry`; KeyError, TypeError or ValueError where it is broken."""
+    """Inverse of `_contact_entry`; raises KeyError, TypeError or ValueError where the entry is broken."""
     position = np.array(entry["position"], float)
     quaternion_wxyz = np.array(entry["quaternion_wxyz"], float)
     if position.shape != (3,) or quaternion_wxyz.shape != (4,) or not np.abs(quaternion_wxyz).max() > 1e-6:
@@ -123,7 +117,7 @@ def _read_contact(entry: dict[str, Any]) -> Contact:
 
 
 def _read_transition(entry: dict[str, Any]) -> ContactTransition:
-    """One transition; KeyError, TypeError or ValueError where it is broken."""
+    """One transition; raises KeyError, TypeError or ValueError where the entry is broken."""
     timing = Timing(float(entry["times"]["shift"]), float(entry["times"]["swing"]))
     if not (0 <= timing.shift <= LONGEST and 0 < timing.swing <= LONGEST):
         raise ValueError(

@@ -15,13 +15,10 @@ from toolkit.report.colors import AXES, EXECUTED, LIMB_COLORS, LIMIT, OPTIMISED,
 from toolkit.report.series import slip_steps, thinned
 
 
-def draw_plots(path: Path, execution: Execution, schedule: ContactSchedule | None = None) -> None:
+def draw_plots(path: Path, execution: Execution, schedule: ContactSchedule) -> None:
     """Write a picture of six curves over time: CoM, its error, momenta, CoP margins, torque ratio, slip.
 
-    Args:
-        path: file; the ending gives the format (png, pdf, svg).
-        execution: the run; an empty picture where it has no control tick.
-        schedule: of the planned contacts, for the slip of each stance.
+    The ending of `path` gives the format (png, pdf, svg). Panels stay empty where a run has no control tick.
     """
     figure = Figure(figsize=(11, 9), layout="constrained")
     panels = figure.subplots(3, 2, sharex=True)
@@ -32,7 +29,7 @@ def draw_plots(path: Path, execution: Execution, schedule: ContactSchedule | Non
     FigureCanvasAgg(figure).print_figure(str(path), dpi=110)
 
 
-def _draw(panels: np.ndarray, execution: Execution, schedule: ContactSchedule | None) -> None:
+def _draw(panels: np.ndarray, execution: Execution, schedule: ContactSchedule) -> None:
     """Fill the six panels."""
     samples = execution.samples
     times = samples.tick_times
@@ -57,7 +54,7 @@ def _draw(panels: np.ndarray, execution: Execution, schedule: ContactSchedule | 
     torque.plot(*thinned(times, samples.torque_ratio, worst="max"), color=unit(EXECUTED), label="largest joint")
     torque.axhline(1, color=unit(LIMIT), lw=0.8, label="limit")
     torque.set(title="torque / limit", ylim=(0, 1.1))
-    if execution.slip and schedule is not None:
+    if execution.slip:
         edges, values = slip_steps(execution, schedule)
         slip.step(edges, 1e3 * values, where="post", color=unit(EXECUTED), label="stance")
     slip.set(title="largest slip of each stance", ylabel="[mm]", ylim=(0, None))

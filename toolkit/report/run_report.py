@@ -1,4 +1,4 @@
-"""RunReport: what report.json says about a run."""
+"""RunReport: the content of report.json."""
 
 from __future__ import annotations
 
@@ -57,11 +57,11 @@ EXECUTION = (
     "tick_seconds",
 )
 STAGES = dict(surfaces=SURFACES, planning=PLANNING, dynamics=DYNAMICS, wholebody=WHOLEBODY, execution=EXECUTION)
-"""Every stage and its figures, in order. A stage that was not reached has its first figure False, the rest None."""
+"""Every stage and its figures, in order. The first figure of a stage that was not reached is False, the rest None."""
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python, the toolkit and the packages that decide the result."""
+    """Versions of Python, the toolkit and the packages that affect the result."""
     found = {"python": platform.python_version()}
     for package in ("humanoid-contact-toolkit", *PACKAGES):
         try:
@@ -76,14 +76,14 @@ class RunReport:
     """Content of report.json.
 
     Attributes:
-        world, robot: names.
+        world, robot: Names.
         seed: Seed of every random draw.
         verdict: "PASS" or "FAIL".
-        reason: one line where the verdict is FAIL, else "".
-        stages: stage -> figure -> value; SI units, radians; see `STAGES`.
-        checks: of the verdict.
-        options: further settings of the run worth keeping.
-        versions: of the software.
+        reason: One line where the verdict is FAIL, else "".
+        stages: Value of each figure of each stage in `STAGES`; SI units, radians.
+        checks: Checks of the verdict.
+        options: Further settings of the run.
+        versions: Versions of the software.
     """
 
     world: str
@@ -100,13 +100,7 @@ class RunReport:
     def of(
         cls, result: PipelineResult, surface_seconds: float | None = None, settings: dict[str, Any] | None = None
     ) -> RunReport:
-        """The report of a pipeline's result.
-
-        Args:
-            result: What the pipeline returned.
-            surface_seconds: Wall-clock of loading the world.
-            settings: Further settings worth keeping.
-        """
+        """The report of a pipeline's result; the world took `surface_seconds` to load."""
         trial = result.trial
         stages = {
             "surfaces": _surfaces(result.world, surface_seconds),
@@ -121,24 +115,10 @@ class RunReport:
 
     @classmethod
     def without_search(cls, world: World, robot: str, seed: int, reason: str, settings: dict[str, Any]) -> RunReport:
-        """The report of a run that ended in an error before there was any result.
-
-        Args:
-            world: The world.
-            robot: Name of the robot.
-            seed: Seed of every random draw.
-            reason: The error in one line.
-            settings: Further settings worth keeping.
-        """
+        """The report of a run that ended before any result, with the error in one line as its reason."""
         stages = {stage: _figures(names, None) for stage, names in STAGES.items()}
-        return cls(
-            world.name, robot, seed, "FAIL", reason, stages | {"surfaces": _surfaces(world, None)}, options=settings
-        )
-
-    @property
-    def passed(self) -> bool:
-        """Whether the verdict is PASS."""
-        return self.verdict == "PASS"
+        stages["surfaces"] = _surfaces(world, None)
+        return cls(world.name, robot, seed, "FAIL", reason, stages, options=settings)
 
     def as_dict(self) -> dict[str, Any]:
         """The report as report.json holds it."""
@@ -157,7 +137,7 @@ class RunReport:
 
 
 def write_report(path: Path, report: RunReport) -> None:
-    """Write report.json; a number that is not finite becomes null (a failed check's value among them)."""
+    """Write report.json; a number that is not finite, such as a failed check's value, becomes null."""
     write_json(path, report.as_dict())
 
 
@@ -198,7 +178,7 @@ def _planning(result: PipelineResult) -> dict[str, Any]:
 
 
 def _dynamics(motion: CentroidalMotion | None) -> dict[str, Any]:
-    """Figures of the centroidal motion; residual and margins recomputed in NumPy, not the solver's."""
+    """Figures of the centroidal motion; its residual and margins are recomputed without the solver."""
     if motion is None:
         return _figures(DYNAMICS, None)
     return {

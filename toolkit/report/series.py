@@ -16,27 +16,23 @@ from toolkit.report.colors import AXES, EXECUTED, LIMB_COLORS, LIMIT, Color
 from toolkit.report.motion_scene import LEAST_FORCE, TIMELINE, at, stance_times
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
-RATE = 100.0
-"""Hz to which series are thinned; each sample then holds the worst value of its interval."""
+RATE = 100.0  # Hz; to which series are thinned
 
 
-def thinned(
-    times: np.ndarray, values: np.ndarray, rate: float = RATE, worst: str = "mean"
-) -> tuple[np.ndarray, np.ndarray]:
-    """Cut samples into intervals of 1 / rate and keep one value of each.
+def thinned(times: np.ndarray, values: np.ndarray, worst: str = "mean") -> tuple[np.ndarray, np.ndarray]:
+    """Cut samples into intervals of 1 / `RATE` and keep one value of each.
 
     Args:
-        times: (n,) s, ascending.
+        times: (n,) s; ascending.
         values: (n, ...) float; NaN where undefined.
-        rate: Hz.
-        worst: "max" or "min" keep the extreme, "mean" the mean, all without NaN (NaN where nothing is defined).
+        worst: "max", "min" or "mean" of an interval's defined values; NaN where there is none.
 
     Returns:
-        (m,) s first time of each interval, (m, ...) values.
+        (m,) s; first time of each interval, and (m, ...) values.
     """
     if not len(times):
         return times, values
-    _, first = np.unique(np.floor((times - times[0]) * rate + 1e-6).astype(int), return_index=True)
+    _, first = np.unique(np.floor((times - times[0]) * RATE + 1e-6).astype(int), return_index=True)
     undefined = np.isnan(values)
     if worst == "mean":
         total = np.add.reduceat(np.where(undefined, 0.0, values), first)
@@ -57,7 +53,7 @@ def plot(
     width: float = 1.5,
     **style: Any,
 ) -> None:
-    """Send curves (n,) or (n, k) over (n,) s; a sample that is NaN leaves a gap; `style` goes to `SeriesLines`."""
+    """Send curves (n,) or (n, k) over (n,) s; a NaN leaves a gap. `style` is passed on to `SeriesLines`."""
     values = np.asarray(values, float).reshape(len(times), -1)
     columns = values.shape[1]
     lines = rr.SeriesLines(names=names, colors=colors, widths=[width] * columns, **style)
@@ -72,7 +68,7 @@ def plot_execution(
     trajectory: WholeBodyTrajectory | None,
     schedule: ContactSchedule | None,
 ) -> None:
-    """Send every series of a simulated run; what needs the trajectory or the schedule only where there is one."""
+    """Send every series of a simulated run; some need the trajectory or the schedule and are left out without it."""
     samples = execution.samples
     times = samples.tick_times
     if not len(times):
@@ -97,13 +93,8 @@ def plot_execution(
             if force.max() > LEAST_FORCE:
                 name = f"{limb.label} {source}"
                 plot(stream, f"series/force/{limb.label}/{source}", *thinned(times, force), name, mine, width)
-    plot(
-        stream,
-        "series/torque_ratio/largest",
-        *thinned(times, samples.torque_ratio, worst="max"),
-        "torque / limit",
-        EXECUTED,
-    )
+    largest = thinned(times, samples.torque_ratio, worst="max")
+    plot(stream, "series/torque_ratio/largest", *largest, "torque / limit", EXECUTED)
     plot(stream, "series/torque_ratio/limit", times[[0, -1]], np.ones(2), "limit", LIMIT, 1.0)
     if execution.slip and schedule is not None:
         edges, values = slip_steps(execution, schedule)
@@ -119,7 +110,7 @@ def plot_motion(stream: rr.RecordingStream, motion: CentroidalMotion) -> None:
 
 
 def limb_errors(execution: Execution, trajectory: WholeBodyTrajectory) -> dict[Limb, np.ndarray]:
-    """(C,) m distance of each measured patch from the trajectory's, for limbs that have both."""
+    """(C,) m; distance between the measured and the planned patch of each limb that has both."""
     errors = {}
     for limb in Limb:
         planned, measured = trajectory.limb_pose[:, limb, :3], execution.samples.limb_pose[:, limb, :3]
@@ -130,7 +121,7 @@ def limb_errors(execution: Execution, trajectory: WholeBodyTrajectory) -> dict[L
 
 
 def slip_steps(execution: Execution, schedule: ContactSchedule) -> tuple[np.ndarray, np.ndarray]:
-    """Slip of each stance: (k + 1,) s at which it begins, and the end of the run; (k + 1,) m, the last one repeated."""
+    """Slip of k stances: (k + 1,) s with the begin of each and the end of the run; (k + 1,) m, the last one twice."""
     end = float(execution.samples.tick_times[-1])
     edges = np.clip([*stance_times(schedule), end], 0.0, end)
     count = min(len(execution.slip), len(edges) - 1)
@@ -140,7 +131,7 @@ def slip_steps(execution: Execution, schedule: ContactSchedule) -> tuple[np.ndar
 def send_contact_states(
     stream: rr.RecordingStream, schedule: ContactSchedule | None, execution: Execution | None
 ) -> None:
-    """Send when each limb is in contact, planned and measured, as lanes of states."""
+    """Send the times at which each limb is in contact, planned and measured, as lanes of states."""
     lanes: dict[tuple[Limb, str], list[tuple[float, bool]]] = {}
     if schedule is not None:
         for phase in schedule.phases:
@@ -171,7 +162,7 @@ def send_contact_states(
 
 
 def touchdown_entries(execution: Execution) -> list[tuple[float, str]]:
-    """(s, text) of every touchdown, for the log."""
+    """Time (s) and text of every touchdown, for the log."""
     entries = []
     for touch in execution.touchdowns:
         late, off = 1e3 * (touch["time"] - touch["planned_time"]), 1e3 * touch["position_error"]

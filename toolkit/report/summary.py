@@ -29,15 +29,14 @@ def summary(report: RunReport) -> str:
     lines = [f"# {report.verdict}: {report.robot} in {report.world}", ""]
     if report.reason:
         lines += [f"**{report.reason}**", ""]
-    planning, execution = report.stages.get("planning", {}), report.stages.get("execution", {})
+    planning, execution = report.stages["planning"], report.stages["execution"]
     facts = []
-    if planning.get("contacts") is not None:
+    if planning["contacts"] is not None:
         facts.append(f"{planning['contacts']} transitions, {planning['palm_contacts']} with a palm")
         facts.append(f"first sequence after {planning['first_solution_seconds']:.2f} s")
-    if execution.get("simulated_seconds") is not None:
-        facts.append(
-            f"{execution['simulated_seconds']:.1f} s simulated at {execution['real_time_factor']:.2f} x real time"
-        )
+    if execution["simulated_seconds"] is not None:
+        pace = f"{execution['real_time_factor']:.2f} x real time"
+        facts.append(f"{execution['simulated_seconds']:.1f} s simulated at {pace}")
     facts.append(f"seed {report.seed}")
     lines += [" · ".join(facts), ""]
     if report.checks:
@@ -53,7 +52,7 @@ def summary(report: RunReport) -> str:
 def search_summary(search: SearchResult) -> str:
     """Markdown text of a search: its figures and a row per solution."""
     spent = f"{search.seconds:.2f} s, after {search.heuristic_seconds:.2f} s for the heuristic"
-    everything = "; every reachable state was looked at" if search.exhausted else ""
+    everything = "; every reachable state was expanded" if search.exhausted else ""
     lines = [f"{search.expansions} states expanded in {spent}{everything}.", ""]
     if search.reason:
         lines += [f"**{search.reason}**", ""]

@@ -1,4 +1,4 @@
-"""What was extracted from a world, as a table and as a recording."""
+"""The surfaces extracted from a world, as a table and as a recording."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from toolkit.world.world import World
 
 
 def surface_table(world: World) -> Table:
-    """A row per surface: index, geom, position, area, angle from up, friction, convex pieces, what it serves."""
+    """A row per surface: index, geom, position, area, angle from up, friction, convex pieces, feet or palms."""
     feet = sum(surface.serves_foot for surface in world.surfaces)
     palms = sum(surface.serves_palm for surface in world.surfaces)
     title = f"{escape(world.name)}: {len(world.surfaces)} surfaces, {feet} for feet, {palms} for palms"

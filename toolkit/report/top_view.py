@@ -1,4 +1,4 @@
-"""A plan seen from above, as a picture."""
+"""A picture of a plan seen from above."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ def draw_top_view(path: Path, plan: MotionPlan, solution: Solution, executed: np
     """Write a picture of a plan from above: surfaces, numbered contacts, the CoM, start and goal; axes in metres.
 
     Args:
-        path: file; the ending gives the format (png, pdf, svg).
-        plan: Contacts, optimised CoM (left out where it is not feasible), and the world.
+        path: The file; its ending gives the format (png, pdf, svg).
+        plan: Contacts, world, and optimised CoM, which is left out where it is not feasible.
         solution: The search's solution, for the predicted CoM and the cost.
-        executed: (C, 3) m, measured CoM.
+        executed: (C, 3) m; measured CoM.
     """
     world, robot = plan.world, plan.robot
     contacts = _numbered(plan.sequence)
@@ -60,9 +60,8 @@ def draw_top_view(path: Path, plan: MotionPlan, solution: Solution, executed: np
     axes.plot(x, y, marker="o", color=unit(START), zorder=3)
     nose = 0.15 * world.start.rotation[:2, 0]
     axes.annotate("", (x + nose[0], y + nose[1]), (x, y), arrowprops={"arrowstyle": "->", "color": unit(START)})
-    goal = world.goal
-    centre = (float(goal.position[0]), float(goal.position[1]))
-    axes.add_patch(Circle(centre, goal.radius, facecolor="none", edgecolor=unit(GOAL), lw=2.5, zorder=3))
+    centre = (float(world.goal.position[0]), float(world.goal.position[1]))
+    axes.add_patch(Circle(centre, world.goal.radius, facecolor="none", edgecolor=unit(GOAL), lw=2.5, zorder=3))
     for contact, number in contacts:
         _draw_contact(axes, contact, robot.half_sizes[contact.limb], number)
     for name, (points, color, style) in paths.items():
@@ -81,7 +80,7 @@ def draw_top_view(path: Path, plan: MotionPlan, solution: Solution, executed: np
 
 
 def _numbered(sequence: ContactSequence) -> list[tuple[Contact, int]]:
-    """Contacts with the number of their transition, 0 for the start."""
+    """All contacts with the numbers of their transitions, 0 for the start."""
     made = [(t.contact, i + 1) for i, t in enumerate(sequence.transitions) if t.contact is not None]
     return [*((contact, 0) for contact in sequence.start.contacts), *made]
 
@@ -89,7 +88,7 @@ def _numbered(sequence: ContactSequence) -> list[tuple[Contact, int]]:
 def _centres(
     solution: Solution, motion: CentroidalMotion, executed: np.ndarray | None
 ) -> dict[str, tuple[np.ndarray, tuple[int, int, int], str]]:
-    """Name -> CoM path, colour and line style of those that there are."""
+    """The known CoM paths by name, with their colours and line styles."""
     paths: dict[str, tuple[np.ndarray, tuple[int, int, int], str]] = {}
     if len(solution.com):
         paths["predicted"] = (solution.com, PREDICTED, "o--")
@@ -102,7 +101,7 @@ def _centres(
 
 
 def _extent(world: World, points: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (2,), (2,) of the part shown: everything that matters, and surfaces only as far as they are near."""
+    """Corners (2,), (2,) m of the part shown: start, goal and contacts, with the surfaces near them."""
     goal = world.goal
     around = [world.start.position[:2], goal.position[:2] - goal.radius, goal.position[:2] + goal.radius, *points]
     low, high = np.min(around, axis=0) - BORDER, np.max(around, axis=0) + BORDER
@@ -115,12 +114,12 @@ def _extent(world: World, points: list[np.ndarray]) -> tuple[np.ndarray, np.ndar
 
 
 def _flat(ring: np.ndarray) -> np.ndarray:
-    """(k, 3) points of a (k, 2) ring in the surface frame."""
+    """(k, 3) points of (k, 2) points in the surface frame."""
     return np.concatenate([ring, np.zeros((len(ring), 1))], axis=1)
 
 
 def _draw_surface(axes, surface: Surface) -> None:
-    """A surface with its holes; a steep one shows as its edge."""
+    """Draw a surface with its holes; a steep one appears as a line."""
     color = FOOT_SURFACE if surface.serves_foot else PALM_SURFACE if surface.serves_palm else OTHER_SURFACE
     vertices, codes = [], []
     for ring in surface.boundary:
@@ -132,7 +131,7 @@ def _draw_surface(axes, surface: Surface) -> None:
 
 
 def _draw_contact(axes, contact: Contact, half_size: np.ndarray, number: int) -> None:
-    """A patch with its number; one on a wall is drawn as the line it is from above."""
+    """Draw a patch with its number; a patch on a wall appears as a line."""
     signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
     corners = contact.pose @ _flat(signs * half_size)
     color = unit(LIMB_COLORS[contact.limb])

@@ -1,4 +1,4 @@
-"""Where to look from: the camera side that the world hides least."""
+"""The side of the camera from which the world hides least."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ import numpy as np
 
 from toolkit.report.meshes import SHOWN_GROUPS, static_bodies
 
-ANGLES = (65.0, 110.0, 150.0, 25.0)
-"""Degrees between the heading and the direction to the camera, in order of preference; either side."""
+ANGLES = (65.0, 110.0, 150.0, 25.0)  # degrees from the heading to the camera, by preference; on either side
 
 
 def best_direction(
@@ -19,18 +18,15 @@ def best_direction(
     distance: float,
     elevations: tuple[float, ...],
 ) -> np.ndarray:
-    """Direction from what is looked at to the camera.
+    """(3,) unit vector; direction from the pivots to the camera from which the static geoms hide the fewest targets.
 
     Args:
-        model: compiled scene; only its static geoms hide anything.
-        targets: (k, 3) m, points that should be seen.
-        pivots: (k, 3) or (3,) m, what the camera turns about when it looks at each of them.
-        heading: rad, the way the robot goes.
-        distance: m from pivot to camera.
-        elevations: degrees above the horizon, in order of preference (after the least hidden).
-
-    Returns:
-        (3,) unit vector.
+        model: Compiled scene.
+        targets: (k, 3) m; points that should be visible.
+        pivots: (k, 3) or (3,) m; the camera looks at a pivot when a target should be visible.
+        heading: rad; direction in which the robot walks.
+        distance: m; from pivot to camera.
+        elevations: Degrees above the horizon; among equals the first is preferred.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -41,11 +37,11 @@ def best_direction(
                 flat = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
                 directions.append(np.array([*flat, np.sin(elevation)]))
     pairs = list(zip(targets, np.broadcast_to(pivots, targets.shape), strict=True))
-    hidden = [sum(is_hidden(model, data, x, pivot + distance * way) for x, pivot in pairs) for way in directions]
+    hidden = [sum(_is_hidden(model, data, x, pivot + distance * way) for x, pivot in pairs) for way in directions]
     return directions[int(np.argmin(hidden))]
 
 
-def is_hidden(model: mujoco.MjModel, data: mujoco.MjData, target: np.ndarray, camera: np.ndarray) -> bool:
+def _is_hidden(model: mujoco.MjModel, data: mujoco.MjData, target: np.ndarray, camera: np.ndarray) -> bool:
     """Whether a visible static geom is between two points (3,) m; `data` holds the geoms' poses."""
     static = static_bodies(model)[model.geom_bodyid]
     groups = np.isin(np.arange(mujoco.mjNGROUP), list(SHOWN_GROUPS)).astype(np.uint8)
@@ -58,5 +54,5 @@ def is_hidden(model: mujoco.MjModel, data: mujoco.MjData, target: np.ndarray, ca
             return False
         if static[hit[0]]:
             return True
-        origin, remaining = origin + (distance + 1e-4) * way, remaining - distance - 1e-4  # on behind the robot
+        origin, remaining = origin + (distance + 1e-4) * way, remaining - distance - 1e-4  # continue behind the robot
     return False

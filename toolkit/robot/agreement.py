@@ -13,24 +13,16 @@ from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import PinocchioMap, placo_wrapper
 
-TOLERANCE = 1e-9
+TOLERANCE = 1e-9  # largest difference, divided by one plus the magnitude
+_SAMPLES = 3  # random states that are compared
 
 
-def check_agreement(robot: RobotModel, samples: int = 3, seed: int = 0) -> None:
-    """Compare MuJoCo with the Pinocchio model inside placo.
-
-    Args:
-        robot: loaded robot.
-        samples: number of random states.
-        seed: of the states.
-
-    Raises:
-        RobotError: another set of joints or another armature, or a difference beyond 1e-9.
-    """
+def check_agreement(robot: RobotModel) -> None:
+    """Raise RobotError if MuJoCo and the Pinocchio model inside placo differ by more than the tolerance."""
     other = placo_wrapper(robot).model
     if other.nv != robot.mujoco_model.nv:
         raise RobotError(f"robot '{robot.name}': Pinocchio has {other.nv} velocities, MuJoCo {robot.mujoco_model.nv}")
-    differences = compare_dynamics(robot.mujoco_model, other, samples=samples, rng=np.random.default_rng(seed))
+    differences = compare_dynamics(robot.mujoco_model, other, samples=_SAMPLES, rng=np.random.default_rng(0))
     for what, difference in differences.items():
         if not difference <= TOLERANCE:
             raise RobotError(
@@ -40,25 +32,21 @@ def check_agreement(robot: RobotModel, samples: int = 3, seed: int = 0) -> None:
 
 
 def compare_dynamics(
-    model: mujoco.MjModel,
-    other: pinocchio.Model,
-    *,
-    samples: int,
-    rng: np.random.Generator,
+    model: mujoco.MjModel, other: pinocchio.Model, *, samples: int, rng: np.random.Generator
 ) -> dict[str, float]:
     """Largest differences between a MuJoCo model and the Pinocchio model of its URDF.
 
-    Compared are the mass and the joint limits, and in random states the poses of bodies and sites, the CoM, the mass
+    The mass and the joint limits are compared, and in random states the poses of bodies and sites, the CoM, the mass
     matrix, and the forces that gravity and velocities cause.
 
     Args:
-        model: one floating tree.
-        other: its URDF in Pinocchio, with the armature.
-        samples: number of random states: base anywhere, joints inside their ranges, velocities up to 1.
-        rng: source of the states.
+        model: A floating tree.
+        other: The same tree in Pinocchio, with the armature.
+        samples: Number of random states: base anywhere, joints inside their ranges, velocities up to 1.
+        rng: Source of the states.
 
     Returns:
-        What -> largest absolute difference, divided by one plus the magnitude; inf where a value is not finite.
+        Largest absolute difference of each quantity, divided by one plus the magnitude; inf if a value is not finite.
     """
     order = PinocchioMap.of([model.joint(j).name for j in range(1, model.njnt)], other)
     worst: dict[str, float] = {}
@@ -108,7 +96,7 @@ def _frames(model: mujoco.MjModel, data: mujoco.MjData) -> Iterator[tuple[str, P
 
 
 def _mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """Mass matrix (nv, nv) by products with unit vectors: mj_mulM keeps its signature between releases."""
+    """Mass matrix (nv, nv) by products with unit vectors, because mj_mulM is the same in all releases of MuJoCo."""
     matrix = np.zeros((model.nv, model.nv))
     for column, unit in enumerate(np.eye(model.nv)):
         mujoco.mj_mulM(model, data, matrix[column], unit)

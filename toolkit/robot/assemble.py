@@ -1,4 +1,4 @@
-"""From a model file to the robot's own MJCF: free base, locked joints, torque actuators, contact sites."""
+"""Turn a model file into the robot's own MJCF: free base, locked joints, torque actuators, contact sites."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Assembly:
     """A robot's model in its final form.
 
     Attributes:
-        mjcf: self-contained MJCF text.
-        assets: file name -> bytes.
-        mujoco_model: `mjcf` compiled.
-        velocity: joint -> rad/s, all actuated joints.
-        bodies: limb -> body that carries its site.
+        mjcf: Self-contained MJCF text.
+        assets: Content of each file by its name.
+        mujoco_model: The compiled `mjcf`.
+        velocity: Velocity limit of each actuated joint, rad/s.
+        bodies: Name of the body that carries the site of each limb.
     """
 
     mjcf: str
@@ -40,18 +40,14 @@ class Assembly:
 
 
 def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
-    """Turn a model file into the robot that the toolkit works with.
+    """Turn a model file into the robot that the toolkit works with; the spec of `source` is changed.
 
-    Args:
-        description: the robot.toml.
-        source: the model file; its spec is changed.
-
-    Returns:
-        The robot alone, with a free joint `root_joint`, one torque actuator per joint in joint order, the contact
-        sites, and nothing of the file that acts on the robot from outside (actuators, gravity compensation, floor).
+    The result is the robot alone, with a free joint `root_joint`, one torque actuator per joint in joint order, and the
+    contact sites. Everything in the file that acts on the robot from outside is removed (actuators, gravity
+    compensation, floor).
 
     Raises:
-        RobotError: unknown or unsupported names, joints or constraints, or missing limits.
+        RobotError: Unknown or unsupported names, joints or constraints, or missing limits.
     """
     spec, where = source.spec, description.path
     _check_tree(description, source)
@@ -72,7 +68,7 @@ def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
 
 
 def _compiled(source: ModelSource, what: mujoco.MjSpec | str) -> mujoco.MjModel:
-    """A spec, or MJCF text with the files of the source, compiled."""
+    """Compile a spec, or MJCF text with the files of the source."""
     try:
         if isinstance(what, str):
             what = mujoco.MjSpec.from_string(what, assets=dict(source.spec.assets))
@@ -134,7 +130,7 @@ def _strip(source: ModelSource) -> None:
     spec = source.spec
     joints = {joint.name for joint in spec.joints}
     for equality in list(spec.equalities):
-        # A mimic joint whose joints are all locked is no constraint any more.
+        # A constraint between locked joints has no effect any more.
         if equality.type != mujoco.mjtEq.mjEQ_JOINT or equality.name1 in joints or equality.name2 in joints:
             what = f"'{equality.name}'" if equality.name else f"on '{equality.name1}'"
             raise RobotError(
@@ -145,14 +141,13 @@ def _strip(source: ModelSource) -> None:
     if spec.tendons:
         raise RobotError(f"{source.path}: tendons are not supported; remove them")
     world = spec.worldbody
-    groups = (spec.keys, spec.sensors, spec.cameras, spec.lights, world.geoms, world.sites)
-    for group in groups:
+    for group in (spec.keys, spec.sensors, spec.cameras, spec.lights, world.geoms, world.sites):
         for item in list(group):
             spec.delete(item)
     for body in spec.bodies:
         body.gravcomp = 0.0
     for geom in spec.geoms:
-        geom.priority = 0  # the world's friction counts
+        geom.priority = 0  # so that the world's friction is used
     copy_fields(mujoco.MjSpec().option, spec.option)
 
 
@@ -163,7 +158,7 @@ def _check_names(source: ModelSource) -> None:
             raise RobotError(
                 f"{source.path}: '{joint.name}' names both a joint and a body; rename the body to '{joint.name}_link'"
             )
-    # A contact site is named after its limb: no body may carry that name in the frame list of placo.
+    # A contact site is named after its limb, and no body may have that name in placo's list of frames.
     for limb in Limb:
         if limb.label in bodies:
             source.spec.body(limb.label).name = f"{limb.label}_link"
@@ -197,17 +192,16 @@ def _set_joints(description: RobotDescription, source: ModelSource, bare: mujoco
         joint.actfrclimited, joint.actgravcomp = mujoco.mjtLimited.mjLIMITED_FALSE, False
         if name in armature:
             joint.armature = armature[name]
-        limit = torque[name]
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         motor.set_to_motor()
         motor.gear = [1.0, 0, 0, 0, 0, 0]
         motor.ctrllimited = motor.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
-        motor.ctrlrange = motor.forcerange = [-limit, limit]
+        motor.ctrlrange = motor.forcerange = [-torque[name], torque[name]]
     return {name: float(velocity[name]) for name in names}
 
 
 def _file_torques(bare: mujoco.MjModel) -> dict[str, float]:
-    """Torque limits by joint that a compiled model carries: the tightest of joint and actuator limits."""
+    """Torque limits of a compiled model by joint: the smaller of the joint's and its actuators' limits, N m."""
     torques: dict[str, float] = {}
 
     def tighten(joint: int, low: float, high: float) -> None:

@@ -1,4 +1,4 @@
-"""RobotDescription: what robot.toml says, read strictly."""
+"""Read a robot.toml strictly."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ _TOP = ("description", "licence", "source", "model", "limbs", "home", "gains", "
 _MODEL = ("file", "package", "base", "locked_joints")
 _LIMB = ("body", "site", "position", "quaternion_wxyz", "patch", "max_force", "pad")
 _LIMITS = ("position", "velocity", "torque")
-_MOST = 1e9  # of any number
+_MOST = 1e9  # largest number that is accepted
 
 
 @dataclass(frozen=True)
 class LimbDescription:
-    """A contact limb as robot.toml gives it.
+    """A contact limb in robot.toml.
 
     Attributes:
-        limb: which one.
-        body: body that carries the patch, or None where `site` is given.
-        site: site of the model file at the patch, or None where `body` is given.
-        pose: pose of the contact frame in the body, or in the site.
-        patch: (2,) float, m; full extents along x and y.
-        max_force: N.
-        pad: m; thickness of a box added under the patch as its collision shape, None for no box.
+        limb: The limb.
+        body: Body that carries the patch, or None if `site` is given.
+        site: Site of the model file at the patch, or None if `body` is given.
+        pose: Pose of the contact frame in the body or in the site.
+        patch: Full extents (2,) float of the patch along x and y, m.
+        max_force: Largest normal force, N.
+        pad: Thickness of a box added under the patch as its collision shape, m; None for no box.
     """
 
     limb: Limb
@@ -51,25 +51,23 @@ class LimbDescription:
 
 @dataclass(frozen=True)
 class RobotDescription:
-    """A robot.toml, read and checked as far as it can be without the model.
+    """A robot.toml, checked as far as possible without the model.
 
-    Pattern tables map joint-name patterns (`fnmatch`, case sensitive) to values; the last match of a joint counts.
+    Pattern tables map joint-name patterns (`fnmatch`, case sensitive) to values; the last match of a joint is used.
 
     Attributes:
-        path: the robot.toml.
-        description, licence, source: text.
-        file: model file, relative to the folder of `path` or to the installed files of `package`.
-        package: name of a Python distribution that brings the model file, or None.
-        base: base body.
-        locked_joints: pattern -> rad; joints frozen at this position.
-        limbs: contact limbs.
-        home: pattern -> rad.
-        gains: pattern -> (kp, kd).
-        armature: pattern -> kg m^2.
-        position: pattern -> (lower, upper) rad, over the model's.
-        velocity: pattern -> rad/s, over the model's.
-        torque: pattern -> N m, over the model's.
-        declared: numbers that the compiled model is held against by tests, as written.
+        path: The robot.toml.
+        description, licence, source: Free text.
+        file: Model file, relative to the folder of `path` or to the installed files of `package`.
+        package: Name of a Python distribution that contains the model file, or None.
+        base: Name of the base body.
+        locked_joints: Positions at which joints are frozen, by pattern, rad.
+        limbs: Contact limbs.
+        home: Positions in the home posture, by pattern, rad.
+        gains: Joint gains (kp, kd) by pattern.
+        armature: Armature by pattern, kg m^2.
+        position, velocity, torque: Limits by pattern that replace the model's: (lower, upper) in rad, rad/s and N m.
+        declared: Numbers that tests compare with the compiled model.
     """
 
     path: Path
@@ -91,23 +89,17 @@ class RobotDescription:
 
 
 def suggestion(name: str, allowed: Iterable[str]) -> str:
-    """End of an error message: the close match of a name, or the allowed ones."""
+    """End of an error message: the allowed name that is close to the given one, or all allowed names."""
     allowed = sorted(allowed)
     close = get_close_matches(name, allowed, n=1, cutoff=0.6)
     return f"did you mean '{close[0]}'?" if close else f"allowed: {', '.join(allowed) or 'none'}"
 
 
 def read_description(path: Path) -> RobotDescription:
-    """Read a robot.toml.
-
-    Args:
-        path: the file.
-
-    Returns:
-        Its content; names of bodies, sites and joints are not looked up yet.
+    """Read a robot.toml without looking up its names of bodies, sites and joints.
 
     Raises:
-        RobotError: the file is missing or no TOML, or a key is unknown, missing or of the wrong kind.
+        RobotError: The file is missing or not valid TOML, or a key is unknown, missing or of the wrong kind.
     """
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -141,19 +133,10 @@ def read_description(path: Path) -> RobotDescription:
 
 
 def match_joints(path: Path, table: str, patterns: Mapping[str, Any], joint_names: Iterable[str]) -> dict[str, Any]:
-    """Values of joints by pattern; the last pattern that matches a joint counts.
-
-    Args:
-        path: the robot.toml, for messages.
-        table: name of the table, for messages.
-        patterns: pattern -> value.
-        joint_names: all joints that a pattern may match.
-
-    Returns:
-        Joint name -> value, for the joints that match.
+    """Values by name of the joints that match a pattern; the last pattern that matches a joint is used.
 
     Raises:
-        RobotError: a pattern matches no joint.
+        RobotError: A pattern matches no joint; the message names the robot.toml and the table.
     """
     names = tuple(joint_names)
     values: dict[str, Any] = {}
@@ -188,15 +171,15 @@ def _limbs(reader: _Reader, data: dict) -> dict[Limb, LimbDescription]:
             site=site,
             pose=Pose.from_quaternion(position, quaternion),
             patch=np.array(reader.numbers(table, "patch", where, 2, lowest=1e-3)),
-            max_force=reader.number(table, "max_force", where, default=float("inf"), lowest=1e-6),
-            pad=reader.number(table, "pad", where, lowest=1e-3) if "pad" in table else None,
+            max_force=reader.numbers(table, "max_force", where, 1, default=(float("inf"),), lowest=1e-6)[0],
+            pad=reader.numbers(table, "pad", where, 1, lowest=1e-3)[0] if "pad" in table else None,
         )
     return dict(sorted(limbs.items()))
 
 
 @dataclass(frozen=True)
 class _Reader:
-    """Typed access to tables, with messages that name file and key."""
+    """Typed access to tables; error messages name the file and the key."""
 
     path: Path
 
@@ -206,7 +189,7 @@ class _Reader:
                 raise RobotError(f"{self.path}: unknown key '{where}{key}'; {suggestion(key, allowed)}")
 
     def numbers_within(self, item: Any, where: str) -> None:
-        """Raise for a number, however deep, that is not finite or too large to compute with."""
+        """Raise if a number at any depth is not finite or too large."""
         if isinstance(item, dict | list):
             for key, value in item.items() if isinstance(item, dict) else enumerate(item):
                 self.numbers_within(value, f"{where}.{key}".lstrip("."))
@@ -228,11 +211,6 @@ class _Reader:
         if not isinstance(value, str) or (default is None and not value):
             raise RobotError(f"{self.path}: '{where}{key}' = {value!r} must be text")
         return value
-
-    def number(self, table: dict, key: str, where: str, default: float | None = None, lowest: float = -np.inf) -> float:
-        if key not in table and default is not None:
-            return default
-        return self._check(table.get(key), f"{where}{key}", 1, lowest)[0]
 
     def numbers(
         self, table: dict, key: str, where: str, count: int, default: tuple | None = None, lowest: float = -np.inf

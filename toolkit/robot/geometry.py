@@ -12,28 +12,20 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.chain import arm_joints, joints_to
 from toolkit.robot.model import ArmGeometry, LegGeometry
 
-STRAIGHT_LEG_MARGIN = 0.015  # of the length from hip to ankle
-STRAIGHT_ARM_MARGIN = 0.05  # of the length from shoulder to palm
+STRAIGHT_LEG_MARGIN = 0.015  # share of the length from hip to ankle
+STRAIGHT_ARM_MARGIN = 0.05  # share of the length from shoulder to palm
 _ROLES = ("roll", "pitch", "yaw")
 _ALIGNED = 0.72  # least |cosine| between a joint axis in the home posture and the base axis that names its role
 
 
 def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegGeometry:
-    """A leg between hip centre and ankle centre.
+    """A leg between hip centre and ankle centre, from kinematics and CoM of the home posture.
 
-    Angles are those of the two-link leg: zero is a straight leg at right angles to the level sole, also where the
-    joints' own zeros are elsewhere.
-
-    Args:
-        model: the robot alone; sites named after the limbs.
-        data: forward kinematics and CoM of the home posture done.
-        limb: a foot.
-
-    Returns:
-        The leg.
+    Angles are those of the two-link leg: zero is a straight leg at right angles to the level sole, even if the zeros of
+    the joints differ.
 
     Raises:
-        RobotError: the chain from base to foot is not hip (yaw, roll, pitch in any order), knee, ankle (two).
+        RobotError: The chain from base to foot is not hip (yaw, roll, pitch in any order), knee, ankle (two joints).
     """
     joints = joints_to(model, int(model.site_bodyid[model.site(limb.label).id]))
     roles = _leg_roles(model, data, joints, limb)
@@ -43,7 +35,7 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
     hip = _axes_crossing(data, [roles[role] for role in ("hip_yaw", "hip_roll", "hip_pitch")])
     ankle = _axes_crossing(data, [roles["ankle_pitch"], roles["ankle_roll"]])
 
-    # The plane of the leg: across the knee axis.
+    # The plane of the leg is normal to the knee axis.
     across = data.xaxis[roles["knee"]] * np.sign(data.xaxis[roles["knee"]] @ base[:, 1])
     knee = data.xanchor[roles["knee"]]
     upward_thigh, upward_shin = _across(hip - knee, across), _across(knee - ankle, across)
@@ -55,14 +47,15 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
     }
 
     ranges, torques = {}, {}
-    torque = _torque_limits(model)
     for role, joint in roles.items():
         reference = sole if role == "ankle_roll" else base
-        sign = float(np.sign(data.xaxis[joint] @ reference[:, _ROLES.index(_role_axis(role))]))
+        axis = "pitch" if role == "knee" else role.partition("_")[2]
+        sign = float(np.sign(data.xaxis[joint] @ reference[:, _ROLES.index(axis)]))
         value = data.qpos[model.jnt_qposadr[joint]]
         offset = angles[role] - sign * value if role in angles else 0.0
         low, high = sorted(offset + sign * limit for limit in model.jnt_range[joint])
-        ranges[role], torques[role] = (float(low), float(high)), float(torque[joint])
+        ranges[role] = float(low), float(high)
+        torques[role] = float(model.actuator_forcerange[joint - 1, 1])  # joint 0 is the free one
     flexed, straight = ranges["knee"][1], max(ranges["knee"][0], 0.0)
     if flexed < 0.1:
         raise RobotError(f"{limb.label}: the knee does not flex backwards in the home posture; bend it in [home]")
@@ -79,20 +72,12 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
 
 
 def arm_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> ArmGeometry:
-    """An arm's reach around its shoulder, by bending the elbow alone.
+    """An arm's reach around its shoulder by bending the elbow alone, from kinematics and CoM of the home posture.
 
-    The shoulder is where the second and third axes meet: the first may stand closer to the spine, as a clavicle does.
-
-    Args:
-        model: the robot alone; sites named after the limbs.
-        data: forward kinematics and CoM of the home posture done.
-        limb: a palm.
-
-    Returns:
-        The arm.
+    The shoulder is the point where the second and third axes meet; the first may be closer to the spine, as a clavicle.
 
     Raises:
-        RobotError: fewer than four joints between the trunk and the palm.
+        RobotError: There are fewer than four joints between the trunk and the palm.
     """
     site = model.site(limb.label).id
     joints = arm_joints(model, limb)
@@ -124,18 +109,10 @@ def arm_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> ArmG
 def derive_limbs(
     model: mujoco.MjModel, home: np.ndarray, limbs: Mapping[Limb, object]
 ) -> tuple[dict[Limb, LegGeometry], dict[Limb, ArmGeometry]]:
-    """Geometry of all limbs in a home posture.
-
-    Args:
-        model: the robot alone.
-        home: (7 + n,) qpos.
-        limbs: keyed by the limbs that the robot has.
-
-    Returns:
-        Legs by foot, arms by palm.
+    """Legs by foot and arms by palm of a robot compiled alone, in the home posture qpos (7 + n,).
 
     Raises:
-        RobotError: a limb whose joints are not understood.
+        RobotError: The joints of a limb are not those of a leg or an arm.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = home
@@ -171,15 +148,11 @@ def _leg_roles(model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], li
     return {role: roles[role] for role in order}
 
 
-def _role_axis(role: str) -> str:
-    return "pitch" if role == "knee" else role.partition("_")[2]
-
-
 def _axes_crossing(data: mujoco.MjData, joints: list[int]) -> np.ndarray:
-    """Point (3,) nearest to the axes of joints, in the world: the least-squares solution of P_i (x - a_i) = 0."""
+    """Point (3,) of the world nearest to the axes of joints: the least-squares solution of P_i (x - a_i) = 0."""
     axes, anchors = data.xaxis[joints], data.xanchor[joints]
     projections = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    # Parallel axes leave the point free along them: the solution nearest to the mean anchor.
+    # If the axes are parallel, the solution nearest to the mean anchor is used.
     middle = anchors.mean(0)
     pull = np.einsum("nij,nj->i", projections, anchors - middle)
     return middle + np.linalg.lstsq(projections.sum(0), pull, rcond=1e-9)[0]
@@ -190,17 +163,10 @@ def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 
 def _angle(start: np.ndarray, end: np.ndarray, axis: np.ndarray) -> float:
-    """Angle in rad about a unit axis that turns one vector into the other, both seen along the axis."""
+    """Angle in rad about a unit axis from one vector to the other, both projected along the axis."""
     start, end = _across(start, axis), _across(end, axis)
     return float(np.arctan2(axis @ np.cross(start, end), start @ end))
 
 
 def _length(thigh: float, shin: float, flexion: float) -> float:
     return float(np.sqrt(thigh**2 + shin**2 + 2 * thigh * shin * np.cos(flexion)))
-
-
-def _torque_limits(model: mujoco.MjModel) -> np.ndarray:
-    limits = np.full(model.njnt, np.inf)
-    for actuator in range(model.nu):
-        limits[model.actuator_trnid[actuator, 0]] = model.actuator_forcerange[actuator, 1]
-    return limits

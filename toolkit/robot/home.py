@@ -1,4 +1,4 @@
-"""The home posture: joints by pattern, base so that the soles lie on the ground."""
+"""The home posture: joints by pattern, and a base pose that puts the soles on the ground."""
 
 from __future__ import annotations
 
@@ -13,24 +13,17 @@ from toolkit.robot.description import RobotDescription, match_joints
 
 MAX_SOLE_TILT = 0.02  # rad
 MAX_SOLE_STEP = 0.005  # m
-MAX_NEIGHBOUR_JOINTS = 5  # on the path between bodies whose shapes may overlap by construction
-MAX_GAP = 0.005  # m; from a contact patch to the shapes of its limb
-MAX_SINK = 0.003  # m; how far another part of the robot may reach below the soles
+MAX_NEIGHBOUR_JOINTS = 5  # joints on the path between bodies whose shapes may overlap by construction
+MAX_GAP = 0.005  # m; largest distance from a contact patch to the shapes of its limb
+MAX_SINK = 0.003  # m; largest depth below the soles of other parts of the robot
 
 
 def home_posture(description: RobotDescription, model: mujoco.MjModel) -> np.ndarray:
-    """Stand a robot on its soles.
-
-    Args:
-        description: the robot.toml.
-        model: the robot alone, with its contact sites.
-
-    Returns:
-        (7 + n,) qpos: soles on z = 0, mean of the feet above the origin, heading +x.
+    """Home qpos (7 + n,) of a robot alone: soles on z = 0, mean of the feet above the origin, heading +x.
 
     Raises:
-        RobotError: a pattern without joint, a joint out of its range, soles not level with each other, or a CoM that
-            is not above the feet.
+        RobotError: A pattern matches no joint, a joint is out of its range, the soles are not level with each other, or
+            the CoM is not above the feet.
     """
     where = description.path
     names = [model.joint(j).name for j in range(1, model.njnt)]
@@ -66,14 +59,10 @@ def home_posture(description: RobotDescription, model: mujoco.MjModel) -> np.nda
 
 
 def check_patches(description: RobotDescription, assembly: Assembly) -> None:
-    """Every contact patch lies on a shape of its limb: what is planned with is what touches.
-
-    Args:
-        description: the robot.toml.
-        assembly: the robot alone, with its contact sites.
+    """Check that every contact patch lies on a shape of its limb, so that the planned patch is what touches.
 
     Raises:
-        RobotError: no shape that collides, of the body or of one that is fixed to it, comes near the patch.
+        RobotError: No colliding shape of the body, or of a body fixed to it, is near the patch.
     """
     spec = mujoco.MjSpec.from_string(assembly.mjcf, assets=assembly.assets)
     for limb, item in description.limbs.items():
@@ -108,20 +97,12 @@ def check_patches(description: RobotDescription, assembly: Assembly) -> None:
 def touching_neighbours(
     description: RobotDescription, model: mujoco.MjModel, home: np.ndarray
 ) -> list[tuple[str, str]]:
-    """Pairs of bodies close in the chain whose collision shapes overlap in the home posture.
+    """Names of pairs of bodies close in the chain whose collision shapes overlap in the home qpos (7 + n,).
 
-    Such shapes overlap by construction (meshes around a joint), so their contacts are to be ignored.
-
-    Args:
-        description: the robot.toml.
-        model: the robot alone.
-        home: (7 + n,) qpos.
-
-    Returns:
-        Pairs of body names.
+    Such shapes overlap by construction (meshes around a joint), so their contacts must be ignored.
 
     Raises:
-        RobotError: bodies further apart touch: the posture itself is wrong.
+        RobotError: Bodies further apart in the chain touch, so the posture itself is wrong.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = home
@@ -170,14 +151,13 @@ def _check_balance(description: RobotDescription, com: np.ndarray, soles: list[P
 
 
 def _check_lowest(description: RobotDescription, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Nothing may reach below the soles: what touches the ground is the patch."""
+    """Raise if a shape reaches below the soles, because only the patches may touch the ground."""
     mujoco.mj_kinematics(model, data)
     for geom in range(model.ngeom):
         if not model.geom_contype[geom] | model.geom_conaffinity[geom]:
             continue
         centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
-        corners = centre + half * (np.stack(np.meshgrid(*[[-1, 1]] * 3), -1).reshape(-1, 3))
-        points = corners
+        points = centre + half * (np.stack(np.meshgrid(*[[-1, 1]] * 3), -1).reshape(-1, 3))
         if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
             mesh = model.geom_dataid[geom]
             first = model.mesh_vertadr[mesh]

@@ -1,4 +1,4 @@
-"""Finding robots and loading them."""
+"""Find robots and load them."""
 
 from __future__ import annotations
 
@@ -25,37 +25,19 @@ DEFAULT_GAINS = (200.0, 8.0)
 
 
 def robots_folder(robots_dir: Path | None = None) -> Path:
-    """The folder with one folder per robot: given, else `robots/` here, else the one beside the toolkit."""
+    """The folder with one folder per robot: the given one, else `robots/` here, else the one beside the toolkit."""
     if robots_dir is not None:
         return Path(robots_dir)
     return Path.cwd() / "robots" if os.path.isdir("robots") else Path(__file__).resolve().parents[2] / "robots"
 
 
 def find_robots(robots_dir: Path | None = None) -> tuple[str, ...]:
-    """Names of all robots, sorted: folders that hold a robot.toml.
-
-    Args:
-        robots_dir: where to look; see `robots_folder`.
-
-    Returns:
-        Folder names.
-    """
+    """Sorted names of the folders with a robot.toml in the `robots_folder`."""
     return tuple(sorted(path.parent.name for path in robots_folder(robots_dir).glob(f"*/{FILE_NAME}")))
 
 
-def robot_folder(name: str, robots_dir: Path | None = None) -> Path:
-    """The folder of a robot.
-
-    Args:
-        name: of a folder in the robots folder, or a path to a folder with a robot.toml.
-        robots_dir: where to look; see `robots_folder`.
-
-    Returns:
-        Existing folder.
-
-    Raises:
-        RobotError: no such robot.
-    """
+def _robot_folder(name: str, robots_dir: Path | None) -> Path:
+    """The existing folder of a robot by its name in the robots folder or by a path to a folder with a robot.toml."""
     folder = robots_folder(robots_dir)
     for path in (folder / name, Path(name)):
         if name and os.path.isfile(path / FILE_NAME):
@@ -66,10 +48,10 @@ def robot_folder(name: str, robots_dir: Path | None = None) -> Path:
 
 
 def default_robot(robots_dir: Path | None = None) -> str:
-    """Name of the robot that is meant where none is: the one in the file `default`, else the only one there is.
+    """Name of the robot that is used if none is named: the one in the file `default`, else the only robot.
 
     Raises:
-        RobotError: there are none or several, and no such file.
+        RobotError: There is no such file, and there is no robot or more than one.
     """
     folder = robots_folder(robots_dir)
     if os.path.isfile(folder / "default"):
@@ -85,19 +67,19 @@ def default_robot(robots_dir: Path | None = None) -> str:
 
 
 def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
-    """Load a robot and prove that MuJoCo, Pinocchio and placo agree about it.
+    """Load a robot and check that MuJoCo, Pinocchio and placo agree about it.
 
     Args:
-        name: of a folder in the robots folder, or a path to a folder with a robot.toml; None for `default_robot`.
-        robots_dir: where to look; see `robots_folder`.
+        name: Name of a folder in the robots folder, or a path to a folder with a robot.toml; None for `default_robot`.
+        robots_dir: The robots folder; see `robots_folder`.
 
     Returns:
         The robot.
 
     Raises:
-        RobotError: no such robot, or a broken, incomplete or inconsistent description; the message says where.
+        RobotError: There is no such robot, or its description is broken, incomplete or inconsistent.
     """
-    folder = robot_folder(default_robot(robots_dir) if name is None else name, robots_dir)
+    folder = _robot_folder(default_robot(robots_dir) if name is None else name, robots_dir)
     description = read_description(folder / FILE_NAME)
     assembly = assemble(description, read_model(find_model_file(description)))
     where = description.path
@@ -142,25 +124,17 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
         },
         legs=legs,
         arms=arms,
-        fingerprint=fingerprint(description, assembly, home),
+        fingerprint=_fingerprint(description, assembly, home),
     )
     check_agreement(robot)
     return robot
 
 
-def fingerprint(description: RobotDescription, assembly: Assembly, home: np.ndarray) -> str:
-    """Hash of what the dynamics depend on: kinematics, inertia, limits, shapes, contact patches and home.
+def _fingerprint(description: RobotDescription, assembly: Assembly, home: np.ndarray) -> str:
+    """Hash of everything that the dynamics depend on: kinematics, inertia, limits, shapes, contact patches and home.
 
-    Taken over numbers of the compiled model rounded to 1e-6, so that colours, comments and the way in which a
-    release of MuJoCo prints XML do not matter.
-
-    Args:
-        description: the robot.toml.
-        assembly: the compiled robot.
-        home: (7 + n,) qpos.
-
-    Returns:
-        64 hexadecimal digits.
+    It is taken over numbers of the compiled model rounded to 1e-6, so that colours, comments and the XML format of a
+    release of MuJoCo have no effect. It has 64 hexadecimal digits.
     """
     model = assembly.mujoco_model
     joints = [model.joint(j).name for j in range(1, model.njnt)]

@@ -1,4 +1,4 @@
-"""Freezing joints of a model at given positions."""
+"""Freeze joints of a model at given positions."""
 
 from __future__ import annotations
 
@@ -12,17 +12,14 @@ from toolkit.geometry.pose import Pose
 
 
 def lock_joints(spec: mujoco.MjSpec, positions: Mapping[str, float]) -> None:
-    """Remove joints and leave their bodies where the given joint positions put them.
+    """Remove joints from a spec that compiles, and leave their bodies at the given positions in rad (m for a slide).
 
-    A body with joints J1 … Jk stands at `M J1 … Jk`. Freezing Ji at the motion L moves it to the front,
-    `M J1 … Ji-1 L … = M L (L⁻¹ J1 L) … (L⁻¹ Ji-1 L) …`, so M becomes M L and earlier joints are seen from L.
-
-    Args:
-        spec: changed; must compile.
-        positions: joint -> rad (m for a slide joint).
+    A body with joints J1 … Jk has the pose `M J1 … Jk`. The motion L of a frozen joint Ji is moved to the front,
+    `M J1 … Ji-1 L … = M L (L⁻¹ J1 L) … (L⁻¹ Ji-1 L) …`. So M becomes M L, and earlier joints are expressed relative
+    to L.
 
     Raises:
-        RobotError: a joint to be re-expressed stands in a `<frame>`.
+        RobotError: An earlier joint that must be re-expressed is in a `<frame>`.
     """
     if not positions:
         return

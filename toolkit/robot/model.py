@@ -1,4 +1,4 @@
-"""RobotModel: what every stage knows about the robot."""
+"""The robot as every stage knows it."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class LimbModel:
     """A limb that can make contact.
 
     Attributes:
-        limb: which one.
-        site: name of the site at the centre of the contact patch; its z axis is the outward normal of the surface
-            that it rests on, x of a foot points to the toes.
-        body: name of the body that carries the site.
-        half_size: (2,) float, m; half extents of the patch along x and y of the site.
-        max_normal_force: N; inf where only friction and weight bound it.
+        limb: The limb.
+        site: Name of the site at the centre of the contact patch; its z axis is the outward normal of the surface
+            that it rests on, and x of a foot points to the toes.
+        body: Name of the body that carries the site.
+        half_size: Half extents (2,) float of the patch along x and y of the site, m.
+        max_normal_force: Largest normal force, N; inf if only friction and weight bound it.
     """
 
     limb: Limb
@@ -38,13 +38,13 @@ class LegGeometry:
     """A leg as two links between hip centre and ankle centre, for constraints on the CoM (derived on load).
 
     Attributes:
-        hip_in_com: (3,) m; hip centre relative to the whole-body CoM in the home posture, axes of the base.
-        ankle_in_sole: (3,) m; ankle centre in the sole (contact) frame.
-        thigh, shin: m.
-        min_length, max_length: m; distance from hip to ankle that the knee range allows, with a margin from straight.
-        ranges: joint limits (lower, upper) in rad by role: hip_yaw, hip_roll, hip_pitch, knee, ankle_pitch, ankle_roll.
-            Signs: roll about x, pitch about y, yaw about z of the base / sole; a flexed knee is positive.
-        torques: torque limits in N m by the same roles.
+        hip_in_com: Hip centre (3,) relative to the whole-body CoM in the home posture, axes of the base, m.
+        ankle_in_sole: Ankle centre (3,) in the sole (contact) frame, m.
+        thigh, shin: Lengths of the two links, m.
+        min_length, max_length: Distances from hip to ankle that the knee allows, with a margin to the straight leg, m.
+        ranges: Joint limits (lower, upper) in rad by role: hip_yaw, hip_roll, hip_pitch, knee, ankle_pitch, ankle_roll.
+            Signs: roll about x, pitch about y, yaw about z of the base or sole; a flexed knee is positive.
+        torques: Torque limits by the same roles, N m.
     """
 
     hip_in_com: np.ndarray
@@ -62,8 +62,8 @@ class ArmGeometry:
     """An arm as a reach around the shoulder centre (derived on load).
 
     Attributes:
-        shoulder_in_com: (3,) m; shoulder centre relative to the CoM in the home posture, axes of the base.
-        min_reach, max_reach: m; distances from shoulder to palm patch that IK can serve.
+        shoulder_in_com: Shoulder centre (3,) relative to the CoM in the home posture, axes of the base, m.
+        min_reach, max_reach: Range of distances from shoulder to palm patch that IK can reach, m.
     """
 
     shoulder_in_com: np.ndarray
@@ -76,27 +76,26 @@ class RobotModel:
     """A robot, loaded and checked. Joint arrays are in MuJoCo's order of the robot compiled alone (`joint_names`).
 
     Attributes:
-        name: folder name under robots/.
-        folder: that folder.
-        mjcf: self-contained MJCF text of the robot alone (free joint `root_joint` on the base, torque actuators limited
+        name: Name of the robot's folder under robots/.
+        folder: That folder.
+        mjcf: Self-contained MJCF text of the robot alone (free joint `root_joint` on the base, torque actuators limited
             to the joint torques, contact sites named after the limbs, no world geometry).
-        assets: file name -> bytes needed to compile `mjcf` (meshes); empty for primitives.
-        mujoco_model: `mjcf` compiled; nq = 7 + n, nv = 6 + n, nu = n, actuator i drives joint_names[i].
+        assets: Content by name of the files needed to compile `mjcf` (meshes); empty for primitives.
+        mujoco_model: The compiled `mjcf`; nq = 7 + n, nv = 6 + n, nu = n, actuator i drives joint_names[i].
         urdf: URDF text without geometry generated from `mujoco_model`; build placo wrappers with `toolkit.robot.placo`.
-        base: name of the base body.
-        joint_names: (n,) actuated joints.
-        lower, upper: (n,) rad position limits.
-        velocity_limit: (n,) rad/s.
-        torque_limit: (n,) N m.
-        armature: (n,) kg m^2.
-        kp, kd: (n,) default joint gains, N m/rad and N m s/rad.
-        home: (7 + n,) qpos of the home posture, soles on z = 0, mean of the feet above the origin, heading +x.
-        mass: kg.
-        com_height: m above the soles in the home posture.
-        limbs: limb -> LimbModel; both feet always.
-        legs: foot limb -> LegGeometry.
-        arms: palm limb -> ArmGeometry.
-        fingerprint: hash of everything that the dynamics depend on (for data sets and networks).
+        base: Name of the base body.
+        joint_names: Names (n,) of the actuated joints.
+        lower, upper: Position limits (n,), rad.
+        velocity_limit, torque_limit: Limits (n,), rad/s and N m.
+        armature: Armature (n,), kg m^2.
+        kp, kd: Default joint gains (n,), N m/rad and N m s/rad.
+        home: Home qpos (7 + n,): soles on z = 0, mean of the feet above the origin, heading +x.
+        mass: Mass, kg.
+        com_height: Height of the CoM above the soles in the home posture, m.
+        limbs: Models by limb; both feet are always there.
+        legs: Legs by foot.
+        arms: Arms by palm.
+        fingerprint: Hash of everything that the dynamics depend on, for data sets and networks.
     """
 
     name: str
@@ -124,24 +123,24 @@ class RobotModel:
 
     @property
     def half_sizes(self) -> np.ndarray:
-        """(4, 2) float, m; patch half extents by limb, zeros for a limb the robot has not."""
+        """Half extents (4, 2) float of the patches by limb, m; zeros for a limb that the robot does not have."""
         sizes = np.zeros((4, 2))
         for limb, model in self.limbs.items():
             sizes[limb] = model.half_size
         return sizes
 
     def joints_to(self, limb: Limb) -> np.ndarray:
-        """(k,) int; indices into `joint_names` of the joints from the base to a limb, in order."""
+        """Indices (k,) int into `joint_names` of the joints from the base to a limb, in order."""
         model = self.mujoco_model
         return np.array(joints_to(model, model.body(self.limbs[limb].body).id), int) - 1  # joint 0 is the free one
 
     def carrying(self, limbs: Iterable[Limb]) -> np.ndarray:
-        """(n,) bool; joints from the base to any of some limbs."""
+        """Whether each joint is between the base and one of the limbs, (n,) bool."""
         joints = np.zeros(len(self.joint_names), bool)
         for limb in limbs:
             joints[self.joints_to(limb)] = True
         return joints
 
     def arm_joints(self, palm: Limb) -> np.ndarray:
-        """(k,) int; indices into `joint_names` of the joints from the trunk to a palm, in order."""
+        """Indices (k,) int into `joint_names` of the joints from the trunk to a palm, in order."""
         return np.array(arm_joints(self.mujoco_model, palm), int) - 1

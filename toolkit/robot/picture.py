@@ -12,17 +12,12 @@ import numpy as np
 from toolkit.errors import ToolkitError
 from toolkit.robot.model import RobotModel
 
+_WIDTH, _HEIGHT = 900, 1200  # pixels
+_AZIMUTH, _ELEVATION = 150.0, -8.0  # deg; direction of view about z and above the horizon
+
 
 def standing_scene(robot: RobotModel, friction: float = 1.0) -> mujoco.MjModel:
-    """The robot over a plane at z = 0, with light and checkered ground.
-
-    Args:
-        robot: loaded robot.
-        friction: of every contact with the ground.
-
-    Returns:
-        Compiled model; the robot's part of qpos and ctrl is that of `robot.mujoco_model`.
-    """
+    """The robot over a checkered plane at z = 0 with this friction, with lights; qpos and ctrl are the robot's."""
     spec = mujoco.MjSpec.from_string(robot.mjcf, assets=robot.assets)
     spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 100.0
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -44,23 +39,11 @@ def standing_scene(robot: RobotModel, friction: float = 1.0) -> mujoco.MjModel:
     return spec.compile()
 
 
-def render_home(
-    robot: RobotModel, width: int = 900, height: int = 1200, azimuth: float = 150.0, elevation: float = -8.0
-) -> np.ndarray:
-    """Render the home posture on a plane.
-
-    Args:
-        robot: loaded robot.
-        width: pixels.
-        height: pixels.
-        azimuth: direction of view about z in degrees.
-        elevation: direction of view above the horizon in degrees.
-
-    Returns:
-        (height, width, 3) uint8.
+def render_home(robot: RobotModel) -> np.ndarray:
+    """Picture (1200, 900, 3) uint8 of the home posture on a plane.
 
     Raises:
-        ToolkitError: no off-screen OpenGL context; the message says what to set.
+        ToolkitError: There is no off-screen OpenGL context; the message says what to set.
     """
     model = standing_scene(robot)
     data = mujoco.MjData(model)
@@ -68,20 +51,20 @@ def render_home(
     mujoco.mj_forward(model, data)
     camera = mujoco.MjvCamera()
     camera.lookat[:] = [0.0, 0.0, 0.88 * robot.com_height]
-    camera.distance, camera.azimuth, camera.elevation = 2.75 * robot.com_height, azimuth, elevation
+    camera.distance, camera.azimuth, camera.elevation = 2.75 * robot.com_height, _AZIMUTH, _ELEVATION
 
-    model.vis.global_.offwidth, model.vis.global_.offheight = width, height
-    window = _context(width, height)
+    model.vis.global_.offwidth, model.vis.global_.offheight = _WIDTH, _HEIGHT
+    window = _context()
     context = None
     try:
         window.make_current()
         scene = mujoco.MjvScene(model, maxgeom=1000 + model.ngeom)
         context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
-        options, rectangle = mujoco.MjvOption(), mujoco.MjrRect(0, 0, width, height)
+        options, rectangle = mujoco.MjvOption(), mujoco.MjrRect(0, 0, _WIDTH, _HEIGHT)
         mujoco.mjv_updateScene(model, data, options, None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
         mujoco.mjr_render(rectangle, scene, context)
-        pixels = np.empty((height, width, 3), np.uint8)
+        pixels = np.empty((_HEIGHT, _WIDTH, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, rectangle, context)
     finally:
         if context is not None:
@@ -90,13 +73,13 @@ def render_home(
     return pixels[::-1]
 
 
-def _context(width: int, height: int) -> Any:
-    """An off-screen OpenGL context: MUJOCO_GL where set, else EGL, else OSMesa; unlike MuJoCo's, chosen on call."""
+def _context() -> Any:
+    """An off-screen OpenGL context by MUJOCO_GL if set, else EGL, else OSMesa; MuJoCo would choose on import."""
     wanted = os.environ.get("MUJOCO_GL", "").lower()
     failures = []
     for name in [wanted] if wanted else ["egl", "osmesa"]:
         try:
-            return importlib.import_module(f"mujoco.{name}").GLContext(width, height)
+            return importlib.import_module(f"mujoco.{name}").GLContext(_WIDTH, _HEIGHT)
         except (ImportError, AttributeError, RuntimeError, OSError) as error:
             failures.append(f"{name}: {error}")
     raise ToolkitError(f"no off-screen rendering ({'; '.join(failures)}); install EGL (libegl1) and set MUJOCO_GL=egl")

@@ -1,4 +1,4 @@
-"""Pinocchio and placo views of a robot, and the one place where states change between their orders."""
+"""Pinocchio and placo models of a robot, and the conversion of states between them and MuJoCo."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class PinocchioMap:
     joints), and joints in another order.
 
     Attributes:
-        q_index: (n,) int; joint_names[i] stands at q[q_index[i]].
-        v_index: (n,) int; joint_names[i] stands at v[v_index[i]], also in torques and Jacobian columns.
+        q_index: Indices (n,) int; joint_names[i] is at q[q_index[i]].
+        v_index: Indices (n,) int; joint_names[i] is at v[v_index[i]], also in torques and Jacobian columns.
     """
 
     q_index: np.ndarray
@@ -58,9 +58,8 @@ class PinocchioMap:
         """Pinocchio velocity (..., 6 + n) of MuJoCo's qvel (..., 6 + n) at qpos (..., 7 + n)."""
         qvel = np.asarray(qvel, float)
         v = np.empty_like(qvel)
-        v[..., :3] = np.einsum(
-            "...ji,...j->...i", rotation_from_quaternion(np.asarray(qpos)[..., _WXYZ]), qvel[..., :3]
-        )
+        rotation = rotation_from_quaternion(np.asarray(qpos)[..., _WXYZ])
+        v[..., :3] = np.einsum("...ji,...j->...i", rotation, qvel[..., :3])
         v[..., 3:6] = qvel[..., 3:6]
         v[..., self.v_index] = qvel[..., 6:]
         return v
@@ -69,9 +68,8 @@ class PinocchioMap:
         """MuJoCo's qvel (..., 6 + n) of a Pinocchio velocity (..., 6 + n) at qpos (..., 7 + n)."""
         v = np.asarray(v, float)
         qvel = np.empty_like(v)
-        qvel[..., :3] = np.einsum(
-            "...ij,...j->...i", rotation_from_quaternion(np.asarray(qpos)[..., _WXYZ]), v[..., :3]
-        )
+        rotation = rotation_from_quaternion(np.asarray(qpos)[..., _WXYZ])
+        qvel[..., :3] = np.einsum("...ij,...j->...i", rotation, v[..., :3])
         qvel[..., 3:6] = v[..., 3:6]
         qvel[..., 6:] = v[..., self.v_index]
         return qvel
@@ -85,30 +83,16 @@ class PinocchioMap:
         a[..., :3] -= np.cross(v[..., 3:6], v[..., :3])
         return a
 
-    def qacc_from_a(self, qpos: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """MuJoCo's qacc (..., 6 + n) of a Pinocchio acceleration and velocity (..., 6 + n)."""
-        a, v = np.array(a, float), np.asarray(v, float)
-        a[..., :3] += np.cross(v[..., 3:6], v[..., :3])
-        return self.qvel_from_v(qpos, a)
-
-    def joints_of_v(self, v: np.ndarray) -> np.ndarray:
-        """Joint part (..., n) in `joint_names` order of velocities, accelerations or torques (..., 6 + n)."""
-        return np.asarray(v)[..., self.v_index]
-
     def matrix_to_mujoco(self, qpos: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        """A symmetric (6 + n, 6 + n) matrix over Pinocchio velocities, such as the mass matrix, over qvel instead."""
+        """Turn a symmetric matrix (6 + n, 6 + n) over Pinocchio velocities, such as the mass, into one over qvel."""
         basis = np.stack([self.v_from_qvel(qpos, row) for row in np.eye(len(matrix))], axis=1)  # v = basis @ qvel
         return basis.T @ matrix @ basis
 
 
 def placo_wrapper(robot: RobotModel) -> placo.RobotWrapper:
-    """A fresh placo robot with the robot's armature; `wrapper.model` is its pinocchio.Model.
+    """A new placo robot at its neutral configuration, with the robot's armature.
 
-    Args:
-        robot: loaded robot.
-
-    Returns:
-        A wrapper at its neutral configuration; frames carry the names of bodies and contact sites.
+    `wrapper.model` is its pinocchio.Model; the frames have the names of bodies and contact sites.
     """
     wrapper = placo.RobotWrapper("", placo.Flags.ignore_collisions, robot.urdf)
     wrapper.model.armature = _armature(robot, pinocchio_map(robot, wrapper.model))

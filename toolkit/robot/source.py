@@ -1,4 +1,4 @@
-"""Reading a robot's model file, MJCF or URDF, into one MjSpec."""
+"""Read a robot's model file, MJCF or URDF, into one MjSpec."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _MESH_ENDINGS = {".stl", ".obj", ".msh"}
 
 @dataclass(frozen=True)
 class ModelSource:
-    """A model file, read but not changed yet.
+    """A model file as it was read.
 
     Attributes:
-        path: the model file.
-        spec: its content, files included.
-        velocity: joint -> rad/s, as far as the file says (URDF only: MuJoCo drops them).
+        path: The model file.
+        spec: Content of the file, including the files that it names.
+        velocity: Velocity limits in a URDF by joint, rad/s; MuJoCo ignores them.
     """
 
     path: Path
@@ -33,16 +33,10 @@ class ModelSource:
 
 
 def find_model_file(description: RobotDescription) -> Path:
-    """The model file that a robot.toml names.
-
-    Args:
-        description: the robot.toml.
-
-    Returns:
-        Existing path.
+    """The existing model file that a robot.toml names.
 
     Raises:
-        RobotError: the file or the package that brings it is missing, or a package has several such files.
+        RobotError: The file or the package that contains it is missing, or a package has several such files.
     """
     where = description.path
     if description.package is None:
@@ -67,16 +61,10 @@ def find_model_file(description: RobotDescription) -> Path:
 def read_model(path: Path) -> ModelSource:
     """Read an MJCF or URDF file.
 
-    A URDF keeps its fixed links, loses visual shapes that MuJoCo cannot draw, and gets `package://` paths resolved.
-
-    Args:
-        path: the file.
-
-    Returns:
-        The model.
+    A URDF keeps its fixed links and loses visual shapes that MuJoCo cannot draw; its `package://` paths are resolved.
 
     Raises:
-        RobotError: not valid XML, neither MJCF nor URDF, a missing mesh, or MuJoCo cannot parse it.
+        RobotError: The file is not valid XML or neither MJCF nor URDF, a mesh is missing, or MuJoCo cannot parse it.
     """
     try:
         root = ElementTree.parse(path).getroot()
@@ -140,13 +128,11 @@ def _prepare_urdf(path: Path, root: ElementTree.Element) -> None:
     for extension in root.findall("mujoco"):
         root.remove(extension)
     extension = ElementTree.SubElement(root, "mujoco")
-    ElementTree.SubElement(
-        extension, "compiler", {"strippath": "false", "fusestatic": "false", "discardvisual": "false"}
-    )
+    ElementTree.SubElement(extension, "compiler", strippath="false", fusestatic="false", discardvisual="false")
 
 
 def _resolve(path: Path, name: str) -> Path | None:
-    """Existing file behind a URDF file name; `package://` is looked for in the folders above the URDF."""
+    """The existing file that a URDF names; a `package://` is searched for in the folders above the URDF."""
     if name.startswith("package://"):
         package, _, rest = name.removeprefix("package://").partition("/")
         candidates = [parent / package / rest for parent in path.parents]

@@ -12,23 +12,18 @@ _UNLIMITED = 1e3  # rad; `continuous` would make Pinocchio use cos and sin, and 
 
 
 def urdf_from_model(model: mujoco.MjModel, name: str = "robot") -> str:
-    """Describe a robot compiled alone as a URDF with the same kinematics and inertia.
+    """URDF text, with exact numbers, of a robot compiled alone; it has the same kinematics and inertia.
 
     Every body and site becomes a link of the same name. A body with several joints gets massless links between them.
-    With `M` the pose of the body in its parent, each joint stands at
-    `M ← M T(anchor - previous anchor) Rot(axis, -ref)`.
-
-    Armature has no place in URDF and must be set on the Pinocchio model (`toolkit.robot.placo` does).
+    The pose `M` of the body in its parent becomes `M T(anchor - previous anchor) Rot(axis, -ref)` at each joint.
+    URDF cannot describe the armature; `toolkit.robot.placo` sets it on the Pinocchio model.
 
     Args:
-        model: one root body with a free joint, hinges and slides below it; bodies and joints named.
-        name: name of the robot.
-
-    Returns:
-        URDF text; numbers are printed exactly.
+        model: One root body with a free joint, and hinges and slides below it; bodies and joints have names.
+        name: Name of the robot.
 
     Raises:
-        RobotError: a ball joint, a second free joint, or two frames of one name.
+        RobotError: There is a ball joint, a second free joint, or two frames with the same name.
     """
     names = [model.joint(j).name for j in range(1, model.njnt)]
     names += [model.body(b).name for b in range(1, model.nbody)] + [model.site(s).name for s in range(model.nsite)]
@@ -105,7 +100,7 @@ def _joint(name: str, kind: str, parent: str, child: str, pose: Pose, extra: str
 
 
 def _roll_pitch_yaw(rotation: np.ndarray) -> np.ndarray:
-    """Angles with R = Rz(yaw) Ry(pitch) Rx(roll); the pitch by atan2, as asin loses half the digits near 90°."""
+    """Angles with R = Rz(yaw) Ry(pitch) Rx(roll); the pitch uses atan2, because asin loses half the digits near 90°."""
     r = rotation
     cosine = np.hypot(r[0, 0], r[1, 0])
     pitch = np.arctan2(-r[2, 0], cosine)

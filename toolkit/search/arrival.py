@@ -1,7 +1,7 @@
 """Whether a search may end: after the last transition the robot stands at rest.
 
-The paper asks that of the last transition alone, which a robot that arrives fast cannot do. Where it cannot, the last
-few transitions and a moment on the final stance are optimised together, as they will be in the whole sequence.
+The paper asks this of the last transition alone, but a robot that arrives fast cannot do it. In that case the last few
+transitions and a moment on the final stance are optimised together, as they will be in the whole sequence.
 """
 
 from __future__ import annotations
@@ -22,13 +22,9 @@ _REST = 0.6  # s on the final stance that are optimised with them
 
 
 class Arrival:
-    """Judge of the last transition, for ANA*; the objective of the last edge is replaced by what coming to rest takes.
+    """Judge of the last transition, for ANA*; the objective of the last edge becomes the cost of coming to rest.
 
-    Args:
-        evaluator: Judges one transition as the last one, and whether several come to rest.
-        reader: Of the search's states.
-        cost: Of edges.
-        tally: Counted up.
+    The evaluator judges one transition as the last one, and whether several come to rest; `tally` counts rejections.
     """
 
     def __init__(self, evaluator: TransitionEvaluator, reader: StateReader, cost: EdgeCost, tally: Tally):
@@ -42,11 +38,11 @@ class Arrival:
         if objective is None:
             self._tally.rejected[Reason.DYNAMICS] += 1
             return None
-        cost = edge.cost + self._cost.dynamics(objective - edge.payload[0])
+        cost = edge.cost + self._cost.dynamics * (objective - edge.payload[0])
         return edge._replace(cost=cost, payload=(objective, edge.payload[1]))
 
     def _together(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> float | None:
-        """What of the objective of coming to rest falls to the last edge; None where that is infeasible."""
+        """The last edge's part of the objective of coming to rest; None where that is infeasible."""
         judged = [payload for payload in payloads if payload is not None]
         passed = [state for state in states if not is_pending(state)]
         transitions = [self._reader.transition(edge.state, edge.payload)]

@@ -1,4 +1,4 @@
-"""The world as a robot can walk it: where its limbs find places, where it starts, and how far it is to the goal."""
+"""The world as a robot can walk it: places for its limbs, the start stance and the way to the goal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.start_palms import with_palms
 from toolkit.search.planner_config import PlannerConfig
-from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.start import place_feet
 from toolkit.world.world import PALM_SITES, World
 
@@ -31,12 +30,12 @@ class Way:
     """The way from a start to the goal.
 
     Attributes:
-        distance: To the goal.
-        length: m; of all the way.
+        distance: Distance to the goal.
+        length: Length of the whole way in m.
         wide: Whether wide steps are to be used.
-        longest: m; the most that the mean of the feet moves in one transition.
+        longest: The farthest, in m, that the mean of the feet moves in one transition.
         slides: Whether no way leads over resting ground alone.
-        forced: m/s^2; the most that the robot accelerates on the way whatever it does.
+        forced: The most, in m/s^2, that the ground forces the robot to accelerate on the way.
     """
 
     distance: Distance
@@ -48,13 +47,7 @@ class Way:
 
 
 class Ground:
-    """The ground for one robot in one world.
-
-    Args:
-        robot: The robot.
-        world: The world.
-        config: Settings.
-    """
+    """The ground for one robot in one world."""
 
     def __init__(self, robot: RobotModel, world: World, config: PlannerConfig):
         self._robot, self._world, self._config = robot, world, config
@@ -66,33 +59,24 @@ class Ground:
         self._warm_up()
 
     def _warm_up(self) -> None:
-        """Compile or load what is compiled."""
-        moves, table = self.moves(wide=False)
-        ground, surface = self._projector.table, np.zeros(1, int)
+        """Compile or load all kernels."""
+        moves, ground, surface = self.moves(wide=False), self._projector.table, np.zeros(1, int)
         sole = Projected(surface, ground.origin[surface], ground.rotation[surface])
-        moves.warm_up(int(table.add(Limb.RIGHT_FOOT, sole)[0]))
+        moves.warm_up(int(moves.table.add(Limb.RIGHT_FOOT, sole)[0]))
 
-    def moves(self, wide: bool) -> tuple[MoveGenerator, ContactTable]:
-        """Screened moves, with wide steps or without, and the empty table in which they enter their contacts."""
-        table = ContactTable(self._projector.table.friction)
-        moves = MoveGenerator(
-            self._robot,
-            self._projector,
-            table,
-            self._models[wide],
-            self._terrain.occupancy,
-            self._terrain.box,
-            self._config.moves,
-            self._arms,
+    def moves(self, wide: bool) -> MoveGenerator:
+        """Screened moves, with wide steps or without."""
+        terrain = self._terrain
+        return MoveGenerator(
+            self._robot, self._projector, self._models[wide], terrain.occupancy, terrain.box, self._arms
         )
-        return moves, table
 
     def start_stance(self) -> Stance:
         """Both feet on the ground below the start, at their distance in the home posture, and palms at their sites.
 
         Raises:
-            PlanningError: they find no room, or the robot cannot stand there.
-            InputError: the world asks for a palm that no arm can hold there, or that the settings forbid.
+            PlanningError: They find no room, or the robot cannot stand there.
+            InputError: The world asks for a palm that no arm can hold there, or that the settings forbid.
         """
         robot, world = self._robot, self._world
         names = [PALM_SITES[limb] for limb in world.start_palms]
@@ -101,15 +85,15 @@ class Ground:
                 f"{world.path}: palms are switched off, but the world asks for palms in contact at the "
                 f"start; leave out --no-palms, or remove the site{'s' * (len(names) > 1)} {' and '.join(names)}"
             )
-        moves, table = self.moves(wide=False)
+        moves = self.moves(wide=False)
         reasons: Counter[str] = Counter()
         for stance in place_feet(robot, world, self._projector):
             left, right = (stance[limb] for limb in FEET)
             pose, surface = left.pose, np.array([left.surface])
             place = pose.position[None], pose.rotation[None], np.array([pose.yaw])
-            code = int(moves.screen(Limb.LEFT_FOOT, surface, *place, table.add_contact(right))[0])
+            code = int(moves.screen(Limb.LEFT_FOOT, surface, *place, moves.table.add_contact(right))[0])
             if code == 0:
-                return with_palms(robot, world, stance, moves, table)
+                return with_palms(world, stance, moves)
             reasons[Reason(code).words] += 1
         raise PlanningError(
             f"{world.path}: the robot cannot stand at the start ({reasons.most_common(1)[0][0]}); move the site "
@@ -120,7 +104,7 @@ class Ground:
         """The way from a stance to the goal.
 
         Raises:
-            PlanningError: nothing leads to the goal.
+            PlanningError: Nothing leads to the goal.
         """
         config, feet, forced = self._config, start.mean_feet, self._terrain.forced_acceleration()
         choices = {"on": [True], "off": [False], "auto": [False, True]}[config.wide_steps]
@@ -133,7 +117,7 @@ class Ground:
             slides, choices = not rests, rests or choices[-1:]
         distance, wide = self._distance(feet, choices)
         length = float(distance(feet.position[None], np.array([feet.yaw]))[0])
-        return Way(distance, length, wide, self._stride(wide) + config.projection.shift, slides, forced)
+        return Way(distance, length, wide, self._stride(wide) + self._projector.config.shift, slides, forced)
 
     def _distance(self, feet: Pose, choices: list[bool]) -> tuple[Distance, bool]:
         """Distance to the goal with the first choice of steps, wide or not, that leads there."""
@@ -155,13 +139,13 @@ class Ground:
         return TransitionModel.of(self._robot, np.concatenate([steps, wide_steps()]) if wide else steps)
 
     def _stride(self, wide: bool) -> float:
-        """m; the longest step."""
+        """The longest step in m."""
         return self._models[wide].longest_step
 
     def _projected(self, friction: float | None) -> Projector:
-        """Projector onto the ground that holds a resting foot with this part of its friction; None: onto all of it."""
+        """Projector onto the ground on which a foot rests with this part of its friction; None: onto all ground."""
         surfaces = resting_surfaces(self._world.surfaces, friction)
-        return Projector(self._robot, surfaces, self._world.mujoco_model, self._config.projection)
+        return Projector(self._robot, surfaces, self._world.mujoco_model)
 
     def _distances(self, projector: Projector) -> TerrainDistance:
         return TerrainDistance(self._robot, self._world, projector)

@@ -1,4 +1,4 @@
-"""How a search asks a judge of transitions: as long as there is time, and with what the limbs reach."""
+"""Queries of a search to a judge of transitions, as long as there is time; checks what the limbs reach as well."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from toolkit.search.states.state import COM, CONTACTS, VELOCITY, origin_of
 
 @dataclass
 class Tally:
-    """What a search counts.
+    """Counts of one search.
 
     Attributes:
-        rejected: (len(REASONS),) int; candidates that fell, by reason.
-        untrained: Transitions that lay outside what their judge was trained for.
+        rejected: (len(Reason),) int; rejected candidates by reason.
+        untrained: Number of transitions outside what their judge was trained for.
     """
 
     rejected: np.ndarray = field(default_factory=lambda: np.zeros(len(Reason), np.int64))
@@ -33,10 +33,10 @@ class Judging:
 
     Args:
         evaluator: The judge.
-        reader: Of the search's states.
-        reach: What legs and arms reach.
-        tally: Counted up.
-        deadline: s on the clock of `time.perf_counter`; no query that would end later is begun.
+        reader: Reads the search's states.
+        reach: Checks what legs and arms reach.
+        tally: Counts the rejections.
+        deadline: Time in s on the clock of `time.perf_counter`; no query that would end later is begun.
     """
 
     def __init__(
@@ -47,14 +47,10 @@ class Judging:
         self._pace = 0.0  # s per transition of the last query
 
     def __call__(self, row: np.ndarray, candidates: Candidates) -> tuple[TransitionBatch, np.ndarray] | None:
-        """Judge candidates out of a state, or that of a pending state.
-
-        Args:
-            row: Of the state.
-            candidates: n of them.
+        """Judge n candidates out of the state of a row, or the one candidate of a pending state.
 
         Returns:
-            What the judge says, and codes (n,), 0 where the limbs reach as well; None where there is no time left.
+            The judgement, and codes (n,), 0 where the limbs reach as well; None where there is no time left.
         """
         contacts, com, velocity = origin_of(row)[CONTACTS], row[COM] / 1000.0, row[VELOCITY] / 1000.0
         transitions = self._reader.transitions(candidates.limb, candidates.number, candidates.timing)

@@ -1,4 +1,4 @@
-"""ContactPlanner: from a start to a goal by an anytime search over contact transitions of feet and palms."""
+"""ContactPlanner: an anytime search from a start to a goal over contact transitions of feet and palms."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ class ContactPlanner:
         robot: The robot.
         world: The world.
         evaluator: Judges the dynamics of transitions.
-        config: Settings.
-        goal_evaluator: Judges the transition that reaches the goal, as one after which the robot rests; None: it is
-            judged like any other.
+        config: Settings; the default ones where None.
+        goal_evaluator: Judges the transition that reaches the goal, after which the robot rests; None: that transition
+            is judged like any other.
 
     Attributes:
         ground: The world as the robot can walk it.
@@ -77,17 +77,17 @@ class ContactPlanner:
         """Search for contact sequences until the time is up or nothing can improve.
 
         Args:
-            rng: For random expansions.
-            time_limit: s, the heuristic not counted.
+            rng: Generator of the random expansions.
+            time_limit: Limit in s, without the time for the heuristic.
             observer: Told of progress and of every solution.
-            exclusions: Transitions that later stages rejected; the search keeps away from them.
+            exclusions: Transitions that later stages rejected; the search avoids them.
             palms: Whether this search may use palms, where `config.palms` allows them at all.
 
         Returns:
-            Every solution found, and why there is none where there is none.
+            Every solution, or the reason why there is none.
 
         Raises:
-            PlanningError: the robot cannot stand at the start, or nothing leads to the goal.
+            PlanningError: The robot cannot stand at the start, or nothing leads to the goal.
         """
         start = self.ground.start_stance()
         began = time.perf_counter()
@@ -99,7 +99,7 @@ class ContactPlanner:
         parts = self._parts(way, strategy, tally, exclusions, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
         searches = [(ContactProblem(parts, state), strategy.patient)]
-        if strategy.hasty is not None:  # what begins with the right foot is often a mirror image of what it has
+        if strategy.hasty is not None:  # a sequence that begins with the right foot often mirrors one that does not
             searches.insert(0, (ContactProblem(parts, moved_last(state, Limb.RIGHT_FOOT)), strategy.hasty))
         goal = self._goal_evaluator
         judge = None if goal is None else Arrival(goal, parts.reader, parts.cost, tally)
@@ -119,7 +119,7 @@ class ContactPlanner:
     def _suited(self, start: Stance, com: np.ndarray, tally: Tally) -> TransitionEvaluator:
         """The evaluator for the timings: its stand-in where it was trained for none of them.
 
-        What an evaluator compiles or loads at its first query is no part of the search: so it is asked here.
+        All evaluators are asked here once, so that what they compile or load at first takes no time of the search.
         """
         still = [ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], timing) for timing in self._timings]
         untrained = self._evaluator.evaluate(start, com, np.zeros(3), still).untrained
@@ -131,28 +131,19 @@ class ContactPlanner:
         return stand_in if stand_in is not None and untrained == len(still) else self._evaluator
 
     def _parts(
-        self,
-        way: Way,
-        strategy: Strategy,
-        tally: Tally,
-        exclusions: Sequence[Exclusion],
-        palms: bool,
-        deadline: float,
+        self, way: Way, strategy: Strategy, tally: Tally, exclusions: Sequence[Exclusion], palms: bool, deadline: float
     ) -> Parts:
-        """What the graphs of one search are made of."""
-        robot, config, timings = self.robot, self.config, self._timings
-        moves, table = self.ground.moves(way.wide)
-        palms = palms and config.palms and moves.has_palm_surfaces
-        limbs = [limb for limb in PALMS if palms and limb in robot.arms]
-        swing_speed, rejected = strategy.cost.swing_speed, tally.rejected
-        candidates = CandidateGenerator(moves, table, limbs, timings, swing_speed, exclusions, rejected)
-        reader = StateReader(table, timings)
-        reach = ReachCheck(robot, moves.legs, moves.shanks, moves.arms, table, limbs, timings, config.reach)
+        """The parts of the graphs of one search."""
+        moves, timings = self.ground.moves(way.wide), self._timings
+        table, palms = moves.table, palms and self.config.palms and moves.has_palm_surfaces
+        limbs = [limb for limb in PALMS if palms and limb in self.robot.arms]
+        candidates = CandidateGenerator(moves, limbs, timings, exclusions, tally.rejected)
+        reader, reach = StateReader(table, timings), ReachCheck(moves, limbs, timings)
         cost = EdgeCost(strategy.cost, table, timings, self.world.goal, way.distance, way.longest)
         haste = None
-        if strategy.haste is not None:
-            haste = Haste(table, robot.com_height, way.forced, cost.per_metre, strategy.haste)
-        delay = Delay(strategy.cost, Drift(robot, table, timings), haste)
+        if strategy.hasty is not None:
+            haste = Haste(table, self.robot.com_height, way.forced, cost.per_metre)
+        delay = Delay(Drift(self.robot, table, timings), haste)
         at_once, waiting = (
             None if judge is None else Judging(judge, reader, reach, tally, deadline)
             for judge in (strategy.at_once, strategy.waiting)
@@ -160,13 +151,13 @@ class ContactPlanner:
         return Parts(table, reader, candidates, at_once, waiting, cost, delay, tally)
 
     def _reason(self, result: AnaStarResult[bytes], tally: Tally) -> str:
-        limit = self.config.search.max_expansions  # as it was asked for, whatever the search made of it
+        limit = self.config.search.max_expansions  # the setting, not the multiple of it that the strategy allows
         expansions = limit if result.stopped_by == "expansions" and limit is not None else result.expansions
         return reason_of(result.stopped_by, result.seconds, expansions, tally.rejected, self._evaluator.rejection)
 
 
 def _places(table: ContactTable, states: Sequence[bytes]) -> np.ndarray:
-    """(k, 3) x m, y m, yaw rad; mean of the feet of those of the states that are judged."""
+    """(k, 3) x m, y m, yaw rad; mean of the feet of those states that are judged."""
     judged = [state for state in states if not is_pending(state)]
     if not judged:
         return np.zeros((0, 3))

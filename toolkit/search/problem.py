@@ -1,6 +1,6 @@
-"""The contact search as a graph for ANA*: states, the transitions out of them, and what these cost (paper, Sec. V).
+"""The contact search as a graph for ANA*: states, the transitions out of them, and their costs (paper, Sec. V).
 
-Where judging a transition takes long, transitions wait to be judged until they are the best to go on with: the graph
+Where judging a transition takes long, transitions wait to be judged until they are the best to go on with. The graph
 then has, between two states, one that stands for the transition not yet judged (`state.pack_pending`).
 """
 
@@ -35,22 +35,22 @@ from toolkit.search.states.state import (
     unpack_all,
 )
 
-_CROWD, _PACE = 0.1, 0.25  # m, m/s
+_CROWD, _PACE = 0.1, 0.25  # m, m/s; states of a crowd differ by less
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What a contact search is made of.
+    """Parts of a contact search.
 
     Attributes:
         table: Contacts.
-        reader: Of states.
-        candidates: Transitions out of a state, before they are judged.
-        at_once: Asks the judge of what is expanded; None: everything waits. See `Strategy`.
-        waiting: Asks the judge of what has waited; None: nothing waits.
-        cost: Of edges, and to the goal.
-        delay: By which states wait.
-        tally: What was counted.
+        reader: Reads states.
+        candidates: Makes the transitions out of a state, before they are judged.
+        at_once: Asks the judge of the states that are expanded; None: everything waits. See `Strategy`.
+        waiting: Asks the judge of the transitions that have waited; None: nothing waits.
+        cost: Costs of edges, and to the goal.
+        delay: Delays of the states.
+        tally: Counts the rejections.
     """
 
     table: ContactTable
@@ -67,7 +67,7 @@ class ContactProblem:
     """Graph of one search; see `search.anytime.graph.SearchProblem`. Edge payloads are (objective, timing index).
 
     Args:
-        parts: What it is made of; several graphs may share them.
+        parts: The parts of the search; several graphs may share them.
         start: The state in which it begins.
     """
 
@@ -90,7 +90,7 @@ class ContactProblem:
         return judged & self._parts.cost.at_goal(self._seen(states)[1])
 
     def crowd(self, states: Sequence[bytes]) -> list[tuple]:
-        """See `SearchProblem`: states with the mean of the feet in the same square of 0.1 m, and about as fast."""
+        """See `SearchProblem`: states of similar speed with the mean of the feet in the same square of 0.1 m."""
         rows, centre, _ = self._seen(states)
         place = np.floor(centre[:, :2] / _CROWD)
         speed = np.floor(np.hypot(*rows[:, VELOCITY][:, :2].T) / (1000.0 * _PACE))
@@ -105,7 +105,7 @@ class ContactProblem:
         return self._answer
 
     def expand(self, state: bytes, slack: float) -> list[Edge[bytes]] | None:
-        """See `SearchProblem`: screens, then one query of the judge for all children together."""
+        """See `SearchProblem`: screens all children, then judges them in one query."""
         parts, row = self._parts, unpack([state])[0]
         if is_pending(state):
             assert parts.waiting is not None
@@ -134,13 +134,13 @@ class ContactProblem:
     def _edges(
         self, candidates: Candidates, batch: TransitionBatch, codes: np.ndarray, *, pending: bool
     ) -> list[Edge[bytes]]:
-        """Edges of the candidates that passed; of pending ones the known part of the cost is already paid."""
+        """Edges of the candidates that passed; pending ones have already paid the known part of the cost."""
         kept = np.flatnonzero(codes == 0)
         if not len(kept):
             return []
         candidates, objective = candidates.select(kept), batch.objective[kept]
         com, velocity = batch.com[kept], batch.com_velocity[kept]
-        cost = self._parts.cost.dynamics(objective)
+        cost = self._parts.cost.dynamics * objective
         if not pending:
             cost = cost + self._parts.cost.known(candidates)
         states = pack(candidates.contacts, candidates.limb, com, velocity)
@@ -149,7 +149,7 @@ class ContactProblem:
         return [Edge(*item) for item in zip(states, cost.tolist(), payloads, delay.tolist(), strict=True)]
 
     def _postponed(self, row: np.ndarray, candidates: Candidates, *, doubted: bool) -> list[Edge[bytes]]:
-        """Edges to pending states, with the known part of the cost."""
+        """Edges to pending states, which cost the known part."""
         com, velocity = row[COM] / 1000.0, row[VELOCITY] / 1000.0
         states = pack_pending(row, candidates.contacts, candidates.limb, candidates.timing)
         cost = self._parts.cost.known(candidates)

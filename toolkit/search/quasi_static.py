@@ -1,12 +1,12 @@
-"""The quasi-static baseline: the same search, without dynamics, but with static balance all along (paper, Sec. VII).
+"""The quasi-static baseline: the same search without dynamics, but with static balance all along (paper, Sec. VII).
 
 Every transition needs a CoM that is balanced on the contacts that stay and reaches what is touched, at take-off (the
 old contacts) and at touch-down (the new ones). Between both it may move slowly, since the CoMs balanced on the same
 contacts are a convex set. Only distance and the number of transitions cost.
 
-A foot within its friction angle bears the weight below any CoM above its patch; so do two such feet below any CoM above
-a point between the patches. Anything else, a palm that has to hold a foot on a slope for one, is left to the linear
-program of `toolkit.centroidal.balance`.
+A foot within its friction angle bears the weight below any CoM above its patch, and two such feet bear it below any CoM
+above a point between the patches. The linear program of `toolkit.centroidal.balance` judges anything else, for example
+a palm that has to hold a foot on a slope.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from toolkit.geometry.pose import rotation_about_z, steepness
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.legs import legs_of, reach
-from toolkit.search.moves.moves import MoveConfig
+from toolkit.search.moves.moves import MARGINS
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.world.surface import Surface
@@ -34,22 +34,17 @@ from toolkit.world.world import World
 _FRICTION = 0.9  # part of the friction coefficients that may be used
 _PATCH = 0.5  # part of a sole's half extents in which the centre of pressure may be
 _DROPS = (0.0, 0.06, 0.12, 0.18)  # parts of its height by which the CoM may be lower than at home
-_KEPT = 20_000  # linear programs remembered
-_PARTS = np.array([0.0, 0.5, 1.0])  # of the way from the middle of the support to its point nearest to the other foot
+_KEPT = 20_000  # linear programs that are remembered
+_PARTS = np.array([0.0, 0.5, 1.0])  # parts of the way from the support's middle to its point nearest to the other foot
 
 
 class QuasiStaticEvaluator(TransitionEvaluator):
-    """Judges by static balance at take-off and touch-down.
-
-    Args:
-        robot: the robot.
-        moves: kinematic limits, those of the search.
-    """
+    """Judges by static balance at take-off and touch-down, with the kinematic limits of the search."""
 
     rejection = "no statically balanced posture at take-off or touch-down"
 
-    def __init__(self, robot: RobotModel, moves: MoveConfig):
-        self._robot, self._legs = robot, legs_of(robot, moves.margins)
+    def __init__(self, robot: RobotModel):
+        self._robot, self._legs = robot, legs_of(robot, MARGINS)
         self._programs: dict[bytes, np.ndarray | None] = {}
 
     def evaluate(
@@ -115,7 +110,7 @@ class QuasiStaticEvaluator(TransitionEvaluator):
         return True
 
     def _program(self, support: Sequence[Contact]) -> np.ndarray | None:
-        """Best CoM of the linear program for contacts, remembered."""
+        """(3,) m; best CoM of the linear program for contacts, remembered."""
         key = b"".join(
             np.round([contact.limb, *contact.pose.position, *contact.pose.rotation[:, 0]], 4).tobytes()
             for contact in support
@@ -131,10 +126,7 @@ class QuasiStaticEvaluator(TransitionEvaluator):
 def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig | None = None) -> ContactPlanner:
     """The baseline planner; without walls for palms it leaves out ground beyond its friction angle at once.
 
-    Args:
-        robot: the robot.
-        world: the world.
-        config: settings; neither dynamics nor steepness count in the cost.
+    Of the settings `config`, neither the weight of the dynamics nor that of steepness counts.
     """
     config = config or PlannerConfig()
     palms = config.palms and bool(robot.arms) and _walls_in_reach(robot, world)
@@ -145,7 +137,7 @@ def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig 
         wide_steps="off" if config.wide_steps == "auto" else config.wide_steps,
         timings=config.timings[:1],
     )
-    return ContactPlanner(robot, world, QuasiStaticEvaluator(robot, config.moves), config)
+    return ContactPlanner(robot, world, QuasiStaticEvaluator(robot), config)
 
 
 def _walls_in_reach(robot: RobotModel, world: World) -> bool:

@@ -1,4 +1,4 @@
-"""What a contact search returns, in the words of contacts; or why it found nothing."""
+"""Results of a contact search: contact sequences, or the reason why none was found."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class Solution:
     """A contact sequence that the search found.
 
     Attributes:
-        sequence: start stance and transitions.
-        cost: sum of edge costs.
-        bound: upper bound on cost / optimal cost known when it was reported (inf where unknown).
-        seconds: since the search began.
+        sequence: Start stance and transitions.
+        cost: Sum of the edge costs.
+        bound: Upper bound on cost / optimal cost that was known when it was found; inf where unknown.
+        seconds: Time from the start of the search until it was found.
         com: (len(transitions) + 1, 3) m; predicted CoM at the start and after each transition.
-        com_velocity: same shape, m/s.
+        com_velocity: Same shape, m/s; predicted velocity of the CoM.
         objective: (len(transitions),) predicted dynamics objective of each transition.
     """
 
@@ -58,14 +58,15 @@ class SearchResult:
     """All solutions of one search, oldest first, and how it went.
 
     Attributes:
-        solutions: in the order in which they were found; costs fall, but where the search began anew (`restart`).
-        seconds: wall-clock of the search; heuristic_seconds: of building the heuristic (not in `seconds`).
-        expansions: states expanded.
-        exhausted: every reachable state was looked at.
-        expanded: (k, 3) float; x, y, yaw of the mean feet of expanded states, in order (for display).
-        reason: one line where there is no solution, else "".
-        warning: one line where the judgements need a grain of salt, else "".
-        hasty: so many of the first solutions were only to come soon; better ones follow.
+        solutions: Solutions in the order in which they were found. Costs fall, except where the search began again.
+        seconds: Wall-clock time of the search.
+        heuristic_seconds: Time for building the heuristic, not part of `seconds`.
+        expansions: Number of states expanded.
+        exhausted: Whether every reachable state was looked at.
+        expanded: (k, 3) x m, y m, yaw rad; mean of the feet of the expanded states in their order, for display.
+        reason: One line where there is no solution, else "".
+        warning: One line where the judgements are less reliable, else "".
+        hasty: Number of first solutions that only had to come soon; better ones follow.
     """
 
     solutions: tuple[Solution, ...]
@@ -80,7 +81,7 @@ class SearchResult:
 
 
 def reason_of(stopped_by: str, seconds: float, expansions: int, rejected: np.ndarray, dynamics: str) -> str:
-    """One line on why there is no solution and what rejected most candidates, the choice of palms apart."""
+    """One line on why there is no solution and what rejected most candidates, not counting the choice of palms."""
     how = {
         "exhausted": f"every stance that can be reached was looked at ({expansions})",
         "time": f"the time limit of {seconds:.3g} s was reached after {expansions} expansions; a longer one may help",

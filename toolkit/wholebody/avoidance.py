@@ -4,8 +4,8 @@ For a pair of geoms at distance d with normal n (from the first to the second) a
 
     n . (J2(p) - J1(p)) dq >= -(d - d_safe) dt / tau
 
-so that a distance shrinks ever more slowly towards d_safe and grows where it is below. Legs follow from feet and CoM
-and are left to the final collision check.
+so that a distance shrinks ever more slowly towards d_safe, and grows where it is smaller. The legs are determined by
+the feet and the CoM; only the final collision check covers them.
 """
 
 from __future__ import annotations
@@ -17,23 +17,19 @@ import numpy as np
 
 from toolkit.geometry.limb import PALMS, Limb
 from toolkit.robot.model import RobotModel
+from toolkit.wholebody.collision import body_pair
 
-NOTICE = 0.12  # m; distances below this are looked at
+NOTICE = 0.12  # m; larger distances are ignored
 SAFE_WORLD, SAFE_SELF = 0.06, 0.012  # m; wanted distance of an arm from the world and from the rest of the robot
-TIME = 0.15  # s; tau above: slower than a tick by far, faster than a swing
-MAX_ROWS = 16  # dampers at a time, the nearest ones: each costs the solver, and few bind
+TIME = 0.15  # s; tau above: much longer than a tick, shorter than a swing
+MAX_ROWS = 16  # most dampers at a time, of the nearest pairs: each costs solver time, and few are active
 
 
 class ArmAvoidance:
     """Distances of the arms in the composed scene, tick after tick."""
 
     def __init__(self, robot: RobotModel, scene: mujoco.MjModel):
-        """Prepare a copy of the scene.
-
-        Args:
-            robot: the robot; one without palms has no arms to speak of.
-            scene: robot and world in one model; what to avoid.
-        """
+        """Prepare a copy of the scene, robot and world in one model; a robot without palms has no arms here."""
         self.model = copy.copy(scene)
         self.data = mujoco.MjData(self.model)
         self.static = self.model.body_weldid[self.model.geom_bodyid] == 0
@@ -50,16 +46,13 @@ class ArmAvoidance:
         self.resting = self._pairs_below(robot.home, SAFE_SELF)
 
     def rows(self, qpos: np.ndarray, drift: np.ndarray, tick: float, reaching: set[Limb]) -> tuple:
-        """Dampers `A dq <= b` over the joint displacements of one tick.
+        """A (k, n) and b (k,) of the dampers `A dq <= b` over the joint displacements of one tick.
 
         Args:
             qpos: (7 + n,) present state.
             drift: (6,) displacement of the base in the last tick, as MuJoCo's qvel times the tick.
             tick: s.
-            reaching: palms that approach, hold or leave a contact; their hands may touch the world.
-
-        Returns:
-            A (k, n) and b (k,).
+            reaching: Palms that approach, hold or leave a contact; their hands may touch the world.
         """
         model, data = self.model, self.data
         self._place(qpos)
@@ -89,7 +82,7 @@ class ArmAvoidance:
         mujoco.mj_collision(self.model, self.data)
 
     def _contacts(self):
-        """Pairs of geoms within `NOTICE`: geoms, distance, normal from first to second, nearest point of each pair."""
+        """Pairs of geoms within `NOTICE`: both geoms, their distance, the normal from first to second, and a point."""
         contact = self.data.contact
         nearest: dict[tuple[int, int], int] = {}
         for index, (first, second) in enumerate(contact.geom.tolist()):
@@ -103,7 +96,7 @@ class ArmAvoidance:
         yield from self._box_pairs()
 
     def _box_pairs(self):
-        """The same for boxes, whose collision function sees pairs apart only face to face, not edge to edge."""
+        """The same for pairs of boxes; MuJoCo's collision function finds those apart only if two faces are opposite."""
         model, data = self.model, self.data
         others, ends = self.boxes, np.zeros(6)
         for arm in self.arm_boxes:
@@ -117,25 +110,23 @@ class ArmAvoidance:
     def _ignored(self, first: int, second: int, reaching: set[Limb]) -> bool:
         if self.arm_of[first] < 0 and self.arm_of[second] < 0:
             return True
-        bodies = self.model.geom_bodyid[first], self.model.geom_bodyid[second]
-        if (min(bodies), max(bodies)) in self.resting:
+        if body_pair(self.model, first, second) in self.resting:
             return True
         world = self.static[first] or self.static[second]
         return world and any(self.hand[limb][first] or self.hand[limb][second] for limb in reaching)
 
     def _pairs_below(self, qpos: np.ndarray, distance: float) -> set[tuple[int, int]]:
-        """Pairs of the robot's bodies nearer than a distance in a posture: neighbours, mostly."""
+        """Pairs of the robot's bodies, mostly neighbours, that are nearer than a distance (m) in a posture."""
         self._place(qpos)
-        pairs = set()
-        for first, second, apart, _, _ in self._contacts():
-            if apart < distance and not (self.static[first] or self.static[second]):
-                low, high = sorted((int(self.model.geom_bodyid[first]), int(self.model.geom_bodyid[second])))
-                pairs.add((low, high))
-        return pairs
+        return {
+            body_pair(self.model, first, second)
+            for first, second, apart, _, _ in self._contacts()
+            if apart < distance and not (self.static[first] or self.static[second])
+        }
 
 
 def _arm_of_geoms(robot: RobotModel, model: mujoco.MjModel) -> np.ndarray:
-    """(ngeom,) int; the palm whose arm a geom belongs to, -1 elsewhere. The trunk, below both arms, is no arm."""
+    """(ngeom,) int; the palm whose arm a geom belongs to, -1 elsewhere. The trunk belongs to no arm."""
     arm = np.full(model.nbody, -1)
     for palm in (limb for limb in PALMS if limb in robot.limbs):
         root = int(model.jnt_bodyid[model.joint(robot.joint_names[robot.arm_joints(palm)[0]]).id])

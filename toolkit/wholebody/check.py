@@ -15,15 +15,15 @@ from toolkit.wholebody.collision import first_collision
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.motion_dynamics import inverse_dynamics, velocities
 
-# What a whole-body motion may deviate by from its plan.
+# Largest deviation of a whole-body motion from its plan.
 COM_ERROR = 0.02  # m; of the CoM
 FOOT_ERROR, PALM_ERROR = 0.005, 0.01  # m; of a patch in contact
 SWING_ERROR = 0.02  # m; of a foot in the air
 ORIENTATION_ERROR = 0.03  # rad; of a sole, or of a palm's normal
 RANGE_TOLERANCE = 1e-3  # rad; beyond a joint's range: rounding of the solver
+# Allowed share of the torque limit for joints that bear no contact. The controller keeps their torque within the limit,
+# and a head or a free arm may follow late.
 FREE_TORQUE_RATIO = 4.0
-"""Of the torque limit, for joints that bear no contact: a head or a free arm that is a little late harms nothing, and
-the controller keeps its torque within the limit."""
 
 
 @dataclass(frozen=True)
@@ -31,24 +31,18 @@ class CheckReport:
     """Result of the checks.
 
     Attributes:
-        max_position_error: m; over CoM and contacts. max_orientation_error: rad; over contacts.
+        max_position_error: m; over CoM and contacts.
+        max_orientation_error: rad; over contacts.
         torque: (T, n) N m.
-        base_residual: (T, 6) N and N m; see `torque.inverse_dynamics`.
-        limits_respected: joint ranges, velocities, torques.
-        findings: one per violated check, empty where all hold.
+        limits_respected: Whether joint ranges, velocities and torques are within their limits.
+        findings: One per violated check, empty where all hold.
     """
 
     max_position_error: float
     max_orientation_error: float
     torque: np.ndarray
-    base_residual: np.ndarray
     limits_respected: bool
     findings: tuple[Failure, ...]
-
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """One line per violated check."""
-        return tuple(finding.reason for finding in self.findings)
 
 
 def check(
@@ -59,33 +53,24 @@ def check(
     times: np.ndarray,
     qpos: np.ndarray,
 ) -> CheckReport:
-    """Check a motion.
+    """Check a motion (T, 7 + n) at uniform times (T,) in s.
 
-    Args:
-        robot: the robot.
-        scene: robot and world in one model, for collisions.
-        paths: planned poses of the limbs.
-        motion: planned CoM and wrenches.
-        times: (T,) s, uniform.
-        qpos: (T, 7 + n).
+    It is compared with the planned poses of the limbs and the planned CoM, and must collide nowhere in `scene`, the
+    robot and the world in one model. Torques result from the planned wrenches.
     """
     position, orientation, tracking = _tracking(robot, paths, motion, times, qpos)
-    torque, residual = inverse_dynamics(robot, motion, times, qpos)
+    torque = inverse_dynamics(robot, motion, times, qpos)[:, 6:]
     bearing = robot.carrying(limb for limb in robot.limbs if motion.problem.active[:, limb].any())
     limits = _limits(robot, times, qpos, torque, bearing)
     hit = first_collision(robot, scene, times, qpos)
     findings = tracking + limits + ([hit] if hit else [])
-    return CheckReport(position, orientation, torque, residual, not limits, tuple(findings))
+    return CheckReport(position, orientation, torque, not limits, tuple(findings))
 
 
 def _tracking(
-    robot: RobotModel,
-    paths: LimbPaths,
-    motion: CentroidalMotion,
-    times: np.ndarray,
-    qpos: np.ndarray,
+    robot: RobotModel, paths: LimbPaths, motion: CentroidalMotion, times: np.ndarray, qpos: np.ndarray
 ) -> tuple[float, float, list[Failure]]:
-    """Largest position and orientation error over CoM and contacts, and the reasons to fail."""
+    """Largest position (m) and orientation (rad) error over CoM and contacts, and the violated checks."""
     model = robot.mujoco_model
     data = mujoco.MjData(model)
     worst: dict[tuple[str, str], tuple[float, float, float]] = {}  # (thing, unit): error, limit, time
@@ -125,7 +110,7 @@ def _tracking(
 
 
 def _angle(limb: Limb, actual: np.ndarray, planned: np.ndarray) -> float:
-    """Angle in rad between two orientations; of the normals only for palms, whose twist is free."""
+    """Angle in rad between two orientations; for palms, whose twist is free, between their normals."""
     if not limb.is_foot:
         return float(np.arctan2(np.linalg.norm(np.cross(actual[:, 2], planned[:, 2])), actual[:, 2] @ planned[:, 2]))
     # |R - I|_F = 2 sqrt(2) sin(angle / 2): accurate for small angles, unlike the trace.
@@ -133,13 +118,9 @@ def _angle(limb: Limb, actual: np.ndarray, planned: np.ndarray) -> float:
 
 
 def _limits(
-    robot: RobotModel,
-    times: np.ndarray,
-    qpos: np.ndarray,
-    torque: np.ndarray,
-    bearing: np.ndarray,
+    robot: RobotModel, times: np.ndarray, qpos: np.ndarray, torque: np.ndarray, bearing: np.ndarray
 ) -> list[Failure]:
-    """Reasons to fail: range, velocity, torque."""
+    """The violated limits of range, velocity and torque; `bearing` (n,) bool marks joints that bear a contact."""
     findings = []
     joints = qpos[:, 7:]
     beyond = np.maximum(robot.lower - joints, joints - robot.upper)
@@ -167,6 +148,6 @@ def _limits(
 
 
 def _worst(values: np.ndarray) -> tuple[int, int]:
-    """Index of the largest entry, where NaN counts as infinite."""
+    """Row and column of the largest entry, where NaN counts as infinite."""
     row, column = np.unravel_index(np.argmax(np.where(np.isnan(values), np.inf, values)), values.shape)
     return int(row), int(column)

@@ -8,22 +8,16 @@ import numpy as np
 from toolkit.contacts.failure import Failure
 from toolkit.robot.model import RobotModel
 
-RATE = 25.0  # Hz; at most this many postures per second are looked at: at 1 m/s a limb moves 4 cm between two
-PATCH_DEPTH = 4e-3  # m; a limb's last link may press this deep into the world: it makes the planned contacts
-BODY_DEPTH = 1e-3  # m; any other link into the world
-SELF_DEPTH = 2e-3  # m; links of the robot into each other
+RATE = 25.0  # Hz; at most this many postures per second are checked: at 1 m/s a limb moves 4 cm between two
+PATCH_DEPTH = 4e-3  # m; allowed depth of a limb's last link in the world, as it makes the planned contacts
+BODY_DEPTH = 1e-3  # m; allowed depth of any other link in the world
+SELF_DEPTH = 2e-3  # m; allowed depth of links of the robot in each other
 
 
 def first_collision(robot: RobotModel, scene: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray) -> Failure | None:
-    """The first collision of a motion, None if there is none.
+    """The first collision of a motion (T, 7 + n) at uniform times (T,) in s, None if there is none.
 
-    Pairs of links that touch each other in the home posture are left out.
-
-    Args:
-        robot: the robot.
-        scene: robot and world in one model.
-        times: (T,) s, uniform.
-        qpos: (T, 7 + n).
+    `scene` is the robot and the world in one model. Pairs of links that touch in the home posture are left out.
     """
     model, data = scene, mujoco.MjData(scene)
     static = model.body_weldid[model.geom_bodyid] == 0
@@ -41,7 +35,7 @@ def first_collision(robot: RobotModel, scene: mujoco.MjModel, times: np.ndarray,
                 link = second if static[first] else first
                 allowed = PATCH_DEPTH if patch[link] else BODY_DEPTH
             else:
-                allowed = np.inf if _bodies(model, first, second) in resting else SELF_DEPTH
+                allowed = np.inf if body_pair(model, first, second) in resting else SELF_DEPTH
             if depth > allowed:
                 return Failure(
                     f"{_label(model, first)} and {_label(model, second)} collide at {times[index]:.2f} s, "
@@ -58,15 +52,16 @@ def _touching_at_home(
     data.qpos[:] = home
     mujoco.mj_kinematics(model, data)
     mujoco.mj_collision(model, data)
-    return {_bodies(model, a, b) for a, b in data.contact.geom if not static[a] and not static[b]}
+    return {body_pair(model, a, b) for a, b in data.contact.geom if not static[a] and not static[b]}
 
 
-def _bodies(model: mujoco.MjModel, first: int, second: int) -> tuple[int, int]:
+def body_pair(model: mujoco.MjModel, first: int, second: int) -> tuple[int, int]:
+    """Indices of the bodies of two geoms, in ascending order."""
     low, high = sorted((int(model.geom_bodyid[first]), int(model.geom_bodyid[second])))
     return low, high
 
 
 def _label(model: mujoco.MjModel, geom: int) -> str:
-    """Name of a geom, or of its body."""
+    """Name of a geom; where it has none, it is named after its body."""
     name = model.geom(geom).name
     return name or f"a geom of {model.body(model.geom_bodyid[geom]).name or 'the world'}"

@@ -1,4 +1,4 @@
-"""The way of a swinging foot around the standing one, seen from above."""
+"""How a swinging foot gets around the standing one, seen from above."""
 
 from __future__ import annotations
 
@@ -7,21 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from toolkit.wholebody.swing import SwingPath
-from toolkit.wholebody.swing_task import SAMPLES, SwingConfig, SwingTask
+from toolkit.wholebody.swing_task import GAP, SAMPLES, SwingTask
 
-STEP, MOST = 0.02, 0.16  # m; of the detour: by what it grows until the way is free, and the most it may be
+STEP, MOST = 0.02, 0.16  # m; the detour grows by STEP until the way is free, at most to MOST
 
 
-def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath], config: SwingConfig) -> np.ndarray:
-    """Horizontal bump that leads a foot around the standing one.
+def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath]) -> np.ndarray:
+    """(3,) m; horizontal bump that leads a foot around the standing one, zero where the straight way is free.
 
-    Args:
-        task: the swing.
-        path_of: path with a given bump (3,) in m.
-        config: how far to keep away.
-
-    Returns:
-        (3,) m; zero where the straight way is free.
+    `path_of` makes the path with a given bump (3,) in m.
     """
     if task.other is None:
         return np.zeros(3)
@@ -35,7 +29,7 @@ def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath], config: 
         return float(apart.min()), float(min(apart[0], apart[-1]))
 
     free, at_ends = gap(np.zeros(3))
-    wanted = min(config.gap, at_ends)
+    wanted = min(GAP, at_ends)
     if free >= wanted - 1e-6:
         return np.zeros(3)
     travel = (task.end.position - task.start.position)[:2]
@@ -65,9 +59,7 @@ def corners(positions: np.ndarray, rotations: np.ndarray, half_size: np.ndarray)
 def gaps(moving: np.ndarray, standing: np.ndarray) -> np.ndarray:
     """(k,) m; largest separation of convex quadrilaterals along any edge normal, negative where they overlap.
 
-    Args:
-        moving: (k, 4, 2) m; corners in order around.
-        standing: (4, 2) m.
+    Corners in m, in order around: `moving` (k, 4, 2) and `standing` (4, 2).
     """
     standing = np.broadcast_to(standing, moving.shape)
     gaps = np.full(len(moving), -np.inf)

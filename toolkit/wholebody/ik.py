@@ -3,7 +3,7 @@
 At every tick one quadratic program over the joint displacements dq tracks, from the strongest to the weakest: the
 patches, the CoM, the base's upright orientation with the heading of the feet, the planned angular momentum, and an
 eased return to the home posture. Joint ranges, velocities and a least knee flexion are hard limits. Each tick starts
-from the last one, so the error of the linearisation stays of second order in the step.
+from the last one, so the linearisation error is of second order in the step.
 """
 
 from __future__ import annotations
@@ -20,28 +20,19 @@ from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
 from toolkit.wholebody import ik_config as weights
 from toolkit.wholebody.avoidance import ArmAvoidance
-from toolkit.wholebody.ik_config import IKConfig
-from toolkit.wholebody.knee import knee_range
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.swing import Window
 
-OFFSET = Window(0.0, 0.6)  # of a palm's swing, over which it joins its path
-LEAVING, LANDING = Window(0.0, 0.2), Window(0.75, 1.0)  # of a foot's swing, near its contacts
+OFFSET = Window(0.0, 0.6)  # the part of a palm's swing over which the palm joins its path
+LEAVING, LANDING = Window(0.0, 0.2), Window(0.75, 1.0)  # the parts of a foot's swing near its contacts
 
 
 class WholeBodyIK:
-    """The solver with its tasks, tick after tick."""
+    """The solver with its tasks and its state, solved tick after tick."""
 
-    def __init__(self, robot: RobotModel, config: IKConfig, tick: float, avoidance: ArmAvoidance | None = None):
-        """Set up the tasks.
-
-        Args:
-            robot: the robot.
-            config: settings.
-            tick: s between two solves.
-            avoidance: what arms keep clear of; nothing where None.
-        """
-        self.robot, self.config, self.tick, self.avoidance = robot, config, tick, avoidance
+    def __init__(self, robot: RobotModel, tick: float, avoidance: ArmAvoidance | None = None):
+        """Set up the tasks for a tick in s; `avoidance` keeps the arms clear of the world and the body."""
+        self.robot, self.tick, self.avoidance = robot, tick, avoidance
         self.wrapper = placo_wrapper(robot)
         self.order = pinocchio_map(robot, self.wrapper.model)
         self.solver = self.wrapper.make_solver()
@@ -54,16 +45,16 @@ class WholeBodyIK:
         self._add_tasks()
 
     def _set_limits(self) -> None:
-        robot, config = self.robot, self.config
-        lower = np.minimum(robot.lower + config.range_margin, np.maximum(robot.lower, robot.home[7:]))
-        upper = np.maximum(robot.upper - config.range_margin, np.minimum(robot.upper, robot.home[7:]))
+        robot = self.robot
+        lower = np.minimum(robot.lower + weights.RANGE_MARGIN, np.maximum(robot.lower, robot.home[7:]))
+        upper = np.maximum(robot.upper - weights.RANGE_MARGIN, np.minimum(robot.upper, robot.home[7:]))
         for foot in FEET:
-            knee, least, most = knee_range(robot, foot, config.min_knee)
+            knee, least, most = knee_range(robot, foot)
             lower[knee], upper[knee] = max(lower[knee], least), min(upper[knee], most)
         self.lower, self.upper = lower, upper
         for index, name in enumerate(robot.joint_names):
             self.wrapper.set_joint_limits(name, float(lower[index]), float(upper[index]))
-            self.wrapper.set_velocity_limit(name, float(config.velocity_fraction * robot.velocity_limit[index]))
+            self.wrapper.set_velocity_limit(name, float(weights.VELOCITY_FRACTION * robot.velocity_limit[index]))
         self.solver.enable_joint_limits(True)
 
     def _add_tasks(self) -> None:
@@ -111,16 +102,7 @@ class WholeBodyIK:
         return [(names, weight) for weight, names in groups.items()]
 
     def start(self, qpos: np.ndarray, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
-        """Settle on the first sample.
-
-        Args:
-            qpos: (7 + n,) first guess.
-            paths: targets of the limbs.
-            motion: target of the CoM.
-
-        Returns:
-            (7 + n,) qpos at time 0.
-        """
+        """(7 + n,) qpos at time 0, settled from a first guess (7 + n,)."""
         guess = qpos.copy()
         for palm in self.palms:
             segment = paths.segment(palm, 0.0)
@@ -145,16 +127,16 @@ class WholeBodyIK:
             task.configure("posture", "soft", weight)
         # placo's task is in kg m^2/s: over a tick, and divided by an inertia, it is an angle.
         angle = self.tick / (self.robot.mass * self.robot.com_height**2)
-        self.momentum.configure("momentum", "soft", self.config.angular_momentum * angle**2)
+        self.momentum.configure("momentum", "soft", weights.ANGULAR_MOMENTUM * angle**2)
         self.solver.enable_velocity_limits(True)
         self.drift, self.last_step = np.zeros(6), np.zeros(len(self.robot.joint_names))
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     def advance(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
-        """Move on by one tick to a time in s; returns (7 + n,) qpos.
+        """Advance by one tick to a time in s; returns (7 + n,) qpos.
 
         Raises:
-            PlanningError: if the quadratic program has no solution.
+            PlanningError: The quadratic program has no solution.
         """
         angles = self.joints
         self._set_targets(time, paths, motion)
@@ -172,7 +154,7 @@ class WholeBodyIK:
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     def _posture(self, time: float, angles: np.ndarray, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
-        """(n,) rad; where joints tend to: home, and for an arm that holds or reaches a contact what suits that."""
+        """(n,) rad; posture that joints tend to: home, or what fits the contact that an arm has or reaches."""
         posture = self.robot.home[7:].copy()
         for palm in self.palms:
             segment = paths.segment(palm, time)
@@ -188,7 +170,7 @@ class WholeBodyIK:
     def _arm_posture(
         self, palm: Limb, time: float, angles: np.ndarray, paths: LimbPaths, motion: CentroidalMotion
     ) -> np.ndarray:
-        """(k,) rad; joints of an arm that make the contact at a time, with the trunk upright."""
+        """(k,) rad; joints of an arm that make the contact at a time in s, with the trunk upright."""
         pose = paths.sample(palm, time).pose
         assert pose is not None
         turn = paths.mean_feet(time).rotation
@@ -262,13 +244,13 @@ class WholeBodyIK:
         return change[:6]
 
     def _set_ranges(self, angles: np.ndarray, free: list[Limb]) -> None:
-        """Ranges of this tick: approached ever more slowly, and narrow for arms that hang free.
+        """Set the ranges of this tick, whose ends joints approach ever more slowly.
 
-        Momentum asks for wide swings of the arms; people do not make them.
+        They are narrow for arms that hang free: the momentum task alone would swing them wider than people do.
         """
         lower, upper = self.lower.copy(), self.upper.copy()
         for palm in free:
-            arm, swing = self.arm_joints[palm], self.config.arm_swing
+            arm, swing = self.arm_joints[palm], weights.ARM_SWING
             home = self.robot.home[7:][arm]
             lower[arm] = np.maximum(lower[arm], np.minimum(home - swing, angles[arm]))
             upper[arm] = np.minimum(upper[arm], np.maximum(home + swing, angles[arm]))
@@ -279,7 +261,7 @@ class WholeBodyIK:
             self.wrapper.set_joint_limits(name, low, high)
 
     def _set_palm(self, palm: Limb, tasks: tuple, time: float, paths: LimbPaths) -> None:
-        """Targets of a palm: its path, and at first the distance from there to where the free arm happened to be."""
+        """Set a palm's targets: its path, at first shifted to where the free arm is."""
         position, normal, twist = tasks
         pose, authority = paths.sample(palm, time).pose, paths.authority(palm, time)
         if pose is not None:
@@ -294,7 +276,7 @@ class WholeBodyIK:
         twist.configure(f"{palm.label}_twist", "soft", share * weights.PALM_TWIST)
 
     def _from_free(self, palm: Limb, pose: Pose, time: float, paths: LimbPaths) -> Pose:
-        """A path that comes from the free posture starts where the palm is, and the difference fades."""
+        """The pose on a path; one from the free posture starts where the palm is, and the difference fades."""
         segment = paths.segment(palm, time)
         if not segment.free_start or segment.path is None:
             return pose
@@ -309,7 +291,7 @@ class WholeBodyIK:
 
 
 def momentum_at(motion: CentroidalMotion, time: float) -> np.ndarray:
-    """(3,) kg m^2/s; planned angular momentum about the CoM at a time in s, linear between knots."""
+    """(3,) kg m^2/s; planned angular momentum about the CoM in the world at a time in s, linear between knots."""
     times = motion.problem.times
     step = min(max(int(np.searchsorted(times, time, side="right")) - 1, 0), motion.problem.steps - 1)
     share = min(max((time - times[step]) / (times[step + 1] - times[step]), 0.0), 1.0)
@@ -324,3 +306,17 @@ def first_guess(robot: RobotModel, paths: LimbPaths, motion: CentroidalMotion) -
     qpos = robot.home.copy()
     qpos[:3], qpos[3:7] = base.position + np.array([0.0, 0.0, rise]), base.quaternion_wxyz
     return qpos
+
+
+def knee_range(robot: RobotModel, foot: Limb, least_flexion: float = weights.MIN_KNEE) -> tuple[int, float, float]:
+    """Index of a leg's knee joint, and its lower and upper limit in rad that keep a least flexion (0 is straight)."""
+    joint = int(robot.joints_to(foot)[3])  # after the three of the hip, as in every leg that can be loaded
+    model = robot.mujoco_model
+    data = mujoco.MjData(model)
+    data.qpos[:] = robot.home
+    mujoco.mj_kinematics(model, data)
+    lower, upper = float(robot.lower[joint]), float(robot.upper[joint])
+    missing = least_flexion - robot.legs[foot].ranges["knee"][0]  # from the joint's straight end to enough flexion
+    if data.xaxis[joint + 1] @ data.xmat[1].reshape(3, 3)[:, 1] > 0.0:  # flexing is positive; joint 0 is the free one
+        return joint, min(max(lower, lower + missing), upper), upper
+    return joint, lower, max(min(upper, upper - missing), lower)

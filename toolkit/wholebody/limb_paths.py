@@ -1,11 +1,10 @@
-"""LimbPaths: where each limb's patch is meant to be at any time of a schedule."""
+"""Planned place of each limb's patch at any time of a schedule."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,30 +15,13 @@ from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, mean_pose
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.swing import PathSample, SwingPath, Window
+from toolkit.wholebody.swing import LimbSample, SwingPath, Window
 from toolkit.wholebody.swing_planner import Collide, plan_swing
-from toolkit.wholebody.swing_task import SAMPLES, SwingConfig, SwingTask
-from toolkit.wholebody.toe_pitch import SwingingLeg
+from toolkit.wholebody.swing_task import LIFT, SAMPLES, SwingingLeg, SwingTask
 from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
 
 LEADING = 0.4  # authority of a palm's path in its middle
-
-
-class LimbSample(NamedTuple):
-    """A limb's patch at one time.
-
-    Attributes:
-        pose: world_from_contact; None for a palm that hangs free.
-        velocity: (6,) m/s and rad/s, linear then angular, in the world; NaN for a free palm.
-        acceleration: (6,) m/s^2 and rad/s^2; NaN for a free palm.
-        in_contact: planned contact.
-    """
-
-    pose: Pose | None
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    in_contact: bool
 
 
 @dataclass(frozen=True)
@@ -48,10 +30,10 @@ class Segment:
 
     Attributes:
         begin, end: s.
-        transition: index of the transition that the phase belongs to.
-        pose: where the limb rests in contact; None otherwise.
-        path: how it moves; None in contact and for a free palm.
-        free_start, free_end: the path comes from, or goes to, the arm's free posture.
+        transition: Index of the transition that the phase belongs to.
+        pose: world_from_contact of a limb in contact; None otherwise.
+        path: Path of a limb that swings; None in contact and for a free palm.
+        free_start, free_end: Whether the path comes from, or goes to, the arm's free posture.
     """
 
     begin: float
@@ -67,8 +49,7 @@ class Segment:
 class LimbPaths:
     """Paths of all limbs over a schedule; before and after it they rest.
 
-    Attributes:
-        segments: one tuple per limb (indexed by `Limb`), in order of time, without gaps.
+    `segments` has one tuple per limb (indexed by `Limb`), in order of time, without gaps.
     """
 
     segments: tuple[tuple[Segment, ...], ...]
@@ -85,14 +66,13 @@ class LimbPaths:
         """The limb's patch at a time in s, clamped at the ends."""
         segment = self.segment(limb, time)
         if segment.path is not None:
-            sample: PathSample = segment.path.sample(time)
-            return LimbSample(sample.pose, sample.velocity, sample.acceleration, False)
+            return segment.path.sample(time)
         if segment.pose is not None:
             return LimbSample(segment.pose, np.zeros(6), np.zeros(6), True)
         return LimbSample(None, np.full(6, np.nan), np.full(6, np.nan), False)
 
     def mean_feet(self, time: float) -> Pose:
-        """Upright frame at the mean of the feet, on the ground or not, at a time in s."""
+        """Upright frame at the mean of the planned feet, in contact or not, at a time in s."""
         left, right = (self.sample(foot, time).pose for foot in FEET)
         assert left is not None and right is not None
         return mean_pose(left, right)
@@ -104,7 +84,7 @@ class LimbPaths:
             return 0.0 if segment.pose is None else 1.0
         if limb.is_foot:
             return 1.0
-        # In between, a palm's path only leads: it may neither drag the trunk along nor twist the arm.
+        # In between, a palm's path has little authority, so that it does not drag the trunk along or twist the arm.
         u = (time - segment.path.begin) / segment.path.duration
         if u < 0.5:
             left = Window(0.0, 0.3).step(u)[0]
@@ -127,27 +107,15 @@ def limb_paths(
     robot: RobotModel,
     world: World,
     schedule: ContactSchedule,
-    motion: CentroidalMotion | None = None,
-    config: SwingConfig | None = None,
-    *,
-    collide: Collide | None = None,
+    motion: CentroidalMotion,
+    foot_lift: float = LIFT,
 ) -> LimbPaths:
     """Paths of the limbs of a schedule, clear of the world's geometry where that is possible.
 
-    Args:
-        robot: for the patches' sizes and the arms' free posture.
-        world: to keep clear of.
-        schedule: phases with their contacts.
-        motion: places the free palms relative to the planned CoM; relative to the mean of the feet where None.
-        config: shape of the paths.
-        collide: replaces the collision test of `world`.
-
-    Returns:
-        Paths; see `LimbPaths.blocked` for those that are not clear.
+    Free palms hang relative to the CoM of the planned motion. Feet leave and reach their contacts straight along the
+    normal over `foot_lift` m. `LimbPaths.blocked` names the paths that are not clear.
     """
-    config = config or SwingConfig()
-    if collide is None:
-        collide = box_collide(world)
+    collide = box_collide(world)
     segments: list[tuple[Segment, ...]] = []
     for limb in Limb:
         row = []
@@ -156,7 +124,7 @@ def limb_paths(
             if contact is not None:
                 row.append(Segment(phase.start, phase.end, phase.transition, pose=contact.pose))
             elif phase.swing == limb:
-                row.append(_swing(robot, schedule, index, limb, motion, collide, config))
+                row.append(_swing(robot, schedule, index, limb, motion, collide, foot_lift))
             else:
                 row.append(Segment(phase.start, phase.end, phase.transition))
         segments.append(tuple(row))
@@ -184,9 +152,9 @@ def _swing(
     schedule: ContactSchedule,
     index: int,
     limb: Limb,
-    motion: CentroidalMotion | None,
+    motion: CentroidalMotion,
     collide: Collide,
-    config: SwingConfig,
+    foot_lift: float,
 ) -> Segment:
     """The segment of the limb that swings in phase `index`."""
     phases = schedule.phases
@@ -199,8 +167,7 @@ def _swing(
         return Segment(phase.start, phase.end, phase.transition)
 
     def free(neighbour: int, time: float) -> Pose:
-        com = None if motion is None else motion.sample(time)[0]
-        return free_palm(robot, limb, _feet(phases[neighbour]), com)
+        return free_palm(robot, limb, _feet(phases[neighbour]), motion.sample(time)[0])
 
     start = old.pose if old is not None else free(index - 1 if index > 0 else index, phase.start)
     end = new.pose if new is not None else free(min(index + 1, len(phases) - 1), phase.end)
@@ -208,43 +175,24 @@ def _swing(
     standing = _contact(phase, limb.mirrored) if limb.is_foot else None
     if standing is not None:
         other = standing.pose, robot.half_sizes[limb.mirrored]
-        if motion is not None:
-            u = np.linspace(0.0, 1.0, SAMPLES)
-            com = np.array([motion.sample(phase.start + share * phase.duration)[0] for share in u])
-            leg = SwingingLeg(robot.legs[limb], u, com, standing.pose.yaw)
-    path = plan_swing(
-        SwingTask(
-            begin=phase.start,
-            duration=phase.duration,
-            start=start,
-            end=end,
-            half_size=robot.half_sizes[limb],
-            is_foot=limb.is_foot,
-            free_start=old is None,
-            free_end=new is None,
-            other=other,
-            leg=leg,
-        ),
-        collide,
-        config,
+        u = np.linspace(0.0, 1.0, SAMPLES)
+        com = np.array([motion.sample(phase.start + share * phase.duration)[0] for share in u])
+        leg = SwingingLeg(robot.legs[limb], u, com, standing.pose.yaw)
+    free_start, free_end = old is None, new is None
+    size, lift = robot.half_sizes[limb], foot_lift if limb.is_foot else LIFT
+    task = SwingTask(
+        phase.start, phase.duration, start, end, size, limb.is_foot, free_start, free_end, other, leg, lift
     )
-    return Segment(phase.start, phase.end, phase.transition, path=path, free_start=old is None, free_end=new is None)
+    return Segment(phase.start, phase.end, phase.transition, None, plan_swing(task, collide), free_start, free_end)
 
 
 def _feet(phase: Phase) -> Pose:
-    """Frame of the mean of the feet of a phase with both feet in contact."""
+    """Upright frame at the mean of the feet of a phase with both feet in contact."""
     return Stance(tuple(contact for contact in phase.contacts if contact.limb.is_foot)).mean_feet
 
 
-def free_palm(robot: RobotModel, limb: Limb, feet: Pose, com: np.ndarray | None = None) -> Pose:
-    """Pose of a palm that hangs in the home posture.
-
-    Args:
-        robot: the robot.
-        limb: a palm.
-        feet: upright frame of the mean of the feet.
-        com: (3,) m; where the CoM is; above `feet` as in the home posture where None.
-    """
+def free_palm(robot: RobotModel, limb: Limb, feet: Pose, com: np.ndarray) -> Pose:
+    """Pose of a palm that hangs in the home posture, for a CoM (3,) m and the upright frame of the mean feet."""
     data = mujoco.MjData(robot.mujoco_model)
     data.qpos[:] = robot.home
     mujoco.mj_kinematics(robot.mujoco_model, data)
@@ -252,6 +200,4 @@ def free_palm(robot: RobotModel, limb: Limb, feet: Pose, com: np.ndarray | None 
     site = data.site(robot.limbs[limb].site)
     home = Pose(site.xmat.reshape(3, 3).copy(), site.xpos.copy())
     placed = feet @ home
-    if com is None:
-        return placed
     return Pose(placed.rotation, placed.position + com - feet @ data.subtree_com[0])

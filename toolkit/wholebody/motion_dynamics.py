@@ -1,4 +1,4 @@
-"""What a motion asks of a robot: contact wrenches, joint torques, and the angular momentum of its postures."""
+"""Contact wrenches, joint torques and angular momentum that belong to a motion."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.robot.model import RobotModel
 
-SMOOTHING = np.array([0.0625, 0.25, 0.375, 0.25, 0.0625])  # of neighbouring samples: velocities are differences
+SMOOTHING = np.array([0.0625, 0.25, 0.375, 0.25, 0.0625])  # weights of neighbouring samples; they sum to 1
 
 
 def planned_wrench(motion: CentroidalMotion) -> np.ndarray:
-    """Planned wrenches in the contact frames: `tau = z x f + tau_n n` about the centre of the patch.
+    """(N, 4, 6) planned wrenches in the contact frames: force f (N), and moment tau (N m) about the patch's centre.
 
-    Returns:
-        (N, 4, 6); force f, and moment tau from the centre of pressure z and the torque tau_n about the normal n.
+    The moment is `tau = z x f + tau_n n`, from the centre of pressure z and the torque tau_n about the normal n.
     """
     force = np.einsum("nlji,nlj->nli", motion.problem.rotation, motion.force)
     lever = np.concatenate([motion.cop, np.zeros_like(motion.cop[..., :1])], axis=-1)
@@ -27,15 +26,10 @@ def planned_wrench(motion: CentroidalMotion) -> np.ndarray:
 
 
 def contact_wrenches(motion: CentroidalMotion, times: np.ndarray, window: float) -> np.ndarray:
-    """Planned wrenches at the patch centres, averaged over a window around each time.
+    """(T, 4, 6) planned force (N) and moment (N m) at the patch centres, in the world, at times (T,) in s.
 
-    Args:
-        motion: centroidal motion.
-        times: (T,) s.
-        window: s; plans are constant between knots, so an average removes the dependence on the side of a knot.
-
-    Returns:
-        (T, 4, 6) force and moment in the world.
+    They are averaged over a window in s around each time. Plans are constant between knots, so the average removes the
+    dependence on the side of a knot.
     """
     problem = motion.problem
     force, moment = np.split(planned_wrench(motion), 2, axis=-1)
@@ -50,27 +44,18 @@ def contact_wrenches(motion: CentroidalMotion, times: np.ndarray, window: float)
 
 
 def velocities(model: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray) -> np.ndarray:
-    """(T - 1, nv) mean velocities between neighbouring samples, MuJoCo conventions."""
+    """(T - 1, nv) mean velocities between neighbouring samples, in MuJoCo's conventions."""
     speed = np.zeros((len(times) - 1, model.nv))
     for index in range(len(times) - 1):
         mujoco.mj_differentiatePos(model, speed[index], times[index + 1] - times[index], qpos[index], qpos[index + 1])
     return speed
 
 
-def inverse_dynamics(
-    robot: RobotModel, motion: CentroidalMotion, times: np.ndarray, qpos: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Torques `M qacc + h - J^T w` with the planned wrenches w, by MuJoCo.
+def inverse_dynamics(robot: RobotModel, motion: CentroidalMotion, times: np.ndarray, qpos: np.ndarray) -> np.ndarray:
+    """(T, 6 + n) `M qacc + h - J^T w` with the planned wrenches w, by MuJoCo, at uniform times (T,) in s.
 
-    Args:
-        robot: the robot.
-        motion: for the wrenches.
-        times: (T,) s, uniform.
-        qpos: (T, 7 + n).
-
-    Returns:
-        (T, n) N m of the joints, and (T, 6) what remains at the base: zero if motion and wrenches agree exactly
-        (force in the world, moment about the base in its frame).
+    The first six are the residual at the base, zero if motion and wrenches agree exactly: force (N) in the world, and
+    moment (N m) about the base in its frame. The others are the joint torques in N m.
     """
     model = copy.copy(robot.mujoco_model)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
@@ -96,23 +81,15 @@ def inverse_dynamics(
                 mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], site)
                 generalized -= jacobian.T @ wrenches[index, limb]
         result[index] = generalized
-    return result[:, 6:], result[:, :6]
+    return result
 
 
 def posture_momentum(model: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> tuple:
-    """Angular momentum about the CoM along a motion, lightly smoothed, and its rate.
+    """Angular momentum about the CoM along a motion, lightly smoothed, and its rate: (T, 3) kg m^2/s and (T, 3) N m.
 
-    Inverse kinematics follows the planned angular momentum only as far as the postures allow; whoever tracks both the
-    postures and a momentum must take the momentum from the postures, or the two pull against each other.
-
-    Args:
-        model: of the robot alone.
-        times: (T,) s.
-        qpos: (T, 7 + n).
-        qvel: (T, 6 + n), MuJoCo conventions.
-
-    Returns:
-        (T, 3) kg m^2/s and (T, 3) N m in the world.
+    Both are in the world, at times (T,) in s; `model` is the robot alone. Inverse kinematics follows the planned
+    angular momentum only as far as the postures allow. A controller that tracks both the postures and a momentum must
+    therefore take the momentum from the postures, or the two targets contradict each other.
     """
     data = mujoco.MjData(model)
     momentum = np.zeros((len(times), 3))

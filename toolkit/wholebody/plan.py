@@ -19,24 +19,12 @@ from toolkit.robot.model import RobotModel
 from toolkit.wholebody.avoidance import ArmAvoidance
 from toolkit.wholebody.check import check
 from toolkit.wholebody.ik import WholeBodyIK, first_guess
-from toolkit.wholebody.ik_config import IKConfig
+from toolkit.wholebody.ik_config import SUBSTEPS
 from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
-from toolkit.wholebody.swing_task import SwingConfig
+from toolkit.wholebody.swing_task import LIFT
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
-
-@dataclass(frozen=True)
-class WholeBodyConfig:
-    """Settings of the whole-body stage.
-
-    Attributes:
-        rate: Hz; samples of the trajectory.
-        swing, ik: see the classes.
-    """
-
-    rate: float = 50.0
-    swing: SwingConfig = field(default_factory=SwingConfig)
-    ik: IKConfig = field(default_factory=IKConfig)
+RATE = 50.0  # Hz; samples of the trajectory
 
 
 @dataclass(frozen=True)
@@ -44,9 +32,9 @@ class WholeBodyPlan(MotionPlan):
     """A motion plan with what the whole-body stage added: all that an execution needs.
 
     Attributes:
-        scene: Robot and world in one MuJoCo model, as composed; whoever disturbs it takes a copy.
-        paths: Where each limb's patch is meant to be at any time.
-        trajectory: Joint trajectories; it says itself whether it is feasible.
+        scene: Robot and world in one MuJoCo model, as composed. Copy it before changing it.
+        paths: Planned poses of each limb's patch.
+        trajectory: Joint trajectories; `trajectory.feasible` says whether every check passed.
     """
 
     scene: mujoco.MjModel = field(repr=False)
@@ -54,24 +42,23 @@ class WholeBodyPlan(MotionPlan):
     trajectory: WholeBodyTrajectory
 
 
-def whole_body(plan: MotionPlan, scene: mujoco.MjModel, config: WholeBodyConfig | None = None) -> WholeBodyPlan:
+def whole_body(plan: MotionPlan, scene: mujoco.MjModel, foot_lift: float = LIFT) -> WholeBodyPlan:
     """Find swing paths and a whole-body trajectory for a motion plan.
 
     Args:
         plan: Contacts and motion, with a final rest.
         scene: The plan's robot and world in one model (`toolkit.world.scene.compose_scene`).
-        config: Settings.
+        foot_lift: m; guarded motion of feet along the surface normal.
 
     Returns:
         The plan with paths and trajectory; `trajectory.feasible` says whether every check passed.
     """
-    config = config or WholeBodyConfig()
     begin = perf_counter()
     duration = plan.schedule.duration
-    times = np.linspace(0.0, duration, max(int(round(duration * config.rate)), 2) + 1)
-    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, config.swing)
+    times = np.linspace(0.0, duration, max(int(round(duration * RATE)), 2) + 1)
+    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, foot_lift)
     if plan.motion.feasible:
-        trajectory = _trajectory(plan, scene, paths, times, config)
+        trajectory = _trajectory(plan, scene, paths, times)
     else:
         failure = Failure(f"the centroidal motion is not feasible: {plan.motion.outcome}")
         trajectory = replace(_without_postures(plan.robot, paths, times), failure=failure)
@@ -84,28 +71,26 @@ def solve_ik(
     paths: LimbPaths,
     motion: CentroidalMotion,
     times: np.ndarray,
-    config: IKConfig,
     scene: mujoco.MjModel | None = None,
 ) -> np.ndarray:
-    """(T, 7 + n) qpos on a uniform time grid; the arms keep clear of what is in `scene` where there is one.
+    """(T, 7 + n) qpos on a uniform time grid (T,) in s; the arms keep clear of `scene` unless it is None.
 
     Raises:
-        PlanningError: if a quadratic program has no solution.
+        PlanningError: A quadratic program has no solution.
     """
-    tick = float(times[1] - times[0]) / config.substeps
-    avoidance = None if scene is None else ArmAvoidance(robot, scene)
-    solver = WholeBodyIK(robot, config, tick, avoidance)
+    tick = float(times[1] - times[0]) / SUBSTEPS
+    solver = WholeBodyIK(robot, tick, None if scene is None else ArmAvoidance(robot, scene))
     qpos = np.empty((len(times), len(robot.home)))
     qpos[0] = solver.start(first_guess(robot, paths, motion), paths, motion)
     for index in range(1, len(times)):
-        for substep in range(1, config.substeps + 1):
+        for substep in range(1, SUBSTEPS + 1):
             state = solver.advance(times[index - 1] + substep * tick, paths, motion)
         qpos[index] = state
     return qpos
 
 
-def qvel_of(model: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray) -> np.ndarray:
-    """(T, nv) velocities by central differences in MuJoCo's conventions; at rest at both ends."""
+def _qvel_of(model: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray) -> np.ndarray:
+    """(T, nv) velocities by central differences in MuJoCo's conventions; zero at both ends."""
     qvel = np.zeros((len(times), model.nv))
     for index in range(1, len(times) - 1):
         span = times[index + 1] - times[index - 1]
@@ -127,21 +112,19 @@ def _limb_arrays(paths: LimbPaths, times: np.ndarray) -> tuple[np.ndarray, np.nd
     return pose, velocity, contact
 
 
-def _trajectory(
-    plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray, config: WholeBodyConfig
-) -> WholeBodyTrajectory:
-    """Postures and their checks."""
+def _trajectory(plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray) -> WholeBodyTrajectory:
+    """The postures with the results of their checks."""
     robot, motion = plan.robot, plan.motion
     blocked, trajectory = _blocked(plan.schedule, paths), _without_postures(robot, paths, times)
     try:
-        qpos = solve_ik(robot, paths, motion, times, config.ik, scene)
+        qpos = solve_ik(robot, paths, motion, times, scene)
     except PlanningError as error:
         return replace(trajectory, failure=Failure("; ".join([*(each.reason for each in blocked), str(error)])))
     report = check(robot, scene, paths, motion, times, qpos)
     return replace(
         trajectory,
         qpos=qpos,
-        qvel=qvel_of(robot.mujoco_model, times, qpos),
+        qvel=_qvel_of(robot.mujoco_model, times, qpos),
         torque=report.torque,
         max_position_error=report.max_position_error,
         max_orientation_error=report.max_orientation_error,
@@ -151,7 +134,7 @@ def _trajectory(
 
 
 def _blocked(schedule: ContactSchedule, paths: LimbPaths) -> list[Failure]:
-    """A failure for each swing that finds no way."""
+    """A failure for each swing without a clear way."""
     starts = {(phase.swing, phase.transition): phase.start for phase in schedule.phases}
     return [
         Failure(f"{limb.label} finds no way clear of the world in transition {transition}", starts[limb, transition])
@@ -169,7 +152,7 @@ def _joined(findings: Sequence[Failure], schedule: ContactSchedule) -> Failure |
 
 
 def _without_postures(robot: RobotModel, paths: LimbPaths, times: np.ndarray) -> WholeBodyTrajectory:
-    """The planned paths of the limbs, with nothing known of the joints."""
+    """The planned paths of the limbs; everything about the joints is NaN."""
     pose, velocity, contact = _limb_arrays(paths, times)
     count, joints = len(times), len(robot.joint_names)
     return WholeBodyTrajectory(

@@ -2,8 +2,8 @@
 
 The path is a sum of straight moves, each smoothly timed within its own window of the swing: off the old surface along
 its normal, up, across, down, and onto the new surface along its normal. A sideways bump leads a foot around the other
-one. The orientation turns about one fixed axis (slerp), R1(t); a foot that trails far behind pitches its toes down on
-the way by an angle phi(t) about its own y axis, as a stretched ankle could not keep it level:
+one. The orientation R1(t) turns about one fixed axis (slerp). A stretched ankle cannot keep a foot level that trails
+far behind, so that foot also pitches its toes down on the way, by an angle phi(t) about its own y axis:
 
     R = R1 Ry(phi),  w = w1 + phi' R1 y,  dw/dt = dw1/dt + phi'' R1 y + phi' w1 x R1 y
 """
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,15 +23,10 @@ MINIMUM_JERK_SHARE = 0.3
 
 
 def blend(x):
-    """Smooth step from 0 to 1 with zero rate at both ends, `0.3 minimum-jerk + 0.7 cubic`.
+    """Smooth step from 0 to 1 with zero rate at both ends, `0.3 minimum-jerk + 0.7 cubic`, for x in [0, 1].
 
-    The mix has a lower peak velocity and acceleration than a pure minimum-jerk profile, which trackers pay for.
-
-    Args:
-        x: float or (k,) float in [0, 1].
-
-    Returns:
-        Value, first and second derivative with respect to x, each of the kind of `x`.
+    The mix has a lower peak velocity and acceleration than a pure minimum-jerk profile, so it is easier to track.
+    Returns the value and the first and second derivative with respect to x; x is a float or (k,) float.
     """
     a, b, y = MINIMUM_JERK_SHARE, 1.0 - MINIMUM_JERK_SHARE, 1.0 - x
     value = a * x**3 * (10.0 - 15.0 * x + 6.0 * x**2) + b * x**2 * (3.0 - 2.0 * x)
@@ -70,32 +66,28 @@ class Window:
 
 @dataclass(frozen=True)
 class Move:
-    """A straight displacement within a window; with `returns`, out and back again.
-
-    Attributes:
-        vector: (3,) float, m, world frame.
-        window: when.
-        returns: a bump instead of a step.
-    """
+    """A straight displacement `vector` (3,) m in the world within a window; with `returns`, out and back again."""
 
     vector: np.ndarray
     window: Window
     returns: bool = False
 
 
-@dataclass(frozen=True)
-class PathSample:
-    """A patch at one time.
+class LimbSample(NamedTuple):
+    """A limb's patch at one time.
 
     Attributes:
-        pose: world_from_contact.
-        velocity: (6,) m/s and rad/s; linear velocity of the patch's centre, then angular velocity, in the world.
+        pose: world_from_contact; None for a palm that hangs free.
+        velocity: (6,) m/s and rad/s; linear velocity of the patch's centre, then angular velocity, in the world. NaN
+            for a free palm.
         acceleration: (6,) m/s^2 and rad/s^2; the time derivative of `velocity`.
+        in_contact: Whether contact is planned.
     """
 
-    pose: Pose
+    pose: Pose | None
     velocity: np.ndarray
     acceleration: np.ndarray
+    in_contact: bool
 
 
 @dataclass(frozen=True)
@@ -103,14 +95,14 @@ class SwingPath:
     """Path of one patch within one swing phase.
 
     Attributes:
-        begin: s, when the swing starts.
+        begin: s; when the swing starts.
         duration: s.
         start, end: world_from_contact at both ends.
-        moves: they lead from the start's position to the end's.
-        turn: when the orientation changes.
+        moves: Together they lead from the start's position to the end's.
+        turn: When the orientation changes.
         pitch: rad; largest phi.
-        pitching: when the toes go down and come up again.
-        clear: the swept patch keeps free of the world (decided by the planner of the path).
+        pitching: When the toes go down and come up again.
+        clear: Whether the swept patch touches nothing of the world, as the planner of the path found.
     """
 
     begin: float
@@ -145,7 +137,7 @@ class SwingPath:
 
     @cached_property
     def _turning(self) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        """Angle, unit axis k, and [k] R0 and [k]^2 R0 of Rodrigues' formula, R0 the start's rotation."""
+        """Angle (rad), unit axis k, and [k] R0 and [k]^2 R0 of Rodrigues' formula, where R0 is the start's rotation."""
         angle = float(np.linalg.norm(self.rotation_vector))
         axis = self.rotation_vector / angle if angle > 0.0 else np.zeros(3)
         cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
@@ -156,12 +148,12 @@ class SwingPath:
         """(3, moves) displacements side by side."""
         return np.array([move.vector for move in self.moves]).reshape(-1, 3).T
 
-    def sample(self, time: float) -> PathSample:
+    def sample(self, time: float) -> LimbSample:
         """The patch at a time in s; at rest before and after the swing."""
         u, pace = (time - self.begin) / self.duration, 1.0 / self.duration
         velocity, acceleration = np.zeros(6), np.zeros(6)
         if not 0.0 <= u <= 1.0:
-            return PathSample(self.start if u < 0.0 else self.end, velocity, acceleration)
+            return LimbSample(self.start if u < 0.0 else self.end, velocity, acceleration, False)
         shares = [move.window.bump(u) if move.returns else move.window.step(u) for move in self.moves]
         along = self._vectors @ np.array(shares).reshape(-1, 3)  # columns: value, rate, second derivative
         velocity[:3], acceleration[:3] = along[:, 1] * pace, along[:, 2] * pace**2
@@ -180,7 +172,7 @@ class SwingPath:
             velocity[3:] += rate * y
             c, s = math.cos(pitch), math.sin(pitch)
             rotation = np.array([c * x - s * z, y, s * x + c * z]).T
-        return PathSample(Pose(rotation, self.start.position + along[:, 0]), velocity, acceleration)
+        return LimbSample(Pose(rotation, self.start.position + along[:, 0]), velocity, acceleration, False)
 
 
 def _about_y(angle: np.ndarray) -> np.ndarray:

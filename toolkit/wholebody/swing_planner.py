@@ -9,82 +9,79 @@ import numpy as np
 
 from toolkit.wholebody.detour import detour
 from toolkit.wholebody.swing import Move, SwingPath, Window
-from toolkit.wholebody.swing_task import EASY, SAMPLES, STEEP, SwingConfig, SwingTask, SwingTiming
+from toolkit.wholebody.swing_task import EASY, MARGIN, SAMPLES, STEEP, SwingTask, SwingTiming
 
 Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool: the box touches the world."""
+"""Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool, whether a box touches the world."""
 
 SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
-THICKNESS = 0.08  # m; height of the swept box above the patch: what a foot or a hand has there
+THICKNESS = 0.08  # m; height of the swept box above the patch, to hold the foot or the hand
 SPACING = 0.03  # m; largest way between two poses that are checked: less than the swept box is wide
 
-RAISE_STEP, MAX_RAISE = 0.03, 0.36  # m; what the path is raised by until it is clear, and the most it may be
+RAISE_STEP, MAX_RAISE = 0.03, 0.36  # m; a path is raised in these steps until it is clear, at most by MAX_RAISE
 EASY_RAISE = 0.04  # m; paths raised by more than that are first tried with the steep timing
 MODERATE_RAISE = 0.12  # m; higher paths come after lower ones with less margin
 
-# Windows of the crossing and the landing of feet that swing fast: nearly all the time there is, to keep the peak
-# velocity low, but the foot comes to rest along the surface before it meets it.
+# Windows of the crossing and the landing of feet that swing fast. The crossing takes nearly the whole swing, to keep
+# the peak velocity low, but the foot stops moving along the surface before it touches it.
 FAST_ACROSS, FAST_LAND = Window(0.02, 0.95), Window(0.7, 1.0)
-SLOW, FAST = 1.0, 2.5  # m/s; mean speed up to which the easy windows are kept, and from which these hold
+SLOW, FAST = 1.0, 2.5  # m/s; the easy windows hold up to a mean speed of SLOW, the fast ones from FAST on
 
-# A foot that trails the standing one by more than PITCH_FROM (m) pitches its toes down in proportion (rad/m), at most
-# by MAX_PITCH (rad), and more where the ankle's range asks for it, whose ends are kept at ANKLE_MARGIN (rad).
+# A foot that trails the standing one by more than PITCH_FROM (m) pitches its toes down by PITCH_GAIN (rad/m), and by
+# more where the ankle would come closer than ANKLE_MARGIN (rad) to an end of its range. MAX_PITCH (rad) is the most.
 PITCH_GAIN, PITCH_FROM, MAX_PITCH, ANKLE_MARGIN = 1.5, 0.2, 0.9, 0.15
 
 
-def plan_swing(task: SwingTask, collide: Collide, config: SwingConfig) -> SwingPath:
-    """The least raised path that is clear, with `clear` False where none is.
+def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
+    """The least raised path that is clear; where none is, the highest one with `clear` False.
 
-    Candidates are tried from the straightest to the highest, moderate heights first with the whole margin, then with
-    half of it, then with none; then great heights likewise.
+    Candidates are tried from the straightest to the highest. Moderate heights are tried first with the whole margin,
+    then with half of it, then with none. Great heights follow in the same way.
     """
-    bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector, config), config)
-    sides = _free_sides(task, collide, config)
-    candidates = list(_candidates(task, config))
+    bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector))
+    sides = _free_sides(task, collide)
+    candidates = list(_candidates(task))
     needed = 0.0 if not task.is_foot else abs(task.end.position[2] - task.start.position[2])
     moderate = [item for item in candidates if max(item[:2]) <= needed + MODERATE_RAISE]
     great = [item for item in candidates if max(item[:2]) > needed + MODERATE_RAISE]
     for group in (moderate, great):
         for share in (1.0, 0.5, 0.0):
             for before, after, timing in group:
-                path = _within_ankle_range(task, _path(task, before, after, timing, bump, config))
-                if not collide(*_swept_boxes(task, path, share * config.margin, sides)).any():
+                path = _within_ankle_range(task, _path(task, before, after, timing, bump))
+                if not collide(*_swept_boxes(task, path, share * MARGIN, sides)).any():
                     return path
-    return replace(_path(task, *candidates[-1], bump, config), clear=False)
+    return replace(_path(task, *candidates[-1], bump), clear=False)
 
 
-def _candidates(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float, SwingTiming]]:
+def _candidates(task: SwingTask) -> Iterator[tuple[float, float, SwingTiming]]:
     """Extra height (m) before and after the crossing, with the timing, from the easiest to the highest."""
-    raises = list(_raises(task, config))
+    raises = list(_raises(task))
     level = abs(task.end.position[2] - task.start.position[2]) if task.is_foot else 0.0
     low = [pair for pair in raises if max(pair) <= level + EASY_RAISE]
     yield from ((*pair, EASY) for pair in low)
     yield from ((*pair, STEEP) for pair in raises)
 
 
-def _raises(task: SwingTask, config: SwingConfig) -> Iterator[tuple[float, float]]:
+def _raises(task: SwingTask) -> Iterator[tuple[float, float]]:
     """Extra height (m) before and after the crossing, from the least to the most."""
     steps = np.arange(0.0, MAX_RAISE + 1e-9, RAISE_STEP).tolist()
     if not task.is_foot:
         yield from ((0.0 if task.free_start else step, 0.0 if task.free_end else step) for step in steps)
         return
     climb = float(task.end.position[2] - task.start.position[2])
-    climb += config.foot_lift * float(task.end.normal[2] - task.start.normal[2])
+    climb += task.lift * float(task.end.normal[2] - task.start.normal[2])
     up, down = max(climb, 0.0), max(-climb, 0.0)
-    # Small raises first, whatever the climb: along a slope they are all it takes.
+    # Small raises come first for every climb: along a slope they are enough.
     small = [step for step in steps[:5] if step < abs(climb)]
     heights = sorted({*small, *np.linspace(0.0, abs(climb), 1 + min(4, int(np.ceil(abs(climb) / RAISE_STEP))))})
     yield from ((min(height, up), min(height, down)) for height in heights)
     yield from ((up + step, down + step) for step in steps[1:])
 
 
-def _path(
-    task: SwingTask, before: float, after: float, timing: SwingTiming, bump: np.ndarray, config: SwingConfig
-) -> SwingPath:
+def _path(task: SwingTask, before: float, after: float, timing: SwingTiming, bump: np.ndarray) -> SwingPath:
     """The path with given extra heights, timing and sideways bump."""
-    lift = config.foot_lift if task.is_foot else config.palm_lift
-    off = np.zeros(3) if task.free_start else lift * task.start.normal
-    onto = np.zeros(3) if task.free_end else -lift * task.end.normal
+    off = np.zeros(3) if task.free_start else task.lift * task.start.normal
+    onto = np.zeros(3) if task.free_end else -task.lift * task.end.normal
     up = np.array([0.0, 0.0, 1.0]) if task.is_foot else _outward(task)
     travel = task.end.position - task.start.position - off - onto - (before - after) * up
     speed = float(np.linalg.norm(travel)) / task.duration
@@ -103,7 +100,7 @@ def _path(
 
 
 def _pitched(task: SwingTask, path: SwingPath, pitch: float) -> SwingPath:
-    """The path with its toes pitched down by a further angle (rad) on the way, about the toes; up about the heel."""
+    """The path with its toes pitched by a further angle (rad) on the way: down about the toes, up about the heel."""
     if abs(pitch) < 1e-3:
         return path
     reach = task.half_size[0]
@@ -113,22 +110,22 @@ def _pitched(task: SwingTask, path: SwingPath, pitch: float) -> SwingPath:
 
 
 def _within_ankle_range(task: SwingTask, path: SwingPath) -> SwingPath:
-    """The path with as much more pitch as the ankle needs; twice, since the pitch raises the foot."""
+    """The path with the further pitch that the ankle needs."""
     if task.leg is None:
         return path
-    for _ in range(2):
+    for _ in range(2):  # twice, since the pitch raises the foot
         wanted = path.pitch + task.leg.extra_pitch(path, ANKLE_MARGIN)
         path = _pitched(task, path, float(np.clip(wanted, -MAX_PITCH, MAX_PITCH)) - path.pitch)
     return path
 
 
 def _pitch(task: SwingTask) -> float:
-    """How far (rad) the toes go down on the way: more, the farther the foot trails the standing one."""
+    """Angle (rad) by which the toes go down on the way; it grows with how far the foot trails the standing one."""
     if task.other is None:
         return 0.0
     trail = (task.other[0].position - task.start.position) @ task.start.rotation[:, 0]
     ahead = (task.end.position - task.start.position) @ task.start.rotation[:, 0]
-    # Fast swings leave the ankle no time for more than its range demands.
+    # In fast swings the ankle has only time for the pitch that its range demands.
     speed = float(np.linalg.norm(task.end.position - task.start.position)) / task.duration
     gain = PITCH_GAIN * (1.0 - _haste(speed))
     return float(np.clip(gain * (min(trail, ahead) - PITCH_FROM), 0.0, MAX_PITCH))
@@ -144,30 +141,30 @@ def _outward(task: SwingTask) -> np.ndarray:
 
 
 def _haste(speed: float) -> float:
-    """0 for slow swings, 1 for fast ones."""
+    """Number from 0 for slow swings to 1 for fast ones, of a mean speed in m/s."""
     return min(max((speed - SLOW) / (FAST - SLOW), 0.0), 1.0)
 
 
 def _hastened(speed: float, slow: Window, fast: Window) -> Window:
-    """Window between those of slow and of fast swings."""
+    """Window between those of slow and of fast swings, for a mean speed in m/s."""
     share = _haste(speed)
     return Window(slow.start + share * (fast.start - slow.start), slow.end + share * (fast.end - slow.end))
 
 
-def _free_sides(task: SwingTask, collide: Collide, config: SwingConfig) -> tuple[float, float]:
+def _free_sides(task: SwingTask, collide: Collide) -> tuple[float, float]:
     """How much (m) the patch can be padded sideways where it starts and where it ends, at most the margin."""
     shares = np.array([1.0, 0.75, 0.5, 0.25])
     sides = []
     for pose, free in ((task.start, task.free_start), (task.end, task.free_end)):
         if free:
-            sides.append(config.margin)
+            sides.append(MARGIN)
             continue
         half = np.empty((len(shares), 3))
-        half[:, :2] = task.half_size + (shares * config.margin)[:, None]
+        half[:, :2] = task.half_size + (shares * MARGIN)[:, None]
         half[:, 2] = 0.5 * THICKNESS - SKIN
         centers = np.repeat((pose.position + (half[0, 2] + 2 * SKIN) * pose.normal)[None], len(shares), 0)
         hit = collide(centers, np.repeat(pose.rotation[None], len(shares), 0), half)
-        sides.append(float(max(shares[~hit], default=0.0)) * config.margin)
+        sides.append(float(max(shares[~hit], default=0.0)) * MARGIN)
     return sides[0], sides[1]
 
 
@@ -176,8 +173,8 @@ def _swept_boxes(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres (k, 3), rotations (k, 3, 3), half sizes (k, 3) of the patch, thickened and padded, along a path.
 
-    The padding below fades to nothing at the surfaces that the path leaves and reaches, with the patch's lowest edge;
-    the padding at the sides is what is free there, and grows with the way from there.
+    The padding below shrinks with the height of the patch's lowest edge above the surfaces at the ends. The padding at
+    the sides starts from what is free there and grows with the distance.
     """
     length = sum(np.linalg.norm(move.vector) for move in path.moves)
     count = max(SAMPLES, int(np.ceil(2.0 * length / SPACING)) + 1)  # twice as fast in the middle

@@ -1,4 +1,4 @@
-"""What a swing has to connect, and the shape that swing paths take."""
+"""The task of a swing: what its path has to connect, how far it stays away, and when its moves take place."""
 
 from __future__ import annotations
 
@@ -6,9 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.geometry.pose import Pose
-from toolkit.wholebody.swing import Window
-from toolkit.wholebody.toe_pitch import SwingingLeg
+from toolkit.geometry.heading import mean_heading
+from toolkit.geometry.pose import Pose, yaw_of
+from toolkit.physics.leg import leg_posture
+from toolkit.robot.model import LegGeometry
+from toolkit.wholebody.swing import SwingPath, Window
+
+LIFT = 0.05  # m; guarded motion along the surface normal at both ends of a swing
+MARGIN = 0.02  # m; kept free around the swept patch, where the start and the end leave that much
+GAP = 0.02  # m; kept between the soles of the swinging and the standing foot
+SAMPLES = 33  # least number of poses per swing that are checked
 
 
 @dataclass(frozen=True)
@@ -26,23 +33,39 @@ EASY = SwingTiming()
 STEEP = SwingTiming(Window(0.0, 0.3), Window(0.0, 0.4), Window(0.2, 0.8), Window(0.6, 1.0), Window(0.7, 1.0))
 
 
-SAMPLES = 33  # least number of poses per swing that are looked at
-
-
 @dataclass(frozen=True)
-class SwingConfig:
-    """Shape of swing paths.
+class SwingingLeg:
+    """The leg of a swinging foot, and where the body is during the swing.
 
     Attributes:
-        foot_lift, palm_lift: m; guarded motion along the surface normal at both ends.
-        margin: m; kept free around the swept patch, where the start and the end leave that much.
-        gap: m; kept between the soles of the swinging and the standing foot.
+        leg: Two-link geometry.
+        u: (k,) fractions of the swing.
+        com: (k, 3) m; planned CoM.
+        other_yaw: rad; heading of the standing foot.
     """
 
-    foot_lift: float = 0.05
-    palm_lift: float = 0.05
-    margin: float = 0.02
-    gap: float = 0.02
+    leg: LegGeometry
+    u: np.ndarray
+    com: np.ndarray
+    other_yaw: float
+
+    def extra_pitch(self, path: SwingPath, margin: float) -> float:
+        """Change of the path's pitch (rad, toes down positive) that brings the ankle into its range less a margin.
+
+        The pitch acts as a bump over the swing. Where the bump is small the ankle is left alone.
+        """
+        rotations = path.rotations(self.u)
+        middle = mean_heading(self.other_yaw, yaw_of(rotations))
+        ankle = leg_posture(self.leg, self.com, middle, path.positions(self.u), rotations).ankle_pitch
+        step = path.pitching.value(self.u)
+        bump = 4.0 * step * (1.0 - step)
+        inside = bump > 0.2
+        lower, upper = self.leg.ranges["ankle_pitch"]
+        if not inside.any() or upper - lower <= 2.0 * margin:
+            return 0.0
+        down = float(((lower + margin - ankle)[inside] / bump[inside]).max())
+        up = float(((ankle - upper + margin)[inside] / bump[inside]).max())
+        return down if down > 0.0 else -max(up, 0.0)
 
 
 @dataclass(frozen=True)
@@ -53,10 +76,11 @@ class SwingTask:
         begin, duration: s.
         start, end: world_from_contact at both ends.
         half_size: (2,) m; half extents of the patch.
-        is_foot: feet are raised along z, palms away from the wall.
-        free_start, free_end: the palm comes from, or goes to, the arm's free posture: no surface there.
-        other: the standing sole as (pose, half size); None for palms.
-        leg: of a foot, to keep the ankle in its range; None where the motion of the body is not known.
+        is_foot: Whether a foot swings: feet are raised along z, palms away from the wall.
+        free_start, free_end: Whether the palm comes from, or goes to, the arm's free posture, where no surface is.
+        other: The standing sole as (pose, half size); None for palms.
+        leg: Keeps the ankle of a foot in its range; None for palms and where no other foot stands.
+        lift: m; guarded motion along the surface normal at both ends.
     """
 
     begin: float
@@ -69,3 +93,4 @@ class SwingTask:
     free_end: bool = False
     other: tuple[Pose, np.ndarray] | None = None
     leg: SwingingLeg | None = None
+    lift: float = LIFT

@@ -1,4 +1,4 @@
-"""WholeBodyTrajectory: joint trajectories with what the controller needs beside them."""
+"""Joint trajectories, and what the controller needs with them."""
 
 from __future__ import annotations
 
@@ -11,23 +11,21 @@ from toolkit.contacts.failure import Failure
 
 @dataclass(frozen=True)
 class WholeBodyTrajectory:
-    """A whole-body motion on a uniform time grid of T samples, MuJoCo conventions (robot compiled alone).
+    """A whole-body motion on a uniform time grid of T samples, in MuJoCo's conventions (robot compiled alone).
 
     Attributes:
         times: (T,) s.
         qpos: (T, 7 + n); base position, base quaternion wxyz, joints.
         qvel: (T, 6 + n); base linear velocity in the world, base angular velocity in the body, joint velocities.
         torque: (T, n) N m; inverse dynamics with the planned wrenches.
-        limb_pose: (T, 4, 7); planned pose of each limb's patch, position and quaternion wxyz (contact frame; palms that
-            the robot has not: NaN).
+        limb_pose: (T, 4, 7); planned position (m) and quaternion wxyz of each limb's patch; NaN for free palms.
         limb_velocity: (T, 4, 6); planned velocity of each limb's patch, linear then angular, in the world.
         in_contact: (T, 4) bool; planned contact.
-        max_position_error: m, over CoM and contacts, recomputed with MuJoCo.
-        max_orientation_error: rad, over contacts.
-        limits_respected: joint position, velocity and torque limits hold everywhere.
-        seconds: wall-clock.
-        failure: All checks that did not pass, in words, with time and place of the first; None where all passed, a
-            check for unplanned collisions among them.
+        max_position_error: m; over CoM and contacts, recomputed with MuJoCo.
+        max_orientation_error: rad; over contacts.
+        limits_respected: Whether joint positions, velocities and torques are within their limits everywhere.
+        seconds: s; wall-clock time of the stage.
+        failure: All checks that did not pass, with time and place of the first; None where all passed.
     """
 
     times: np.ndarray

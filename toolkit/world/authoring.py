@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-THICKNESS = 0.04  # m; of generated tiles and platforms: too thin for their edges to count as surfaces for palms
+THICKNESS = 0.04  # m; generated tiles and platforms are too thin for their edges to count as surfaces for palms
 
 _HEAD = """<mujoco model="{model}">
   <!-- {comment} -->
@@ -40,8 +40,8 @@ height="256"/>
     <light pos="{light}" dir="0.3 0.2 -1" directional="true" diffuse="0.55 0.55 0.55"/>
 """
 
-_TAIL = """    <site name="start" pos="{start}" euler="0 0 {heading}" size="0.02" rgba="0.2 0.7 0.3 1"/>
-    <site name="goal" type="cylinder" pos="{goal}" size="{radius} 0.005" rgba="0.95 0.65 0.1 0.5"/>
+_TAIL = """    <site name="start" pos="{start}" euler="0 0 0" size="0.02" rgba="0.2 0.7 0.3 1"/>
+    <site name="goal" type="cylinder" pos="{goal}" size="0.2 0.005" rgba="0.95 0.65 0.1 0.5"/>
   </worldbody>
 </mujoco>
 """
@@ -58,15 +58,12 @@ class WorldText:
     """A world being written.
 
     Attributes:
-        model: name in the file.
-        comment: what the world is, for whoever opens the file.
-        friction: sliding coefficient of all geoms.
-        timing: s; shift and swing.
-        goal: (3,) m.
-        start: (3,) m.
-        heading: deg; yaw of the start.
-        radius: m; of the goal.
-        abyss: m; height of a floor that is only drawn; None for none.
+        model: Name of the model in the file.
+        comment: What the world is, for a reader of the file.
+        friction: Sliding coefficient of all geoms.
+        timing: Times of shift and swing, s.
+        goal, start: Positions (3,) of the two sites, m.
+        abyss: Height of a floor that is only drawn, m; None for no such floor.
     """
 
     model: str
@@ -75,8 +72,6 @@ class WorldText:
     timing: tuple[float, float]
     goal: tuple[float, float, float]
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    heading: float = 0.0
-    radius: float = 0.2
     abyss: float | None = -1.0
     _lines: list[str] = field(default_factory=list, repr=False)
     _assets: list[str] = field(default_factory=list, repr=False)
@@ -93,7 +88,7 @@ class WorldText:
         )
 
     def tile(self, name: str, size, top, *, material: str = "stone", rotation: Rotation | None = None) -> None:
-        """Add a thin box by the extents (2,) m and the centre (3,) m of its top; `rotation` turns about that."""
+        """Add a thin box by the extents (2,) m and the centre (3,) m of its top; `rotation` is about that centre."""
         turn = rotation or Rotation.identity()
         centre = np.asarray(top, float) - turn.as_matrix()[:, 2] * THICKNESS / 2
         self.box(name, (*size, THICKNESS), centre, material=material, rotation=rotation)
@@ -122,14 +117,7 @@ class WorldText:
             timing=numbers(self.timing),
             friction=numbers([self.friction]),
         )
-        lines = list(self._lines)
         if self.abyss is not None:
-            lines.insert(
-                0,
-                f'    <geom class="visual" type="plane" size="0 0 1" pos="0 0 {numbers([self.abyss])}" '
-                'material="abyss"/>\n',
-            )
-        tail = _TAIL.format(
-            start=numbers(start), heading=numbers([self.heading]), goal=numbers(goal), radius=numbers([self.radius])
-        )
-        return head + "".join(lines) + tail
+            pos = f"0 0 {numbers([self.abyss])}"
+            head += f'    <geom class="visual" type="plane" size="0 0 1" pos="{pos}" material="abyss"/>\n'
+        return head + "".join(self._lines) + _TAIL.format(start=numbers(start), goal=numbers(goal))

@@ -1,4 +1,4 @@
-"""Where the world leaves room: boxes against it."""
+"""Collision tests of boxes against a world."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 
 from toolkit.world.world import World
 
-_FAR = (0.0, 0.0, 1e4)  # m; where unused boxes wait
+_FAR = (0.0, 0.0, 1e4)  # m; unused boxes are put there
 
 
 class BoxCollider:
@@ -18,12 +18,7 @@ class BoxCollider:
     """
 
     def __init__(self, world: World, *, batch: int = 32):
-        """Build the model.
-
-        Args:
-            world: the world.
-            batch: boxes tested in one go.
-        """
+        """Build the model for a world; `batch` boxes are tested at once."""
         self._batch = batch
         self._model = free_boxes(world.mujoco_model, batch).compile()
         self._data = mujoco.MjData(self._model)
@@ -34,8 +29,8 @@ class BoxCollider:
         """Whether boxes penetrate the world.
 
         Args:
-            poses: (n, 4, 4) float; world_from_box matrices, origin at the centre of the box, m.
-            half_sizes: (3,) or (n, 3) float, m; half extents along the axes of the box.
+            poses: World_from_box matrices (n, 4, 4) float, m; the origin is the centre of the box.
+            half_sizes: Half extents (3,) or (n, 3) float along the axes of the box, m.
 
         Returns:
             (n,) bool.
@@ -55,7 +50,7 @@ class BoxCollider:
             data.geom_xpos[boxes] = _FAR
             data.geom_xpos[self._first : self._first + count] = pose[:, :3, 3]
             data.geom_xmat[self._first : self._first + count] = pose[:, :3, :3].reshape(-1, 9)
-            # Kinematics is skipped: the boxes' frames are written where it would put them.
+            # The frames that kinematics would compute are written directly.
             bodies = model.geom_bodyid[boxes]
             data.xpos[bodies] = data.xipos[bodies] = data.geom_xpos[boxes]
             data.xmat[bodies] = data.ximat[bodies] = data.geom_xmat[boxes]

@@ -23,16 +23,10 @@ def is_convex(points: np.ndarray, tolerance: float = _FLAT) -> bool:
 
 
 def convex_partition(region: Polygon) -> list[np.ndarray]:
-    """Disjoint convex polygons whose union is the region.
+    """Disjoint convex polygons, as counterclockwise rings (k, 2) float, whose union is a region with or without holes.
 
-    A constrained Delaunay triangulation whose inner edges are removed, longest first, while both sides stay convex
-    (Hertel and Mehlhorn 1983): at most four times the least number of pieces.
-
-    Args:
-        region: polygon, holes allowed.
-
-    Returns:
-        (k, 2) float rings, counterclockwise.
+    Inner edges of a constrained Delaunay triangulation are removed, longest first, as long as the merged piece is
+    convex (Hertel and Mehlhorn 1983). This gives at most four times the least number of pieces.
     """
     if not region.interiors and is_convex(ring_points(region)):
         return [ring_points(region)]
@@ -62,8 +56,7 @@ def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int] | 
     """The ring of two rings without their common edge a-b; None if they share more than that edge."""
     i, j = first.index(b), second.index(a)
     left = first[i:] + first[:i]  # b ... a
-    right = second[j:] + second[:j]  # a ... b
-    ring = left + right[1:-1]
+    ring = left + (second[j:] + second[:j])[1:-1]  # the second ring runs from a to b
     return ring if len(set(ring)) == len(ring) else None
 
 

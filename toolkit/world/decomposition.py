@@ -1,4 +1,4 @@
-"""A mesh that is not convex as convex solids whose faces are the mesh's own facets."""
+"""Split a mesh that is not convex into convex solids whose faces are the mesh's own facets."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from shapely.geometry import Polygon
 from toolkit.world.convex import convex_partition
 from toolkit.world.facets import Facet, facet_of, flat_groups
 
-FACET_ANGLE = np.radians(3.0)  # triangles of one facet: normals within this of the first triangle's
-FACET_DISTANCE = 1.5e-3  # m; and corners within this of its plane
+FACET_ANGLE = np.radians(3.0)  # triangles of one facet have normals within this angle of the first triangle's
+FACET_DISTANCE = 1.5e-3  # m; their corners are within this distance of its plane
 
 _DEPTH = 0.06  # m; thickness of a part where the mesh is thick enough
-_LEAST_DEPTH = 2e-3  # m; and where it is not
-_TAPER = 0.7  # size of a part's back relative to its front: sharp edges of the mesh stay sharp
-_LEAST_WIDTH = 2e-4  # m; narrower slivers are no parts
+_LEAST_DEPTH = 2e-3  # m; least thickness of a part
+_TAPER = 0.7  # size of a part's back relative to its front, so that sharp edges of the mesh stay sharp
+_LEAST_WIDTH = 2e-4  # m; narrower slivers are left out
 _MOST_PARTS = 4000
 
 
@@ -27,8 +27,8 @@ class Decomposition:
     """Convex solids that stand for a mesh.
 
     Attributes:
-        facets: flat facets of the mesh, in the frame of its vertices.
-        parts: (k, 3) float vertex arrays; the convex hull of each is a solid, one face of which lies on the mesh.
+        facets: Flat facets of the mesh, in the frame of its vertices.
+        parts: Vertex arrays (k, 3) float; the convex hull of each is a solid that has one face on the mesh.
     """
 
     facets: list[Facet]
@@ -38,19 +38,19 @@ class Decomposition:
 def decompose_mesh(vertices: np.ndarray, triangles: np.ndarray) -> Decomposition | None:
     """Split a mesh into convex solids, or find that it is convex.
 
-    A closed convex component becomes one solid. Of anything else each flat facet is split into convex polygons, and
-    each of these becomes a frustum that reaches into the mesh: never further than half way to the mesh's other side.
-    Open meshes are sheets: their triangles are turned so that on average they look up.
+    A closed convex component becomes one solid. Each flat facet of any other component is split into convex polygons.
+    Each of these becomes a frustum that reaches into the mesh, at most half way to the mesh's other side.
+    Open meshes are sheets: their triangles are turned so that on average they face up.
 
     Args:
-        vertices: (n, 3) float, m.
-        triangles: (k, 3) int, counterclockwise seen from outside.
+        vertices: Vertices (n, 3) float, m.
+        triangles: Triangles (k, 3) int, counterclockwise seen from outside.
 
     Returns:
-        The solids; None where the mesh is convex, so that its hull is the mesh.
+        The solids, or None if the mesh is convex and therefore equals its hull.
 
     Raises:
-        ValueError: no triangle has an area, or there would be too many solids.
+        ValueError: No triangle has an area, or there would be too many solids.
     """
     mesh = trimesh.Trimesh(vertices, triangles, process=True)
     components = _components(mesh)
@@ -80,9 +80,8 @@ def _least_parts(mesh: trimesh.Trimesh, groups: list[np.ndarray]) -> int:
     """How many groups of triangles have one that is wide enough to become a part."""
     edges = np.linalg.norm(mesh.triangles - np.roll(mesh.triangles, 1, axis=1), axis=2)
     wide = 2 * mesh.area_faces > np.maximum(_LEAST_WIDTH * edges.sum(axis=1), 2e-8)
-    return len(
-        np.unique(np.repeat(np.arange(len(groups)), [len(group) for group in groups])[wide[np.concatenate(groups)]])
-    )
+    owner = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
+    return len(np.unique(owner[wide[np.concatenate(groups)]]))
 
 
 def _check_count(parts: int) -> None:
@@ -118,7 +117,7 @@ def _is_convex(mesh: trimesh.Trimesh) -> bool:
 
 
 def _fronts(facets: list[Facet]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Convex pieces of facets as (corners (k, 3), normal (3,)); slivers, which touch nothing, are left out."""
+    """Convex pieces of facets as (corners (k, 3), normal (3,)); slivers are left out because they touch nothing."""
     fronts = []
     for facet in facets:
         shape = shapely.remove_repeated_points(facet.polygon, 1e-6)
@@ -145,7 +144,7 @@ def _frusta(mesh: trimesh.Trimesh, fronts: list[tuple[np.ndarray, np.ndarray]]) 
 def _thickness(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Distance (n,) from points on a mesh to the next triangle behind them; inf where none is near.
 
-    Rays against triangles (Moeller and Trumbore 1997), those whose boxes meet.
+    Each ray is tested against the triangles whose boxes meet its box (Moeller and Trumbore 1997).
     """
     ends = points - 2.1 * _DEPTH * normals
     low, high = (pick(mesh.triangles, axis=1)[:, :2] for pick in (np.min, np.max))

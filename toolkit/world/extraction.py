@@ -1,4 +1,4 @@
-"""Contact surfaces of a world: merge flush faces, cut away what is covered, split the rest into convex pieces."""
+"""Contact surfaces of a world: merge flush faces, cut covered parts away, and split the rest into convex pieces."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from toolkit.world.solids import Solids
 from toolkit.world.source import Source
 from toolkit.world.surface import Surface
 
-_BATCH = 64  # faces that are looked at together
-_LARGEST = 12  # shadows that are tried one after the other
-_MANY = 50  # faces that are joined at once; fewer one after the other
+_BATCH = 64  # faces that are processed together
+_LARGEST = 12  # shadows that are subtracted one after the other
+_MANY = 50  # from this many faces on, a group is joined at once; smaller groups are joined face by face
 
 
 @dataclass(frozen=True)
@@ -28,16 +28,16 @@ class SurfaceConfig:
     """What counts as a contact surface.
 
     Attributes:
-        foot_angle: rad; a surface serves feet up to this angle between its normal and up.
-        palm_angle_min, palm_angle_max: rad; a surface serves palms between these.
-        clearance: m; room needed above a surface, along its normal.
-        flush: m; geometry up to this height above a surface does not cover it, and faces of equal friction whose
+        foot_angle: Largest angle between up and the normal of a surface for feet, rad.
+        palm_angle_min, palm_angle_max: Range of that angle for palms, rad.
+        clearance: Room needed above a surface along its normal, m.
+        flush: Geometry up to this height above a surface does not cover it, m. Faces of equal friction whose
             planes differ by less and that are no further apart are one surface.
-        flush_angle: rad; faces that are merged have normals within this.
-        foot_area, palm_area: m^2; smaller regions are dropped.
-        foot_width, palm_width: m; regions in which no circle of this diameter fits are dropped.
-        simplify: m; what covers a surface is widened by this, and its corners that stand out less are left out.
-        plane_margin: m; infinite planes end this far beyond start and goal.
+        flush_angle: Largest angle between the normals of merged faces, rad.
+        foot_area, palm_area: Smaller regions are dropped, m^2.
+        foot_width, palm_width: Regions in which no circle of this diameter fits are dropped, m.
+        simplify: Covering shapes are widened by this, and corners that stand out less are left out, m.
+        plane_margin: Infinite planes end this far beyond start and goal, m.
     """
 
     foot_angle: float = np.radians(45.0)
@@ -61,17 +61,14 @@ def extract_surfaces(
     config: SurfaceConfig,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[Surface, ...]:
-    """Contact surfaces of a world.
+    """Surfaces of a world that serve feet or palms, in the order of the geoms.
 
     Args:
-        source: the world's scene.
-        solids: its colliding geometry (`solids_of`).
-        square: (xmin, ymin, xmax, ymax), m; infinite planes are cut to it.
-        config: what counts as a surface.
-        progress: told how much is done, in [0, 1].
-
-    Returns:
-        Surfaces that serve feet or palms, in the order of the geoms.
+        source: The world's scene.
+        solids: The colliding geometry of the scene (`solids_of`).
+        square: Infinite planes are cut to this (xmin, ymin, xmax, ymax), m.
+        config: What counts as a surface.
+        progress: Called with the share that is done, in [0, 1].
     """
     least = min(config.foot_area, config.palm_area) / 3  # flush faces of several geoms may be large enough together
     faces = faces_of(source, square=square, least_area=least)
@@ -106,7 +103,7 @@ def extract_surfaces(
 
 
 def _serves(faces: list[Face], config: SurfaceConfig) -> np.ndarray:
-    """(n, 2) bool; whether faces serve feet, palms, by the angle of their normals."""
+    """Whether faces serve feet and palms, by the angle of their normals, (n, 2) bool."""
     normals = np.array([face.frame.normal for face in faces]).reshape(-1, 3)
     angle = np.arccos(np.clip(normals[:, 2], -1.0, 1.0))
     slack = 1e-6  # a wall of exactly the limit counts
@@ -115,10 +112,10 @@ def _serves(faces: list[Face], config: SurfaceConfig) -> np.ndarray:
 
 
 def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
-    """Faces with the flush ones of different geoms and equal friction joined.
+    """The faces, with flush faces of different geoms and equal friction joined.
 
-    As with facets, what is joined is measured against the largest face of the group: a chain of slightly raised
-    tiles does not become one surface.
+    Every face is compared with the largest face of its group, so that a chain of slightly raised tiles does not become
+    one surface.
     """
     if len({face.geom for face in faces}) < 2:
         return faces
@@ -149,14 +146,11 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
                 shapes[other] = _in_frame(faces[other], frame)
             return shapely.dwithin(shapes[here], shapes[other], config.flush)
 
-        def neighbours(here: int) -> list[int]:
-            around = graph.indices[graph.indptr[here] : graph.indptr[here + 1]]
-            return [int(other) for other in np.sort(around) if not used[other]]
-
         members, waiting = [seed], [seed]
         while waiting:
             here = waiting.pop(0)
-            for other in neighbours(here):
+            around = graph.indices[graph.indptr[here] : graph.indptr[here + 1]]
+            for other in [int(other) for other in np.sort(around) if not used[other]]:
                 if (geoms[other] != geoms[seed] or len(members) > 1) and joins(here, other):
                     used[other] = True
                     members.append(other)
@@ -172,7 +166,7 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
 def _near_pairs(
     faces: list[Face], normals: np.ndarray, outlines: list[np.ndarray], config: SurfaceConfig
 ) -> np.ndarray:
-    """(2, k) pairs of faces, both ways round, of equal friction whose boxes touch and that may lie in one plane."""
+    """Ordered pairs (2, k) of faces with equal friction and touching boxes that may lie in one plane."""
     low = np.array([points.min(axis=0) for points in outlines]) - config.flush
     high = np.array([points.max(axis=0) for points in outlines]) + config.flush
     friction = np.array([face.friction for face in faces])
@@ -197,16 +191,16 @@ def _in_frame(face: Face, frame: Pose) -> Polygon:
 
 
 def _sealed(shapes: list[Polygon], gap: float) -> Polygon:
-    """Union of shapes, seams up to `gap` wide closed."""
+    """Union of shapes in which seams up to `gap` m wide are closed."""
     union = shapely.union_all(shapes)
     if isinstance(union, Polygon) and not union.interiors:
         return union
-    closed = shapely.union_all(shapes).buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
+    closed = union.buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
     return closed if isinstance(closed, Polygon) else max(shapely.get_parts(closed), key=lambda part: part.area)
 
 
 def _open_regions(faces: list[Face], solids: Solids, config: SurfaceConfig) -> list[Face]:
-    """Connected regions of faces that nothing covers; holes are kept."""
+    """Connected regions of faces that nothing covers; they may have holes."""
     regions = shapely.simplify([face.polygon for face in faces], 1e-6)
     shapely.prepare(regions)
     frames = [face.frame for face in faces]
@@ -222,7 +216,7 @@ def _open_regions(faces: list[Face], solids: Solids, config: SurfaceConfig) -> l
     owner, shadows = owner[covers], shadows[covers]
     covered = np.unique(owner)
     if len(covered):
-        # Widened by what the outline may move when it is simplified: the result stays free.
+        # The covers are widened by the distance that simplifying may move the outline, so that the result stays free.
         unions = [shapely.union_all(group) for group in np.split(shadows, np.searchsorted(owner, covered[1:]))]
         covers = shapely.buffer(unions, config.simplify, join_style="mitre", quad_segs=16)
         regions[covered] = shapely.simplify(shapely.difference(regions[covered], covers), config.simplify)
@@ -238,10 +232,10 @@ def _open_regions(faces: list[Face], solids: Solids, config: SurfaceConfig) -> l
 def _without_largest(
     regions: np.ndarray, owner: np.ndarray, shadows: np.ndarray, least: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What the largest shadows of each region leave of it, and (k,) bool which these are.
+    """The rest of each region without its largest shadows, and which shadows these are, (k,) bool.
 
-    It tells most buried faces, and which of many shadows matter, without a union of all. A region of which less than
-    `least` m^2 is left is not looked at further.
+    This finds most buried faces, and the shadows that matter, without a union of all shadows. A region is finished
+    once less than `least` m^2 of it is left.
     """
     rest = regions.copy()
     order = np.lexsort((-shapely.area(shadows), owner))
@@ -255,13 +249,13 @@ def _without_largest(
 
 
 def _hold_contacts(faces: list[Face], config: SurfaceConfig) -> np.ndarray:
-    """(n,) bool; whether faces are large and wide enough for what they serve."""
+    """Whether faces are large and wide enough for the limbs that they serve, (n,) bool."""
     serves = _serves(faces, config)
     area = np.where(serves, [config.foot_area, config.palm_area], np.inf).min(axis=1)
     width = np.where(serves, [config.foot_width, config.palm_width], np.inf).min(axis=1)
     regions = np.array([face.polygon for face in faces], object)
     result: np.ndarray = np.greater_equal(shapely.area(regions), area)
-    # A little less than the width, and mitred: a rectangle of exactly that width must not be lost to rounding.
+    # The width is slightly reduced and mitred, so that rounding does not drop a rectangle of exactly that width.
     inner = shapely.buffer(regions[result], 1e-6 - width[result] / 2, join_style="mitre")
     result[result] = ~shapely.is_empty(inner)
     return result

@@ -1,4 +1,4 @@
-"""Planar faces of the world's geoms, before anything is cut away."""
+"""Planar faces of the world's geoms, before covered parts are cut away."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from toolkit.world.facets import find_facets
 from toolkit.world.solids import height_field_triangles, plane_rectangle
 from toolkit.world.source import Source, mesh_of_geom
 
-_CAP_SIDES = 64  # corners, on the circle, of a cylinder's cap
+_CAP_SIDES = 64  # corners of a cylinder's cap; they lie on the circle
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,10 @@ class Face:
     """A flat face of a geom.
 
     Attributes:
-        geom: label of the authored geom.
-        friction: sliding coefficient.
-        frame: world_from_face; z is the outward normal.
-        polygon: outline in the frame's xy, m; may have holes.
+        geom: Label of the authored geom.
+        friction: Sliding coefficient.
+        frame: World_from_face pose; z is the outward normal.
+        polygon: Outline in the frame's xy, m; it may have holes.
     """
 
     geom: str
@@ -37,16 +37,10 @@ class Face:
 
 
 def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) -> list[Face]:
-    """All flat faces of the colliding geoms of a world.
+    """All flat faces of the colliding geoms of a world, in the order of the geoms.
 
-    Args:
-        source: the world's scene.
-        square: (xmin, ymin, xmax, ymax), m; infinite planes are cut to it.
-        least_area: m^2; smaller faces are left out.
-
-    Returns:
-        Faces in the order of the geoms. Spheres, capsules, ellipsoids and the sides of cylinders and of height fields
-        have none.
+    Spheres, capsules, ellipsoids and the sides of cylinders and of height fields have none. Infinite planes are cut to
+    a square (xmin, ymin, xmax, ymax) in m; faces smaller than `least_area` m^2 are left out.
     """
     model = source.model
     data = mujoco.MjData(model)
@@ -55,7 +49,7 @@ def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) ->
     for index in np.flatnonzero((model.geom_contype | model.geom_conaffinity) != 0).tolist():
         label, friction = source.owner[index], float(model.geom_friction[index, 0])
         pose = Pose(data.geom_xmat[index].reshape(3, 3).copy(), data.geom_xpos[index].copy())
-        if label in source.facets:  # a mesh made of parts: its own facets, once
+        if label in source.facets:  # the facets of a mesh that consists of parts are added once
             found = [(facet.frame, facet.polygon) for facet in source.facets[label]] if label not in done else []
             done.add(label)
         else:
@@ -73,7 +67,7 @@ def _local_faces(
     types, size = mujoco.mjtGeom, model.geom_size[index]
     kind = model.geom_type[index]
     if kind == types.mjGEOM_PLANE:
-        rectangle = plane_rectangle(model, index, pose, square)
+        rectangle = plane_rectangle(pose, square)
         drawn = np.where(size[:2] > 0, size[:2], np.inf)
         low, high = np.maximum(rectangle.min(axis=0), -drawn), np.minimum(rectangle.max(axis=0), drawn)
         return [(pose, shapely.box(*low, *high))] if (high > low).all() else []
@@ -109,9 +103,3 @@ def _box_turns() -> list[np.ndarray]:
 
 
 _BOX_TURNS = _box_turns()
-
-
-def square_around(points: np.ndarray, margin: float) -> tuple[float, float, float, float]:
-    """(xmin, ymin, xmax, ymax) of points (n, 2 or 3) with a margin in m on every side."""
-    low, high = points[:, :2].min(axis=0) - margin, points[:, :2].max(axis=0) + margin
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])

@@ -12,7 +12,7 @@ from shapely.geometry import Polygon
 from toolkit.compiled import compiled
 from toolkit.geometry.pose import Pose
 
-_MANY = 100  # triangles that are merged along edges; of fewer the general union is as quick, and overlaps do not matter
+_MANY = 100  # more triangles are merged along edges; for fewer the general union is as quick and allows overlaps
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class Facet:
     """Connected coplanar triangles.
 
     Attributes:
-        frame: frame of the plane (any_from_facet); z is the outward normal, the origin lies in the facet.
-        polygon: outline in the frame's xy, m; may have holes.
-        triangles: (k,) int; indices of its triangles in the mesh.
+        frame: Frame of the plane (any_from_facet); z is the outward normal and the origin lies in the facet.
+        polygon: Outline in the frame's xy, m; it may have holes.
+        triangles: Indices of its triangles in the mesh, (k,) int.
     """
 
     frame: Pose
@@ -30,16 +30,8 @@ class Facet:
     triangles: np.ndarray
 
 
-def plane_frame(origin: np.ndarray, normal: np.ndarray) -> Pose:
-    """A frame with z along a normal and x along the world's x axis projected on the plane (y where that is short).
-
-    Args:
-        origin: (3,) float, m; a point of the plane.
-        normal: (3,) float unit normal.
-
-    Returns:
-        World-from-plane pose.
-    """
+def _plane_frame(origin: np.ndarray, normal: np.ndarray) -> Pose:
+    """Frame with z along a unit normal (3,) and x along the projected x axis of the world (y if that is short)."""
     axis = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     x = axis - (axis @ normal) * normal
     x = x / np.linalg.norm(x)
@@ -47,26 +39,18 @@ def plane_frame(origin: np.ndarray, normal: np.ndarray) -> Pose:
 
 
 def find_facets(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_area: float = 0.0) -> list[Facet]:
-    """Split a mesh into its flat facets.
+    """Flat facets of a mesh with merged vertices, ordered by the area of their first triangle, largest first.
 
-    Each facet grows from its largest triangle over shared edges. A triangle joins if its normal is within `angle` of
-    the FIRST triangle's and its corners are within `distance` of the first triangle's plane, so that a smoothly curved
-    mesh cannot drift into one facet. The facet's plane is the area-weighted mean of its triangles.
-
-    Args:
-        mesh: vertices merged; degenerate triangles are left out.
-        angle: rad.
-        distance: m.
-        least_area: m^2; smaller facets are left out.
-
-    Returns:
-        Facets, ordered by their first triangle's area, largest first.
+    Each facet grows from its largest triangle over shared edges. A triangle joins if its normal is within `angle` rad
+    of the FIRST triangle's and its corners are within `distance` m of the first triangle's plane, so that a smoothly
+    curved mesh does not become one facet. The facet's plane is the area-weighted mean of its triangles. Degenerate
+    triangles and facets smaller than `least_area` m^2 are left out.
     """
     return [facet_of(mesh, group) for group in flat_groups(mesh, angle=angle, distance=distance, least_area=least_area)]
 
 
 def flat_groups(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_area: float = 0.0) -> list[np.ndarray]:
-    """Triangles (k,) of each of a mesh's flat facets, in the order in which it grew; see `find_facets`."""
+    """Triangles (k,) of each flat facet of a mesh, in the order in which they joined; see `find_facets`."""
     area = mesh.area_faces
     pairs = mesh.face_adjacency
     ends = pairs.ravel()
@@ -90,7 +74,7 @@ def flat_groups(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_a
 
 @compiled(kept=True)
 def _grow(seeds, free, first, neighbours, normals, corners, cosine, distance, members, last):
-    """Fill `members` with triangles, group after group, and `last` with where each group ends; returns their number."""
+    """Fill `members` with triangles, group by group, and `last` with the end of each group; return their number."""
     count, end = 0, 0
     stack = np.empty(len(seeds), np.int64)
     for seed in seeds:
@@ -130,17 +114,17 @@ def facet_of(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
     corners, area = mesh.triangles[group], mesh.area_faces[group]
     weight = area / area.sum()
     normal = weight @ mesh.face_normals[group]
-    frame = plane_frame(weight @ corners.mean(axis=1), normal / np.linalg.norm(normal))
+    frame = _plane_frame(weight @ corners.mean(axis=1), normal / np.linalg.norm(normal))
     flat = frame.inverse() @ corners
     shape = _union(flat[..., :2]) if len(flat) > 1 else Polygon(flat[0, :, :2])
-    if not isinstance(shape, Polygon):  # corners that only touch in a point: keep one piece, the largest
+    if not isinstance(shape, Polygon):  # of pieces that only touch in a point, the largest is kept
         parts = [part for part in shapely.get_parts(shapely.make_valid(shape)) if isinstance(part, Polygon)]
         shape = max(parts, key=lambda part: part.area, default=Polygon())
     return Facet(frame, shape, np.sort(group))
 
 
 def _union(triangles: np.ndarray) -> shapely.Geometry:
-    """Union of triangles (k, 3, 2) that share edges and do not overlap; many are merged along their edges."""
+    """Union of triangles (k, 3, 2); many triangles are merged along their edges if they do not overlap."""
     shapes = shapely.polygons(triangles)
     if len(triangles) > _MANY:
         merged = shapely.coverage_union_all(shapes)

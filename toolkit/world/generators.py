@@ -1,7 +1,7 @@
 """Seeded generators of terrain: each returns a world as MJCF text.
 
-The four of the paper keep its figures: tiles of 0.4 m whose roll and pitch are drawn independently, so that a tile's
-whole tilt can exceed both.
+The numbers are those of the paper: tiles of 0.4 m whose roll and pitch are drawn independently, so that the whole
+tilt of a tile can exceed both.
 """
 
 from __future__ import annotations
@@ -28,21 +28,18 @@ def rubble_field(
     shift: float = 0.6,
     swing: float = 0.8,
 ) -> str:
-    """Tilted tiles between two platforms; the goal is 3.42 m away with the default four rows.
+    """Tilted tiles between two platforms; the goal is 3.42 m from the start if there are four rows.
 
     Args:
-        rng: source of the tilts and heights.
-        rows: tiles along x.
-        columns: tiles along y.
-        tile: m; edge of a tile.
-        tilt: deg; roll and pitch lie within this, independently.
-        rise: m; heights lie within this.
-        friction: sliding coefficient.
-        shift: s.
-        swing: s.
-
-    Returns:
-        MJCF text with rows * columns + 2 surfaces for feet.
+        rng: Source of the tilts and heights.
+        rows: Tiles along x.
+        columns: Tiles along y.
+        tile: Edge of a tile, m.
+        tilt: Largest roll and largest pitch, drawn independently, deg.
+        rise: Largest height above or below the mean, m.
+        friction: Sliding coefficient.
+        shift: Time of a shift, s.
+        swing: Time of a swing, s.
     """
     begin = 0.85
     end = begin + rows * tile
@@ -72,19 +69,19 @@ def rubble_corridor(
     shift: float = 0.6,
     swing: float = 0.8,
 ) -> str:
-    """Tilted tiles of 0.4 x 0.3 m between walls of tilted panels of 0.4 m, one every 0.5 m along and up to z = 1.5.
+    """Tilted tiles of 0.4 x 0.3 m between walls up to z = 1.5 m; a wall has tilted panels of 0.4 m every 0.5 m.
 
     Args:
-        rng: source of the tilts and heights.
-        rows: tiles along x.
-        columns: tiles along y.
-        tilt: deg; roll and pitch of a tile lie within this.
-        rise: m; heights of tiles lie within this.
-        wall: m; |y| of the panels' centres.
-        wall_tilt: deg; a panel is turned about x and about z within this.
-        friction: sliding coefficient.
-        shift: s.
-        swing: s.
+        rng: Source of the tilts and heights.
+        rows: Tiles along x.
+        columns: Tiles along y.
+        tilt: Largest roll and largest pitch of a tile, deg.
+        rise: Largest height of a tile above or below the mean, m.
+        wall: Distance of the panels' centres from the middle, m.
+        wall_tilt: Largest turn of a panel about x and about z, deg.
+        friction: Sliding coefficient.
+        shift: Time of a shift, s.
+        swing: Time of a swing, s.
     """
     begin, (length, width) = 0.6, (0.4, 0.3)
     end = begin + rows * length
@@ -126,16 +123,16 @@ def stepping_stones(
     """Stones with gaps between them, each tilted about a random level axis.
 
     Args:
-        rng: source of the tilts and heights.
-        rows: stones along x.
-        columns: stones along y.
-        stone: m; edge of a stone.
-        gap: m; between stones.
-        tilt: deg; a stone's whole tilt lies within this.
-        rise: m; heights lie within this.
-        friction: sliding coefficient.
-        shift: s.
-        swing: s.
+        rng: Source of the tilts and heights.
+        rows: Stones along x.
+        columns: Stones along y.
+        stone: Edge of a stone, m.
+        gap: Distance between stones, m.
+        tilt: Largest whole tilt of a stone, deg.
+        rise: Largest height above or below the mean, m.
+        friction: Sliding coefficient.
+        shift: Time of a shift, s.
+        swing: Time of a swing, s.
     """
     begin, pitch = 0.4, stone + gap
     end = begin + gap + rows * pitch
@@ -151,11 +148,8 @@ def stepping_stones(
     for row in range(rows):
         for column in range(columns):
             bearing, angle = rng.uniform(0, 2 * np.pi), np.radians(rng.uniform(0.0, tilt))
-            centre = (
-                begin + gap + stone / 2 + row * pitch,
-                (column - (columns - 1) / 2) * pitch,
-                rng.uniform(-rise, rise),
-            )
+            x, y = begin + gap + stone / 2 + row * pitch, (column - (columns - 1) / 2) * pitch
+            centre = (x, y, rng.uniform(-rise, rise))
             turn = Rotation.from_rotvec(angle * np.array([np.cos(bearing), np.sin(bearing), 0.0]))
             world.tile(f"stone_{row}_{column}", (stone, stone), centre, rotation=turn)
     world.platform("platform_goal", (end, end + 1.0), width)
@@ -173,21 +167,19 @@ def training(
     swing: float = 1.0,
     walls: int = 1,
 ) -> str:
-    """Terrain to collect transitions on: 3 x 3 tilted tiles, the start on the middle one, and walls beside the robot.
+    """Terrain for collecting transitions with 3 x 3 tilted tiles, the start on the middle one, and walls at the sides.
+
+    A wall is 0.4 to 0.9 m from the start at a height of 1 m, up to 45 degrees before or behind the robot's side.
 
     Args:
-        rng: source of everything random.
-        tile: m; edge of a tile.
-        tilt: deg; roll and pitch of tiles, and the lean of a wall lie within this.
-        rise: m; heights lie within this.
-        friction: sliding coefficient.
-        shift: s.
-        swing: s.
-        walls: 1 for a wall on one side, 2 for one on each.
-
-    Returns:
-        MJCF text. A wall is 0.4 to 0.9 m from the start at a height of 1 m, up to 45 degrees before or behind the
-        robot's side.
+        rng: Source of everything random.
+        tile: Edge of a tile, m.
+        tilt: Largest roll and pitch of a tile and largest lean of a wall, deg.
+        rise: Largest height above or below the mean, m.
+        friction: Sliding coefficient.
+        shift: Time of a shift, s.
+        swing: Time of a swing, s.
+        walls: Number of walls; 1 for one side, 2 for both sides.
     """
     world = WorldText(
         "training", "3 x 3 tilted tiles and walls", friction, (shift, swing), (tile, 0.0, 0.05), start=(0.0, 0.0, 0.05)
@@ -230,9 +222,5 @@ def _tiles(
     for row in range(rows):
         for column in range(columns):
             turn = Rotation.from_euler("xy", rng.uniform(-tilt, tilt, 2), degrees=True)
-            top = (
-                begin + (row + 0.5) * size[0],
-                (column - (columns - 1) / 2) * size[1],
-                rng.uniform(-rise, rise),
-            )
-            world.tile(f"tile_{row}_{column}", size, top, rotation=turn)
+            x, y = begin + (row + 0.5) * size[0], (column - (columns - 1) / 2) * size[1]
+            world.tile(f"tile_{row}_{column}", size, (x, y, rng.uniform(-rise, rise)), rotation=turn)

@@ -12,7 +12,6 @@ from toolkit.errors import WorldError
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.world.extraction import SurfaceConfig, extract_surfaces
-from toolkit.world.faces import square_around
 from toolkit.world.solids import solids_of
 from toolkit.world.source import read_source
 from toolkit.world.surface import Surface
@@ -20,7 +19,7 @@ from toolkit.world.timing import Timing
 from toolkit.world.world import PALM_SITE_REACH, PALM_SITES, Goal, World
 
 _DEFAULT = SurfaceConfig()
-_ABOVE_START, _BELOW_START = 0.15, 0.3  # m; where the ground is looked for, relative to the start
+_ABOVE_START, _BELOW_START = 0.15, 0.3  # m; range around the height of the start in which ground is accepted
 _AROUND_START = 0.25  # m; the start may be between two stones
 
 
@@ -34,23 +33,25 @@ def load_world(
     """Load a world from its MJCF file.
 
     Args:
-        path: the file; its folder is where meshes are looked for, its name (without ending) names the world.
-        mjcf: text to use in place of the file's content (a world made in memory).
-        config: what counts as a contact surface.
-        progress: told now and then how much is done, in [0, 1].
+        path: The file. Meshes are read from its folder; its name without ending is the name of the world.
+        mjcf: Text to use in place of the file's content, for a world made in memory.
+        config: What counts as a contact surface.
+        progress: Called now and then with the share that is done, in [0, 1].
 
     Returns:
         The world with its surfaces.
 
     Raises:
-        WorldError: one line that names the file, the thing at fault and the remedy.
+        WorldError: The message is one line that names the file, the fault and the remedy.
     """
     path = Path(path)
     source = read_source(path, mjcf, lambda share: progress(0.5 * share))
     model = source.model
     start, goal, timing = _start(path, model), _goal(path, model), _timing(path, model)
     palms = _start_palms(model)
-    square = square_around(np.stack([start.position, goal.position]), config.plane_margin)
+    low = np.minimum(start.position, goal.position) - config.plane_margin
+    high = np.maximum(start.position, goal.position) + config.plane_margin
+    square = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
     solids = solids_of(model, square=square)
     surfaces = extract_surfaces(source, solids, square, config, lambda share: progress(0.5 + 0.5 * share))
     if not any(surface.serves_foot for surface in surfaces):
@@ -110,13 +111,13 @@ def _timing(path: Path, model: mujoco.MjModel) -> Timing:
 
 
 def _start_palms(model: mujoco.MjModel) -> dict[Limb, np.ndarray]:
-    """Where palms start in contact, by their sites."""
+    """Points (3,) m at which palms start in contact, by their sites."""
     sites = {limb: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name) for limb, name in PALM_SITES.items()}
     return {limb: _site_pose(model, site).position for limb, site in sites.items() if site >= 0}
 
 
 def _also_feet(palms: dict[Limb, np.ndarray]) -> str:
-    """A reminder for whoever wants to start on palms."""
+    """A reminder for a world whose robot starts on its palms."""
     return "; a robot that starts with its palms in contact needs ground for both feet too" if palms else ""
 
 

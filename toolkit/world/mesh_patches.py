@@ -8,8 +8,8 @@ import trimesh
 from toolkit.world.authoring import WorldText
 
 _CELLS = 3  # cells along the edge of a patch
-_SEAM = 0.08  # m; between patches
-_DEPTH = 0.3  # m; of the block below the terrain
+_SEAM = 0.08  # m; width of the seam between patches
+_DEPTH = 0.3  # m; depth of the block below the terrain
 
 
 def mesh_patches(
@@ -24,23 +24,20 @@ def mesh_patches(
     shift: float = 0.6,
     swing: float = 0.8,
 ) -> str:
-    """One closed mesh of about 1,000 triangles (with the default size): flat patches, each tilted about a level axis.
+    """One closed mesh of flat patches, each tilted about a level axis; the default size has about 1,000 triangles.
 
     The first and the last row of patches are level, for the start and the goal.
 
     Args:
-        rng: source of the tilts and heights.
-        rows: patches along x.
-        columns: patches along y.
-        patch: m; edge of a patch.
-        tilt: deg; a patch's whole tilt lies within this.
-        rise: m; heights lie within this.
-        friction: sliding coefficient.
-        shift: s.
-        swing: s.
-
-    Returns:
-        MJCF text, the mesh included.
+        rng: Source of the tilts and heights.
+        rows: Patches along x.
+        columns: Patches along y.
+        patch: Edge of a patch, m.
+        tilt: Largest whole tilt of a patch, deg.
+        rise: Largest height above or below the mean, m.
+        friction: Sliding coefficient.
+        shift: Time of a shift, s.
+        swing: Time of a swing, s.
     """
     pitch = patch + _SEAM
     width = columns * pitch - _SEAM
@@ -74,12 +71,8 @@ def _block(x: np.ndarray, y: np.ndarray, height: np.ndarray) -> trimesh.Trimesh:
     count = len(y)
     top = np.column_stack([np.repeat(x, count), np.tile(y, len(x)), height.ravel()])
     corner = (np.arange(len(x) - 1)[:, None] * count + np.arange(count - 1)).ravel()
-    faces = np.concatenate(
-        [
-            np.column_stack([corner, corner + count, corner + count + 1]),
-            np.column_stack([corner, corner + count + 1, corner + 1]),
-        ]
-    )
+    across = corner + count + 1
+    faces = [np.column_stack([corner, corner + count, across]), np.column_stack([corner, across, corner + 1])]
     index = np.arange(len(x) * count).reshape(len(x), count)
     # The rim, counterclockwise seen from above, and its copy on the bottom.
     rim = np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
@@ -90,4 +83,4 @@ def _block(x: np.ndarray, y: np.ndarray, height: np.ndarray) -> trimesh.Trimesh:
     sides = [np.column_stack([rim, lower, under]), np.column_stack([rim, under, following])]
     floor = np.column_stack([np.full(len(rim), centre), under, lower])
     vertices = np.concatenate([top, bottom, [[x.mean(), y.mean(), -_DEPTH]]])
-    return trimesh.Trimesh(vertices, np.concatenate([faces, *sides, floor]), process=False)
+    return trimesh.Trimesh(vertices, np.concatenate([*faces, *sides, floor]), process=False)

@@ -1,4 +1,4 @@
-"""Which of a world's simulation options count: none; those that would change physics are refused."""
+"""The simulation options of a world: none is used, and those that would change the physics are refused."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ REPLACED = frozenset(
     noslip_tolerance ccd_iterations ccd_tolerance sdf_initpoints sdf_iterations sleep_tolerance disableactuator
     """.split()
 )
-"""Options that say how to compute, or that concern actuators: every run has its own. All others are refused."""
+"""Options of the computation or of actuators, which every run replaces. All others are refused."""
 REPLACED_FLAGS = frozenset(
     "warmstart midphase eulerdamp nativeccd multiccd island sensor autoreset energy fwdinv invdiscrete sleep".split()
 )
-"""The same of the flags."""
+"""Flags that every run replaces. All others are refused."""
 
 
 def set_options(option: mujoco.MjOption) -> None:
-    """Default options but for the integrator, the cone and the gravity that every run uses."""
+    """Set the default options, with the time step, integrator, cone and gravity that every run uses."""
     copy_fields(mujoco.MjSpec().option, option)
     option.timestep = 0.002
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -37,15 +37,7 @@ def set_options(option: mujoco.MjOption) -> None:
 
 
 def check_options(path: Path, option: mujoco.MjOption) -> None:
-    """Raise for options that planner and simulation would have to know, and do not.
-
-    Args:
-        path: the world, for the message.
-        option: the world's options.
-
-    Raises:
-        WorldError: an option or a flag that changes physics is not at MuJoCo's default.
-    """
+    """Raise WorldError if an option or a flag that changes the physics of a world is not MuJoCo's default."""
     default = mujoco.MjSpec().option
     default.gravity = [0.0, 0.0, -9.81]
     for name, value in fields_of(option):
@@ -65,11 +57,11 @@ def check_options(path: Path, option: mujoco.MjOption) -> None:
 
 
 def flags_of(name: str) -> list[Any]:
-    """Members of the bits of `disableflags` or `enableflags`."""
+    """The flags of `disableflags` or of `enableflags`."""
     kind = mujoco.mjtDisableBit if name == "disableflags" else mujoco.mjtEnableBit
     return [flag for label, flag in kind.__members__.items() if not label.startswith("mjN")]
 
 
 def flag_name(flag: Any) -> str:
-    """A flag as the MJCF has it."""
+    """Name of a flag in MJCF."""
     return flag.name.partition("_")[2].lower()

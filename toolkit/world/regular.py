@@ -22,14 +22,14 @@ def stairs(
     """A flight of stairs upwards to a landing.
 
     Args:
-        rng: not used; stairs are regular.
-        steps: number of steps, the landing included.
-        step_height: m; negative for stairs downwards.
-        tread: m; depth of a step.
-        width: m.
-        friction: sliding coefficient.
-        shift: s.
-        swing: s.
+        rng: Not used.
+        steps: Number of steps, the landing included.
+        step_height: Height of a step, m; negative for stairs downwards.
+        tread: Depth of a step, m.
+        width: Width of the stairs, m.
+        friction: Sliding coefficient.
+        shift: Time of a shift, s.
+        swing: Time of a swing, s.
     """
     del rng
     begin = 0.45
@@ -53,21 +53,16 @@ def stairs(
 
 
 def gap(
-    rng: np.random.Generator,
-    *,
-    width: float = 0.5,
-    friction: float = 0.5,
-    shift: float = 0.6,
-    swing: float = 0.8,
+    rng: np.random.Generator, *, width: float = 0.5, friction: float = 0.5, shift: float = 0.6, swing: float = 0.8
 ) -> str:
     """Two platforms with a gap between them.
 
     Args:
-        rng: not used.
-        width: m; of the gap.
-        friction: sliding coefficient.
-        shift: s.
-        swing: s.
+        rng: Not used.
+        width: Width of the gap, m.
+        friction: Sliding coefficient.
+        shift: Time of a shift, s.
+        swing: Time of a swing, s.
     """
     del rng
     edge = 0.6
@@ -92,13 +87,13 @@ def slope(
     """A slope downwards, level above and below.
 
     Args:
-        rng: not used.
-        length: m; along the slope.
-        angle: deg; negative for a slope upwards.
-        width: m.
-        friction: sliding coefficient.
-        shift: s.
-        swing: s.
+        rng: Not used.
+        length: Length along the slope, m.
+        angle: Angle of the slope, deg; negative for a slope upwards.
+        width: Width of the slope, m.
+        friction: Sliding coefficient.
+        shift: Time of a shift, s.
+        swing: Time of a swing, s.
     """
     del rng
     edge, tilt = 0.4, np.radians(angle)

@@ -11,26 +11,26 @@ from toolkit.robot.model import RobotModel
 from toolkit.world.options import set_options
 from toolkit.world.world import PALM_SITES, World
 
-WORLD_PREFIX = "world/"  # of everything in the scene that comes from the world
+WORLD_PREFIX = "world/"  # prefix of every name in the scene that comes from the world
 
 
 def compose_scene(robot: RobotModel, world: World) -> mujoco.MjModel:
     """Compile a world and a robot into one model, ready to simulate.
 
     The robot's elements keep their names, the world's get the prefix `world/`. Every contact between the two has
-    exactly the world's friction: the world's geoms have the higher priority. They collide with every geom of the robot
-    that collides with anything; what collides within the robot is left as it is. Of the two files' options none
-    counts: 2 ms steps, implicit in velocity, elliptic cone with impratio 100, gravity 9.81 m/s^2 down.
+    exactly the world's friction, because the world's geoms have the higher priority. They collide with every geom of
+    the robot that collides with anything; collisions within the robot stay as they are. The options of both files are
+    ignored: steps are 2 ms, implicit in velocity, with an elliptic cone of impratio 100 and gravity 9.81 m/s^2 down.
 
     Args:
-        robot: the robot; its posture is the caller's matter (qpos0 is as in the robot's file).
-        world: the world.
+        robot: The robot; qpos0 stays as in its file.
+        world: The world.
 
     Returns:
         The model: nq = 7 + n, joints and actuators in the robot's order, no keyframe.
 
     Raises:
-        RobotError: the robot's model cannot be combined with a world.
+        RobotError: The robot's model cannot be combined with a world.
     """
     spec = mujoco.MjSpec.from_string(robot.mjcf, assets=dict(robot.assets))
     scenery = world.scenery.copy()
@@ -64,7 +64,7 @@ def compose_scene(robot: RobotModel, world: World) -> mujoco.MjModel:
 
 
 def _share_assets(spec: mujoco.MjSpec, scenery: mujoco.MjSpec) -> None:
-    """Give both parts of a scene the files of both; those of the world get names that none of the robot has."""
+    """Give both parts of a scene the files of both; the world's files get names that no file of the robot has."""
     files, names = dict(spec.assets), {}
     for name, content in scenery.assets.items():
         names[name] = name
@@ -75,16 +75,16 @@ def _share_assets(spec: mujoco.MjSpec, scenery: mujoco.MjSpec) -> None:
         item.file = names.get(item.file, item.file)
     for texture in scenery.textures:
         texture.cubefiles = [names.get(name, name) for name in texture.cubefiles]
-    spec.assets, scenery.assets = files, dict(files)  # MuJoCo warns of a child without any
+    spec.assets, scenery.assets = files, dict(files)  # MuJoCo warns if a child has no files
 
 
 def _colliding(model: mujoco.MjModel, index: np.ndarray) -> np.ndarray:
-    """Those of the geoms that collide."""
+    """The geoms among `index` that collide."""
     return index[(model.geom_contype[index] | model.geom_conaffinity[index]) != 0]
 
 
 def _check_composed(model: mujoco.MjModel, robot: RobotModel, world: World) -> None:
-    """Assert that the composed model is the robot plus the world and nothing else."""
+    """Raise unless the composed model is the robot plus the world and nothing else."""
     names = tuple(model.joint(i).name for i in range(1, model.njnt))
     if model.nq != 7 + len(robot.joint_names) or names != robot.joint_names or model.nu != len(names):
         raise RobotError(f"{robot.folder}: the scene's joints {names} are not the robot's {robot.joint_names}")

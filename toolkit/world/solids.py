@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 
 from toolkit.geometry.pose import Pose
 
-_WIDE = 100.0  # m; how far and how deep the half space under a plane reaches
+_WIDE = 100.0  # m; width and depth of the half space under a plane beyond the square
 _SIDES = 48  # sides of a prism that stands for a cylinder
 
 
@@ -23,12 +23,10 @@ class Solids:
     """Convex solids by their vertices and edges.
 
     Attributes:
-        points: (n, 3) float, m; vertices in the world frame, solid after solid.
-        low, high: (s, 3) float, m; boxes around the solids, along the axes of the world.
-        edges: (k, 2) int; pairs of vertices. All of a solid's convex edges are among them.
-        edge_first: (s + 1,) int; solid i has the edges from edge_first[i] to edge_first[i + 1].
-        triangles: (t, 3) int; their faces as triangles of vertices, counterclockwise from outside. Of half spaces and
-            height fields the upper side only.
+        points: Vertices in the world frame, solid after solid, (n, 3) float, m.
+        low, high: Boxes around the solids along the axes of the world, (s, 3) float, m.
+        edges: Pairs of vertices, (k, 2) int, with all convex edges of the solids among them.
+        edge_first: Solid i has the edges from edge_first[i] to edge_first[i + 1]; (s + 1,) int.
     """
 
     points: np.ndarray
@@ -36,21 +34,20 @@ class Solids:
     high: np.ndarray
     edges: np.ndarray
     edge_first: np.ndarray
-    triangles: np.ndarray
 
     def shadows(
         self, frames: Sequence[Pose], bounds: np.ndarray, low: float, high: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Projections on planes of what the solids fill between two heights above each.
+        """Project the parts of the solids between two heights above each plane on that plane.
 
         Args:
-            frames: world_from_plane of n planes; z is the normal.
-            bounds: (n, 4) float, m; xmin, ymin, xmax, ymax in each plane; solids outside are left out.
-            low: m; lower height.
-            high: m; upper height.
+            frames: World_from_plane poses of n planes; z is the normal.
+            bounds: Bounds xmin, ymin, xmax, ymax in each plane, (n, 4) float, m; solids outside are left out.
+            low: The lower height, m.
+            high: The upper height, m.
 
         Returns:
-            (k,) int, ascending, planes; (k,) shapely polygons in their xy, one per solid that fills an area.
+            Ascending indices of planes (k,) int, and polygons (k,) in their xy, one per solid that covers an area.
         """
         turn, origin = np.array([frame.rotation for frame in frames]), np.array([frame.position for frame in frames])
         corners = [
@@ -88,43 +85,24 @@ class Solids:
         """The solids' boxes seen from above."""
         return shapely.STRtree(shapely.box(self.low[:, 0], self.low[:, 1], self.high[:, 0], self.high[:, 1]))
 
-    @property
-    def corners(self) -> np.ndarray:
-        """(t, 3, 3) float; corners of the solids' triangles in the world frame."""
-        return self.points[self.triangles]
-
 
 def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
-    """Convex solids of all colliding geoms of a world.
+    """Convex solids of all colliding geoms of a compiled world whose meshes are convex.
 
-    Planes are half spaces whatever size they are drawn with, because MuJoCo collides them so; here they are wide and
-    deep, and their triangles are cut to a square. Cylinders become prisms around the circle, spheres, capsules and
-    ellipsoids polyhedra around them, a height field one prism per triangle, as MuJoCo collides it.
-
-    Args:
-        model: the world compiled (meshes convex).
-        square: (xmin, ymin, xmax, ymax), m; the part of infinite planes that matters.
-
-    Returns:
-        The solids.
+    Planes are half spaces, whatever their drawn size, because MuJoCo collides them so; here they reach far beyond the
+    square (xmin, ymin, xmax, ymax) in m. Cylinders become prisms around the circle, and spheres, capsules and
+    ellipsoids become polyhedra around them. A height field becomes one prism per triangle, as MuJoCo collides it.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    points, edges, triangles, counts, total = (
-        [np.zeros((0, 3))],
-        [np.zeros((0, 2), int)],
-        [np.zeros((0, 3), int)],
-        [],
-        0,
-    )
+    points, edges, counts, total = [np.zeros((0, 3))], [np.zeros((0, 2), int)], [], 0
     for index in np.flatnonzero((model.geom_contype | model.geom_conaffinity) != 0).tolist():
         pose = Pose(data.geom_xmat[index].reshape(3, 3), data.geom_xpos[index])
-        for corners, faces, sides in _local_solids(model, index, pose, square):
+        for corners, sides in _local_solids(model, index, pose, square):
             many, each = corners.shape[:2]
             first = total + each * np.arange(many)[:, None, None]
             points.append((pose @ corners).reshape(-1, 3))
             edges.append((first + sides).reshape(-1, 2))
-            triangles.append((first + faces).reshape(-1, 3))
             counts.append(np.tile([each, len(sides)], (many, 1)))
             total += many * each
     numbers = np.concatenate([np.zeros((1, 2), int), *counts])
@@ -135,19 +113,11 @@ def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
         np.maximum.reduceat(points, point_first[:-1]) if len(points) else points,
         np.concatenate(edges),
         edge_first,
-        np.concatenate(triangles),
     )
 
 
-def plane_rectangle(model: mujoco.MjModel, index: int, pose: Pose, square: tuple[float, ...]) -> np.ndarray:
-    """(4, 2) float corners, in a plane geom's frame, that cover the square of the world in that plane.
-
-    Args:
-        model: the world compiled.
-        index: the plane geom.
-        pose: world_from_geom.
-        square: (xmin, ymin, xmax, ymax), m.
-    """
+def plane_rectangle(pose: Pose, square: tuple[float, ...]) -> np.ndarray:
+    """Corners (4, 2) float in the frame of a plane geom that cover the world's square (m) in that plane."""
     x0, y0, x1, y1 = square
     corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
     normal = pose.normal
@@ -168,27 +138,22 @@ def _extent(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _ranges(first: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Indices in the ranges first[i] to first[i + 1] of the chosen i, and for each which of the chosen it is of."""
+    """Indices in the ranges first[i] to first[i + 1] of the chosen i, and the position in `chosen` of each index."""
     counts = first[chosen + 1] - first[chosen]
     owner = np.repeat(np.arange(len(chosen)), counts)
     return np.arange(len(owner)) + (first[chosen] - np.cumsum(counts) + counts)[owner], owner
 
 
 def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
-    """Blocks of a geom's convex solids of one build: points (m, n, 3) in the geom's frame, triangles and edges."""
+    """Blocks of a geom's convex solids with equal edges: points (m, n, 3) in the geom's frame and edges (k, 2)."""
     kind, size = model.geom_type[index], model.geom_size[index]
     types = mujoco.mjtGeom
     if kind == types.mjGEOM_PLANE:
-        # Wherever the half space reaches it buries other geoms; its triangles end with the square.
         x0, y0, x1, y1 = square
-        wide = plane_rectangle(model, index, pose, (x0 - _WIDE, y0 - _WIDE, x1 + _WIDE, y1 + _WIDE))
-        points, _, edges = _hull(_extruded(wide, -_WIDE, 0.0))
-        shown = plane_rectangle(model, index, pose, square)
-        first = len(points[0])
-        faces = np.array([[0, 1, 2], [0, 2, 3]]) + first
-        return [(np.concatenate([points[0], np.column_stack([shown, np.zeros(4)])])[None], faces, edges)]
+        wide = plane_rectangle(pose, (x0 - _WIDE, y0 - _WIDE, x1 + _WIDE, y1 + _WIDE))
+        return [_hull(_extruded(wide, -_WIDE, 0.0))]
     if kind == types.mjGEOM_BOX:
-        return [(_CUBE[None] * size, _CUBE_FACES, _CUBE_EDGES)]
+        return [(_CUBE[None] * size, _CUBE_EDGES)]
     if kind == types.mjGEOM_CYLINDER:
         angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
         circle = size[0] / np.cos(np.pi / _SIDES) * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -205,51 +170,38 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
         first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
         return [_hull(model.mesh_vert[first : first + count].astype(float))]
     if kind == types.mjGEOM_HFIELD:
-        return _height_field_prisms(model, int(model.geom_dataid[index]))
+        points, triangles = height_field_triangles(model, int(model.geom_dataid[index]))
+        top = points[triangles]
+        foot = top * [1, 1, 0] + [0, 0, -model.hfield_size[model.geom_dataid[index], 3]]
+        return [(np.concatenate([foot, top], axis=1), _PRISM_EDGES)]
     return []
 
 
 def _ball() -> np.ndarray:
-    """(642, 3) points whose hull just holds the unit sphere."""
+    """Corners (642, 3) of a polyhedron around the unit sphere."""
     ball = trimesh.creation.icosphere(subdivisions=3)
     inside = (ball.triangles[:, 0] * ball.face_normals).sum(axis=1).min()
     return np.asarray(ball.vertices) / inside
 
 
 def _extruded(ring: np.ndarray, low: float, high: float) -> np.ndarray:
-    """(2 k, 3) vertices of a prism over a ring (k, 2)."""
+    """Vertices (2 k, 3) of a prism over a ring (k, 2)."""
     return np.concatenate([np.column_stack([ring, np.full(len(ring), z)]) for z in (low, high)])
 
 
-def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """One convex hull as a block of solids; triangles counterclockwise from outside."""
+def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The convex hull of points (n, 3) as a block of one solid: vertices (1, m, 3) and edges (k, 2)."""
     hull = ConvexHull(points)
-    points, index = points[hull.vertices], np.full(len(points), -1)
+    index = np.full(len(points), -1)
     index[hull.vertices] = np.arange(len(hull.vertices))
-    faces = index[hull.simplices]
-    corners = points[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inwards = (normal * hull.equations[:, :3]).sum(axis=1) < 0
-    faces[inwards] = faces[inwards, ::-1]
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    return points[None], faces, np.unique(edges, axis=0)
+    edges = np.sort(index[hull.simplices][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    return points[hull.vertices][None], np.unique(edges, axis=0)
 
 
 _CUBE = np.array([[x, y, z] for z in (-1.0, 1.0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 _CUBE_EDGES = np.array([[i, (i + 1) % 4] for i in range(4)] * 2 + [[i, i + 4] for i in range(4)])
 _CUBE_EDGES[4:8] += 4
-_CUBE_QUADS = [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
-_CUBE_FACES = np.array([[a, b, c] for a, b, c, _ in _CUBE_QUADS] + [[a, c, d] for a, _, c, d in _CUBE_QUADS])
 _PRISM_EDGES = np.array([[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]])
-_PRISM_TOP = np.array([[3, 4, 5]])
-
-
-def _height_field_prisms(model: mujoco.MjModel, field: int):
-    """Prisms from the base of a height field up to its triangles."""
-    points, triangles = height_field_triangles(model, field)
-    top = points[triangles]
-    foot = top * [1, 1, 0] + [0, 0, -model.hfield_size[field, 3]]
-    return [(np.concatenate([foot, top], axis=1), _PRISM_TOP, _PRISM_EDGES)]
 
 
 def height_field_triangles(model: mujoco.MjModel, field: int) -> tuple[np.ndarray, np.ndarray]:
@@ -262,6 +214,4 @@ def height_field_triangles(model: mujoco.MjModel, field: int) -> tuple[np.ndarra
     points = np.column_stack([x.ravel(), y.ravel(), height])
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     right, up, across = corner + 1, corner + columns, corner + columns + 1
-    lower = np.column_stack([corner, right, across])
-    upper = np.column_stack([corner, across, up])
-    return points, np.stack([lower, upper], axis=1).reshape(-1, 3)
+    return points, np.column_stack([corner, right, across, corner, across, up]).reshape(-1, 3)

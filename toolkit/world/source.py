@@ -1,4 +1,4 @@
-"""From a world's MJCF to the scene that is simulated: read, check, and make every mesh collide as it looks."""
+"""Read and check a world's MJCF, and make every mesh collide as it looks."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ PART_GROUP = 3  # convex parts of a mesh that is drawn as a whole; hidden by def
 RAY_GROUPS = np.array([1, 1, 0, 1, 1, 1], np.uint8)  # `geomgroup` of mj_ray that sees exactly what collides
 
 _ALL_BITS = 0x7FFFFFFF
-_LEAST = 1e-5  # m; of half a geom: what is thinner has no sides to compute with
+_LEAST = 1e-5  # m; smaller half sizes of a geom are refused, because its sides cannot be computed
 
 
 @dataclass(frozen=True)
 class Source:
-    """A world's scene, ready to compile or to take in a robot.
+    """A world's scene, ready to be compiled or combined with a robot.
 
     Attributes:
-        spec: the scene; colliding geoms have all contact bits set, the others none; every geom has a name.
-        model: `spec` compiled.
-        facets: label of a mesh geom -> its flat facets in the world frame, for mesh geoms replaced by convex parts.
-        owner: (ngeom,) labels; the authored geom that each geom of the model stands for. A label is the geom's name,
-            or `type#id` where it has none; no two geoms have the same.
+        spec: The scene. Colliding geoms have all contact bits set, the others none; every geom has a name.
+        model: The compiled `spec`.
+        facets: Flat facets in the world frame, by label, of the mesh geoms that were replaced by convex parts.
+        owner: Labels (ngeom,) of the authored geoms that the geoms of the model stand for. A label is the geom's name,
+            or `type#id` if it has none, and is unique.
     """
 
     spec: mujoco.MjSpec
@@ -42,21 +42,14 @@ class Source:
 
 
 def read_source(path: Path, mjcf: str | None = None, progress: Callable[[float], None] = lambda share: None) -> Source:
-    """Read and check a world's MJCF.
+    """Read and check a world's MJCF file, or its text if it exists in memory only.
 
     MuJoCo collides a mesh geom as its convex hull. A mesh that is not convex is therefore replaced by convex parts,
-    one or more per flat facet, and itself kept for drawing only: what is seen, what rays hit and what is touched agree.
-
-    Args:
-        path: the MJCF file; meshes are looked for beside it.
-        mjcf: its text where it exists in memory only.
-        progress: told how much of the meshes is done, in [0, 1].
-
-    Returns:
-        The scene.
+    one or more per flat facet, and kept for drawing only. So drawing, rays and contacts agree. `progress` is called
+    with the share of the meshes that is done, in [0, 1].
 
     Raises:
-        WorldError: the file is missing or broken, has moving parts, NaN, unusable friction or unsupported geoms.
+        WorldError: The file is missing or broken, or has moving parts, NaN, unusable friction or unsupported geoms.
     """
     spec, model = _compiled(path, mjcf)
     _check_static(path, spec, model)
@@ -88,7 +81,7 @@ def _kind(model: mujoco.MjModel, index: int) -> str:
 
 
 def _unused(name: str, taken: set[str]) -> str:
-    """A name that nothing has yet, the wanted one if possible; taken from now on."""
+    """The wanted name, changed if it is taken; the result is added to the taken names."""
     while name in taken:
         name += "'"
     taken.add(name)
@@ -105,7 +98,7 @@ def _compiled(path: Path, mjcf: str | None) -> tuple[mujoco.MjSpec, mujoco.MjMod
             raise WorldError(f"{path}: cannot be read as text ({error}); give the path of an MJCF file") from error
     try:
         spec = read_spec(path, mjcf)
-        # A dropped or merged geom would no longer be where the file has it.
+        # Every geom must stay where the file has it.
         spec.compiler.discardvisual = spec.compiler.fusestatic = False
         for size in SIZES:
             setattr(spec, size, -1)
@@ -155,13 +148,9 @@ def _check_geoms(path: Path, model: mujoco.MjModel, colliding: np.ndarray, label
 
 
 def _decompositions(
-    path: Path,
-    model: mujoco.MjModel,
-    colliding: np.ndarray,
-    labels: list[str],
-    progress: Callable[[float], None],
+    path: Path, model: mujoco.MjModel, colliding: np.ndarray, labels: list[str], progress: Callable[[float], None]
 ) -> dict[int, Decomposition]:
-    """Geom id -> decomposition, for the colliding mesh geoms that are not convex."""
+    """Decompositions by geom id of the colliding mesh geoms that are not convex."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     result = {}
@@ -189,7 +178,7 @@ def mesh_of_geom(model: mujoco.MjModel, data: mujoco.MjData, index: int) -> tupl
 
 
 def _normalise(geom, model: mujoco.MjModel, index: int, collides: bool) -> None:
-    """Set contact bits and the group of a geom: it collides with everything, or is there for the eye only."""
+    """Set the contact bits and the group of a geom: it collides with everything or is only drawn."""
     geom.contype = geom.conaffinity = _ALL_BITS if collides else 0
     if not collides:
         geom.group = VISUAL_GROUP
@@ -198,19 +187,14 @@ def _normalise(geom, model: mujoco.MjModel, index: int, collides: bool) -> None:
         geom.group = 0
     material = int(model.geom_matid[index])
     if model.geom_rgba[index, 3] == 0.0 or (material >= 0 and model.mat_rgba[material, 3] == 0.0):
-        geom.material = ""  # MuJoCo's rays pass through what is invisible
+        geom.material = ""  # MuJoCo's rays pass through invisible geoms
         geom.rgba = [0.5, 0.5, 0.5, 1e-3]
 
 
 def _add_parts(
-    spec: mujoco.MjSpec,
-    model: mujoco.MjModel,
-    index: int,
-    label: str,
-    decomposition: Decomposition,
-    taken: set[str],
+    spec: mujoco.MjSpec, model: mujoco.MjModel, index: int, label: str, decomposition: Decomposition, taken: set[str]
 ) -> dict[str, str]:
-    """Add a mesh geom's convex parts to the world body; returns part name -> label."""
+    """Add a mesh geom's convex parts to the world body; return the label by the name of each part."""
     names = {}
     for number, vertices in enumerate(decomposition.parts):
         name = _unused(f"{label}/part{number}", taken)

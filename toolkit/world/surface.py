@@ -17,14 +17,14 @@ class Surface:
     """A connected planar region of the world's geometry, free of covered and buried parts.
 
     Attributes:
-        index: position in `World.surfaces`.
-        geom: name (or `type#id`) of the geom it comes from.
-        pose: world_from_surface; origin on the plane, z the outward normal.
-        boundary: rings of (k, 2) float points in the surface frame; the first is the outer ring, counterclockwise, the
-            others are holes, clockwise. Not closed (the last point is not the first one repeated).
-        pieces: convex polygons (k, 2), counterclockwise, that cover the region; they may overlap.
-        friction: sliding coefficient.
-        serves_foot, serves_palm: by the angle of the normal.
+        index: Position in `World.surfaces`.
+        geom: Name (or `type#id`) of the geom that it comes from.
+        pose: World_from_surface pose with its origin on the plane; z is the outward normal.
+        boundary: Rings of points (k, 2) float in the surface frame, m. The first is the outer ring, counterclockwise;
+            the others are holes, clockwise. The first point of a ring is not repeated at its end.
+        pieces: Convex polygons (k, 2), counterclockwise, m, that cover the region; they may overlap.
+        friction: Sliding coefficient.
+        serves_foot, serves_palm: Whether the angle of the normal allows feet and palms.
     """
 
     index: int
@@ -38,7 +38,7 @@ class Surface:
 
     @property
     def normal(self) -> np.ndarray:
-        """(3,) float outward normal in the world."""
+        """Outward normal (3,) float in the world."""
         return self.pose.rotation[:, 2]
 
     @property
@@ -47,14 +47,7 @@ class Surface:
         return Polygon(self.boundary[0], self.boundary[1:])
 
     def height(self, points: np.ndarray) -> np.ndarray:
-        """Height over points of the ground plane, of a surface that is not vertical.
-
-        Args:
-            points: (n, 2) float, m; world xy.
-
-        Returns:
-            (n,) float, m; world z, NaN where the surface is not there.
-        """
+        """World z (n,) in m of a surface that is not vertical at points (n, 2) of the world's xy, NaN outside it."""
         normal, origin = self.normal, self.pose.position
         height = origin[2] - (points - origin[:2]) @ normal[:2] / normal[2]
         local = self.pose.inverse() @ np.column_stack([points, height])
@@ -62,7 +55,7 @@ class Surface:
         return np.where(inside, height, np.nan)
 
     def nearest_point(self, point: np.ndarray) -> np.ndarray:
-        """(3,) m; the point of the surface nearest to a point (3,) m of the world."""
+        """The point (3,) of the surface nearest to a point (3,) of the world, m."""
         x, y, _ = self.pose.inverse() @ point
         nearest = nearest_points(self.region, Point(x, y))[0]
         return self.pose @ np.array([nearest.x, nearest.y, 0.0])

@@ -13,8 +13,8 @@ class Timing:
     """Timing of one contact transition; the default is the paper's.
 
     Attributes:
-        shift: s, with the old stance complete (the CoM shifts).
-        swing: s, while the limb moves.
+        shift: Time in which the CoM shifts on the complete old stance, s.
+        swing: Time in which the limb moves, s.
     """
 
     shift: float = 1.0

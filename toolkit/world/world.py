@@ -1,4 +1,4 @@
-"""World: what the planner knows about a scene."""
+"""The world as the planner knows it."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from toolkit.world.timing import Timing
 PALM_SITES = {limb: f"start_{limb.label}" for limb in PALMS}
 """Names of the sites at which palms start."""
 PALM_SITE_REACH = 0.3
-"""m; farthest that the surface of a palm that starts in contact may be from its site."""
+"""Largest distance from the site of a palm that starts in contact to its surface, m."""
 
 
 @dataclass(frozen=True)
 class Goal:
-    """Reached when the mean of the feet is within `radius` of `position` in XY."""
+    """The goal is reached when the mean of the feet is within `radius` of `position` (3,) in xy, m."""
 
     position: np.ndarray
     radius: float
@@ -33,17 +33,17 @@ class World:
     """A loaded scene.
 
     Attributes:
-        name: file name without ending.
-        path: the MJCF file.
-        mujoco_model: the scene compiled alone (static geoms only; for ray casting, collision, drawing).
-        surfaces: contact surfaces, `surfaces[i].index == i`.
-        start: upright pose of the point between the feet at the start (as authored, not projected).
-        goal: goal region.
-        timing: shift and swing time of a transition.
-        square: (xmin, ymin, xmax, ymax), m; infinite planes are cut to it wherever they are drawn or listed.
-        scenery: the scene as it was read, to be put together with a robot.
-        start_palms: palm -> (3,) m; palms that start in contact, each on the surface nearest to its point; empty: the
-            robot starts on its feet alone.
+        name: File name without ending.
+        path: The MJCF file.
+        mujoco_model: The scene compiled alone (static geoms only), for ray casting, collision and drawing.
+        surfaces: Contact surfaces, `surfaces[i].index == i`.
+        start: Upright pose of the point between the feet at the start, as authored, not projected.
+        goal: Goal region.
+        timing: Shift and swing time of a transition.
+        square: Infinite planes are cut to this (xmin, ymin, xmax, ymax), m, wherever they are drawn or listed.
+        scenery: The scene as it was read, to be combined with a robot.
+        start_palms: Points (3,), m, by palm that starts in contact, each on the surface nearest to its point; empty if
+            the robot starts on its feet alone.
     """
 
     name: str

@@ -17,8 +17,8 @@ class Point(NamedTuple):
     """A point of the product: slacks, multipliers or a change of them.
 
     Attributes:
-        line: (13 C + P,) half lines.
-        round: (C + K, 4) second-order cones.
+        line: (13 C + P,); entries of the half lines.
+        round: (C + K, 4); entries of the second-order cones.
     """
 
     line: np.ndarray
@@ -218,10 +218,8 @@ def refutes(data, multipliers, y_rest):
     a constant plus sum_t c_t'F_t. A force in its cone with bounded normal force adds at most
     max(0, bound (c_n + mu |c_tangential|)). If even so the sum is negative, there is no motion.
 
-    Args:
-        data: the problem.
-        multipliers: a point of the dual cones; those of the contacts are not needed.
-        y_rest: (3,) of the final velocity, any sign; zero if it is free.
+    `multipliers` is a point of the dual cones, whose contacts' part is not used. `y_rest` (3,) is the final velocity's
+    multiplier of any sign, zero if it is free.
     """
     z_line, z_round = multipliers.line, multipliers.round
     n, contacts = data.h.shape[0], data.mu.shape[0]

@@ -1,4 +1,4 @@
-"""The contacts' own part of a Newton step: their wrenches are eliminated from the sum of each step.
+"""The contacts' part of a Newton step: their wrenches are eliminated in favour of the sum of each step.
 
 A wrench u of Hessian H that enters the dynamics through the sum w = sum B u leaves w the Hessian S^-1 with
 S = sum B H^-1 B', see `riccati`.
@@ -50,12 +50,8 @@ def solve_upper(lower, b, n):
 def factor(first, wrench, hessian, spread, total):
     """Factor the contacts' Hessians, and sum them up into K of each step, with S = K K'.
 
-    Args:
-        first: (N + 1,) first contact of each step, and C.
-        wrench: (C, 6, 6) B.
-        hessian: (C, 6, 6) H, its lower triangle; overwritten with its lower factor.
-        spread: (C, 6, 6), filled with H^-1/2 B'.
-        total: (N, 6, 6), filled with K, lower; zero where no contact is.
+    Takes the `first` (N + 1,) contact of each step, `wrench` (C, 6, 6) B and the lower triangles of `hessian` (C, 6, 6)
+    H, which become lower factors. Fills `spread` (C, 6, 6) with H^-1/2 B' and `total` (N, 6, 6) with K.
     """
     for t in range(total.shape[0]):
         total[t] = 0.0

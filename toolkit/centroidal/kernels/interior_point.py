@@ -18,7 +18,7 @@ from toolkit.compiled import compiled
 
 SOLVED, INFEASIBLE, UNDECIDED = 0, 1, 2
 REST_STIFFNESS = 1e7
-"""Of the proximal term that carries the final rest; its multiplier makes the rest exact."""
+"""Stiffness of the proximal term for the final rest; a multiplier makes the rest exact."""
 FEASIBLE = 1e-9
 """Largest residual of the constraints at a solution."""
 NEARLY_FEASIBLE = 1e-1
@@ -30,10 +30,7 @@ SMALL = 1e-4
 
 
 class Model(NamedTuple):
-    """Quadratic model of the objective: gradients and Hessians of contacts, knots and steps; see `riccati`.
-
-    The Hessians of the contacts are in `riccati.Sweep`.
-    """
+    """Quadratic model of the objective: gradients and Hessians, those of the contacts in `riccati.Sweep`."""
 
     contact_gradient: np.ndarray
     knot_gradient: np.ndarray
@@ -67,7 +64,7 @@ def linearise(data, u, x, w, y_rest, model, sweep):
 
 @compiled(reordered=True)
 def rest_terms(data, x, y_rest):
-    """What the final rest adds to the barrier function."""
+    """Terms of the final rest in the barrier function."""
     total = 0.0
     if data.rest:
         for a in range(3):
@@ -140,21 +137,10 @@ def enter_cones(residual, s):
 
 @compiled(reordered=True)
 def direction(data, model, sweep, scaling, residual, s, z, gap, correct, targets, scratch, change):
-    """Fill the change that aims at complementarity `gap`.
+    """Fill the change of slacks s and multipliers z that aims at complementarity `gap`, which is sigma mu.
 
-    Args:
-        data: the problem.
-        model: of the objective.
-        sweep: the factors of this iteration.
-        scaling: of the cones.
-        residual: A (u, x) + c - s.
-        s: slacks, and
-        z: multipliers.
-        gap: sigma mu.
-        correct: whether the change holds the predictor, whose second-order term is then corrected.
-        targets: room for a point.
-        scratch: room for the gradients of the contacts and of the knots.
-        change: filled.
+    The residual is A (u, x) + c - s. Where `correct`, the change holds the predictor, whose second-order term is
+    corrected. `targets` is room for a point, `scratch` for the gradients of the contacts and of the knots.
     """
     du, dx, ds, dz = change
     p, q = np.empty(4), np.empty(4)
@@ -200,19 +186,9 @@ def direction(data, model, sweep, scaling, residual, s, z, gap, correct, targets
 
 @compiled(reordered=True)
 def solve(data, tolerance, max_iterations, u, x, w, z):
-    """Solve a problem.
+    """Solve a problem to a suboptimality of `tolerance` relative to the objective; returns status and iterations.
 
-    Args:
-        data: the problem.
-        tolerance: accepted suboptimality relative to the objective.
-        max_iterations: bound.
-        u: (C, 6) contact wrenches, filled.
-        x: (N + 1, 9) states, filled.
-        w: (N, 6) total wrenches, filled.
-        z: multipliers of the constraints, filled.
-
-    Returns:
-        Status and number of iterations.
+    Fills the contact wrenches u (C, 6), states x (N + 1, 9), total wrenches w (N, 6) and multipliers z.
     """
     n, contacts = data.h.shape[0], data.mu.shape[0]
     lines, rounds = contacts * ROWS + data.plane_offset.shape[0], contacts + data.ball_radius.shape[0]
@@ -276,7 +252,7 @@ def solve(data, tolerance, max_iterations, u, x, w, z):
                 if du[j, 2] < 0.0:
                     step = min(step, -u[j, 2] / du[j, 2])
             step = min(1.0, 0.99 * step)
-            # What full steps would change the Lagrangian by through the residual of the slacks.
+            # By how much full steps change the Lagrangian through the residual of the slacks.
             owed = constraints.dot(z, residual) + constraints.dot(dz, residual)
             lower = False
             for trials in range(1 if correct else 5):

@@ -1,4 +1,4 @@
-"""What a problem asks of its knots: balls that the CoM must keep to, planes, and a first guess of its path."""
+"""Constraints of the knots, balls and planes within which the CoM must be, and a first guess of its path."""
 
 import math
 
@@ -24,12 +24,7 @@ def _ball(p, limb, place, rotation, yaw, center):
 def balls(p, most):
     """The balls of all knots of a problem (`ProblemArrays`), and the lowest foot in contact before or after each.
 
-    Args:
-        p: The problem.
-        most: Number of balls to make room for.
-
-    Returns:
-        (N + 2,) first ball of each knot, (most, 3) centres, (most,) radii, and (N + 1,) heights, inf without a foot.
+    Returns (N + 2,) first ball of each knot, (most, 3) centres, (most,) radii and (N + 1,) heights, inf without a foot.
     """
     n, k = p.active.shape[0], 0
     first, center, radius = np.zeros(n + 2, np.int64), np.empty((most, 3)), np.empty(most)
@@ -68,8 +63,7 @@ def balls(p, most):
 def planes(p, lowest):
     """The planes: least height of knots 1 .. N, above the lowest feet (N + 1,), and the final box.
 
-    Returns:
-        (N + 2,) first plane of each knot, (N + 7, 3) normals and (N + 7,) offsets, of which the last may be unused.
+    Returns (N + 2,) first plane of each knot, (N + 7, 3) normals and (N + 7,) offsets, of which the last may be unused.
     """
     n, k = lowest.shape[0] - 1, 0
     first, normals, offset = np.zeros(n + 2, np.int64), np.zeros((n + 7, 3)), np.empty(n + 7)

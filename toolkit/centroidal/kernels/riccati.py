@@ -19,13 +19,13 @@ class Sweep(NamedTuple):
     """Factors of one iteration, for N steps and C contacts.
 
     Attributes:
-        hessian: (C, 6, 6) of the contacts; `elimination.factor` turns it into its lower factor.
+        hessian: (C, 6, 6) Hessians of the contacts; `elimination.factor` turns them into their lower factors.
         spread: (C, 6, 6) hessian^-1/2 B'.
         total: (N, 6, 6) K, lower.
         mixed: (N, 6, 15) Hessian rows of w against (x, w).
         theta: (N, 6, 6) lower factor of I + K' M_ww K.
         gain: (N, 6, 9) theta^-1/2 K' M_wx.
-        control: (N, 6) of the last right-hand side, before feedback.
+        control: (N, 6) controls of the last right-hand side, before feedback.
     """
 
     hessian: np.ndarray

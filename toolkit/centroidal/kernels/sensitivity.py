@@ -1,8 +1,7 @@
-"""How the least objective of one transition changes with what it is asked for.
+"""Derivatives of the least objective of one transition with respect to its contacts, initial state and timing.
 
-By the envelope theorem this is the derivative of the Lagrangian at fixed multipliers and wrenches. Those are kept in
-the contacts' frames and the states follow from them, so it is the derivative of one smooth function, taken by central
-differences: a rollout each.
+By the envelope theorem these are derivatives of the Lagrangian at fixed multipliers and wrenches. The wrenches are
+fixed in the contacts' frames and the states follow from them. Central differences take two rollouts each.
 """
 
 import math
@@ -13,11 +12,11 @@ from toolkit.centroidal.kernels import constraints, objective, setup
 from toolkit.compiled import compiled
 
 STEP = 1e-5
-"""m, m/s, rad, s or friction; of the central differences, which err by 1e-9 relatively."""
+"""Step of the central differences in m, m/s, rad, s or friction; they err by 1e-9 relatively."""
 NEW = 4
 """Row of the new contact, after those of the limbs."""
 PLACE, ROTATION, COM, VELOCITY, DURATION, FRICTION = 0, 1, 2, 3, 4, 5
-"""What is varied."""
+"""Kinds of variations."""
 
 
 @compiled(reordered=True)
@@ -55,7 +54,7 @@ def heading(left, right):
 
 @compiled(reordered=True)
 def restore(problem, varied):
-    """Make equal again what `vary` changes."""
+    """Undo what `vary` changed."""
     varied.dt[:], varied.yaw[:], varied.com[:] = problem.dt, problem.yaw, problem.com
     varied.position[:], varied.rotation[:], varied.friction[:] = problem.position, problem.rotation, problem.friction
     varied.com_velocity[:], varied.final_center[:] = problem.com_velocity, problem.final_center
@@ -64,14 +63,10 @@ def restore(problem, varied):
 
 @compiled(reordered=True)
 def vary(kind, row, axis, step, p):
-    """Change one thing of a problem by a step, and what follows from it.
+    """Change one thing of a problem (`ProblemArrays`) by a step, and all that depends on it.
 
-    Args:
-        kind: PLACE or ROTATION of the contact `row`, COM, VELOCITY, DURATION of the phase `axis`, or FRICTION.
-        row: limb, or NEW.
-        axis: of the world.
-        step: how much.
-        p: `ProblemArrays` from `build.transition_problem`; changed.
+    The kind is PLACE or ROTATION of the contact `row` (a limb or NEW) along a world axis, COM or VELOCITY along an
+    axis, DURATION of the phase `axis`, or FRICTION.
     """
     n, limb = p.dt.shape[0], p.landing_limb
     half = n // 2
@@ -109,16 +104,9 @@ def vary(kind, row, axis, step, p):
 
 @compiled(reordered=True)
 def derivatives(u, z, problem, varied):
-    """Derivatives of the least objective of a transition.
+    """Derivatives (5, 6) and (9,) of the least objective of a transition, as in `fast.Sensitivity`.
 
-    Args:
-        u: (C, 6) wrenches, and
-        z: multipliers of the solution.
-        problem: `ProblemArrays` from `build.transition_problem`.
-        varied: a copy, which is changed.
-
-    Returns:
-        (5, 6) and (9,), as in `fast.Sensitivity`.
+    Of the wrenches u (C, 6) and multipliers z of its solution; `varied` is a copy of the problem, which is changed.
     """
     n = problem.dt.shape[0]
     contacts, others = np.zeros((5, 6)), np.zeros(9)

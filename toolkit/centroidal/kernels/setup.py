@@ -3,10 +3,9 @@
 Mass, g, 1 m and the weight are the units, so time is counted in sqrt(1 m / g) = 0.32 s; positions count from the
 initial CoM. The state x = (r, v, L) has the angular momentum L about that origin; w = (F, M) is the total force and its
 moment about the origin; u = (f, tau) is a contact's wrench at the centre of its patch in the contact frame,
-w = sum B u. The dynamics (`toolkit.physics.momentum`) are linear in them
-and every constraint is convex: slack s = offset + rows u >= 0 (force bound, CoP, yaw moment), the friction
-cone (mu f_z, f_x, f_y), balls (radius, r - centre) for reach and planes offset + normal r >= 0 for height and final
-box.
+w = sum B u. The dynamics (`toolkit.physics.momentum`) are linear in them and every constraint is convex: slack
+s = offset + rows u >= 0 (force bound, CoP, yaw moment), the friction cone (mu f_z, f_x, f_y), balls (radius,
+r - centre) for reach and planes offset + normal r >= 0 for height and final box.
 """
 
 import math
@@ -22,11 +21,11 @@ from toolkit.physics.momentum import fill_wrench_map, spin
 from toolkit.physics.wrench import pressure, pressure_rows, yaw_row
 
 ROWS = 13
-"""Linear constraints of a contact."""
+"""Number of linear constraints of a contact."""
 SCALE = 1e-3
 """Factor on the paper's objective."""
 UNBOUNDED_FORCE = 1e3
-"""Weights; stands for no bound on a normal force."""
+"""Bound on a normal force in weights that stands for none."""
 SMALLEST = 1e-6
 """Least friction coefficient and half extent in m: cones need an inside. It is the residual check's tolerance."""
 
@@ -35,19 +34,19 @@ class Data(NamedTuple):
     """The arrays, for N steps, C contacts in all steps together, K balls and P planes.
 
     Attributes:
-        h, omega: (N,) step length; weight of the step in the objective.
-        first: (N + 1,) contacts of step t are first[t] .. first[t + 1].
+        h, omega: (N,) length of the step, and its weight in the objective.
+        first: (N + 1,) contacts of step t are first[t] .. first[t + 1] - 1.
         rotation: (C, 3, 3) contact frames.
         wrench: (C, 6, 6) B: wrench about the origin of a unit wrench at the contact.
         mu, force_bound: (C,).
         rows, offset: (C, 13, 6), (C, 13).
         cop_weight: (C, 2).
-        ball_first, ball_center, ball_radius: (N + 2,), (K, 3), (K,); of knots 1 .. N.
+        ball_first, ball_center, ball_radius: (N + 2,), (K, 3), (K,); balls of knots 1 .. N.
         plane_first, plane_normal, plane_offset: (N + 2,), (P, 3), (P,).
         x0: (9,) initial state.
-        guess: (N + 1, 3) CoM to start from, above the mean of the feet.
-        rest: final velocity must vanish.
-        weights: (8,) scaled, in the order of `Weights`, times 2.
+        guess: (N + 1, 3) initial guess of the CoM, above the mean of the feet.
+        rest: Whether the final velocity must vanish.
+        weights: (8,) twice the scaled weights, in the order of `Weights`.
     """
 
     h: np.ndarray
@@ -98,10 +97,7 @@ def contact_rows(turning, x, y, bound, rows):
 @compiled(reordered=True)
 def pack(p):
     """A problem (`ProblemArrays`) as `Data`; also the largest violation of the first knot, in m."""
-    n, total = p.dt.shape[0], 0
-    for t in range(n):
-        for i in range(4):
-            total += p.active[t, i]
+    n, total = p.dt.shape[0], p.active.sum()
     unit, weight = math.sqrt(STANDARD_GRAVITY), p.mass * STANDARD_GRAVITY
     h, omega, w = np.empty(n), np.empty(n), np.empty(8)
     first, frames, wrench = np.zeros(n + 1, np.int64), np.empty((total, 3, 3)), np.zeros((total, 6, 6))
@@ -122,8 +118,7 @@ def pack(p):
                 continue
             for a in range(3):
                 lever[a] = p.position[t, i, a] - p.com[a]
-                for b in range(3):
-                    frames[j, a, b] = p.rotation[t, i, a, b]
+            frames[j] = p.rotation[t, i]
             fill_wrench_map(frames[j], lever, wrench[j])
             mu[j] = max(p.friction[t, i] * p.friction_margin, SMALLEST)
             bound[j] = min(p.max_normal_force[i] / weight, UNBOUNDED_FORCE)
@@ -137,7 +132,7 @@ def pack(p):
     first[n] = j
 
     ball_first, ball_center, ball_radius, lowest = knots.balls(p, 2 * total + 1)
-    # The initial CoM is the origin: what it violates is no constraint of the program.
+    # The first knot is given, so its violation is reported instead of constrained.
     violation = max(0.0, lowest[0] + p.min_height - p.com[2]) if lowest[0] < np.inf else 0.0
     for k in range(ball_first[1]):
         c = ball_center[k]

@@ -1,7 +1,7 @@
-"""A start whose CoM follows the feet, inside the contacts' cones where that can be.
+"""A start whose CoM follows the feet, inside the contacts' cones where possible.
 
-A linear-quadratic tracking problem around a slow motion above the feet gives a feedback law; the wrenches it asks for
-are drawn into the cones step by step, so that later steps make up for what earlier ones could not do.
+A linear-quadratic tracking problem around a slow motion above the feet gives a feedback law. Its wrenches are pulled
+into the cones step by step, so that later steps make up for what earlier ones could not do.
 """
 
 import math
@@ -17,9 +17,9 @@ FOLLOW = 30.0
 EFFORT = 10.0
 """Weight of wrenches that differ from sharing the weight."""
 INSIDE = 0.9
-"""Part of the cones that the start uses."""
+"""Part of the cones that the start may use."""
 LEAST_FORCE = 0.02
-"""Weights; normal force that every contact starts with at least."""
+"""Least normal force of a contact at the start, in weights."""
 ASTRAY = 20.0
 """m; a start further than this from its guess is given up."""
 
@@ -69,24 +69,20 @@ def follow(data, sweep, u, x, w):
     contact_gradient = np.zeros((contacts, 6))
     x_guess, w_guess, ignored = np.zeros((2, 9)), np.zeros(6), np.empty(15)
     w_guess[2] = 1.0
-    # Everything below is the quadratic model around the guess, taken at x = 0, w = 0 plus the sharing wrenches' own.
+    # The quadratic model around the guess.
     for t in range(n):
         share_weight(data, t, True, u)
         riccati.total_wrench(data.first, data.wrench, t, u, w[t])
-        for k in range(2):
-            for a in range(3):
-                x_guess[k, a] = data.guess[t + k, a]
+        x_guess[:, :3] = data.guess[t : t + 2]
         w_guess[3], w_guess[4] = x_guess[0, 1], -x_guess[0, 0]
         objective.step_terms(data.h[t], data.omega[t], data.weights, x_guess[0], w_guess, ignored, step_hessian[t])
         objective.knot_terms(data.omega[t], data.weights, x_guess[1], knot_gradient[t + 1], knot_hessian[t + 1])
-        for a in range(9):
-            knot_gradient[t + 1, a] = 0.0
+        knot_gradient[t + 1] = 0.0
         for a in range(3):
             knot_hessian[t + 1, a, a] += FOLLOW * data.omega[t]
         for j in range(data.first[t], data.first[t + 1]):
+            sweep.hessian[j] = 0.0
             for a in range(6):
-                for b in range(6):
-                    sweep.hessian[j, a, b] = 0.0
                 sweep.hessian[j, a, a] = EFFORT if a < 3 else 100.0 * EFFORT
     objective.rollout(data, u, x, w)
     for t in range(n):

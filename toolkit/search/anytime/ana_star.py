@@ -6,12 +6,11 @@ ANA* keeps the cost G of the best solution and always expands the open state wit
 
 that is, the one that most probably improves on G. With h admissible, a solution is at most max_open e(s) times as
 costly as the best one. With probability epsilon a random open state is expanded instead, which leaves the guarantees
-alone and helps out of cul-de-sacs. States reopen when a cheaper path to them is found, so that the search, run to
-exhaustion, ends with the cheapest path whether or not h is consistent.
+alone and helps out of cul-de-sacs. States reopen when a cheaper path to them is found. A search that runs to
+exhaustion therefore ends with the cheapest path, whether or not h is consistent.
 
-Beyond the paper, states that are alike can be made to wait for each other (`AnaStarConfig.crowding`): each expansion
-in a crowd adds to the h by which the others in it are ordered, as if the valley there filled up. Pruning and bounds
-keep the true h.
+Beyond the paper, similar states can be made to wait for each other (`AnaStarConfig.crowding`). Each expansion in a
+crowd adds to the h by which the other states of the crowd are ordered. Pruning and bounds keep the true h.
 
 Reference:
     van den Berg, Shah, Huang, Goldberg: ANA*: Anytime Nonparametric A*, AAAI 2011; the paper, Sec. V.
@@ -31,6 +30,9 @@ from toolkit.search.anytime.graph import Edge, Judge, Path, Progress, SearchProb
 from toolkit.search.anytime.open_list import OpenList
 
 _TINY = 1e-9  # divisor in place of h = 0
+_REFUSAL = 3.0  # added to h, for the order of expansion, where the judge refused a goal
+_MAX_STATES = 700_000  # a search that knows so many states ends, to bound its memory
+_REPORT_INTERVAL = 0.1  # s between calls of the observer, solutions apart
 
 
 @dataclass(frozen=True)
@@ -38,18 +40,15 @@ class AnaStarConfig:
     """Settings of the search.
 
     Attributes:
-        epsilon: probability of expanding a random open state.
-        layer: random draws take the best state of a random interval of h, so wide; inf: they are uniform.
-        initial_cost: stands for G before there is a solution, for the order of expansion only: inf expands the least
-            h (depth first, fastest), a smaller value weighs the cost so far as well. Nothing is pruned by it.
-        crowding: added to h for the order of expansion, per state already expanded in the same crowd. While there is no
-            solution it grows, by as much again with every `patience` expansions.
-        patience: see `crowding`.
-        refusal: added to h for the order of expansion where the judge refused a goal.
-        max_expansions: ends the search; None for no limit.
-        first_only: the first solution ends the search.
-        max_states: ends the search, to bound memory.
-        report_interval: s between calls of the observer, solutions apart.
+        epsilon: Probability of expanding a random open state.
+        layer: Width of the intervals of h. A random draw takes the best state of a random interval; inf: any state.
+        initial_cost: Stands for G before there is a solution, for the order of expansion only; nothing is pruned by it.
+            inf expands the least h (depth first, fastest); a smaller value weighs the cost so far as well.
+        crowding: Added to h for the order of expansion, per state already expanded in the same crowd. While there is
+            no solution it grows by the same amount with every `patience` expansions.
+        patience: See `crowding`.
+        max_expansions: Limit on the expansions; None: no limit.
+        first_only: Whether the first solution ends the search.
     """
 
     epsilon: float = 0.1
@@ -57,23 +56,22 @@ class AnaStarConfig:
     initial_cost: float = math.inf
     crowding: float = 0.3
     patience: int = 200
-    refusal: float = 3.0
     max_expansions: int | None = None
     first_only: bool = False
-    max_states: int = 700_000
-    report_interval: float = 0.1
 
 
 @dataclass(frozen=True)
 class AnaStarResult(Generic[State]):
-    """Outcome.
+    """Outcome of one search.
 
     Attributes:
-        paths: every solution, in the order of their finding; costs fall strictly.
+        paths: Every solution, in the order in which they were found; their costs fall strictly.
         stopped_by: "exhausted" (nothing left that could improve), "time", "expansions", "memory" or "solution".
-        lower_bound: no path can cost less (with h admissible).
-        seconds, expansions, states: spent and known.
-        expanded: states in order of expansion.
+        lower_bound: No path can cost less, if h is admissible.
+        seconds: Wall-clock time of the search.
+        expansions: Number of states that were expanded.
+        states: Number of states that became known.
+        expanded: States in their order of expansion.
     """
 
     paths: tuple[Path[State], ...]
@@ -89,11 +87,11 @@ class AnaStar(Generic[State]):
     """One search. Make it, call `run` once.
 
     Args:
-        problem: the graph.
-        rng: for the random expansions.
-        config: settings.
-        judge: has the last word on an edge that reaches a goal: returns it, or another edge in its place (a different
-            cost or payload), or None: then the search goes on from there.
+        problem: The graph.
+        rng: Generator of the random expansions.
+        config: Settings; the default ones where None.
+        judge: Asked about every edge that reaches a goal. It returns that edge, or another edge in its place (with a
+            different cost or payload), or None. After None the search goes on from there.
     """
 
     def __init__(
@@ -107,13 +105,10 @@ class AnaStar(Generic[State]):
         self._config = config or AnaStarConfig()
         self._best = math.inf  # G
         self._index: dict[State, int] = {}
-        self._state: list[State] = []
+        self._edge: list[Edge[State]] = []  # by which each node was reached
         self._g: list[float] = []
         self._h: list[float] = []
         self._parent: list[int] = []
-        self._edge_cost: list[float] = []  # from the parent
-        self._payload: list[Any] = []
-        self._delay: list[float] = []
         self._crowd: list[Hashable] = []
         self._expanded_in: dict[Hashable, int] = {}
         self._open = OpenList(self._g, self._h, self._config.layer)
@@ -126,8 +121,8 @@ class AnaStar(Generic[State]):
         """Search until nothing can improve, or a limit is reached.
 
         Args:
-            time_limit: s.
-            observer: told of every solution, and of progress now and then.
+            time_limit: Wall-clock limit in s.
+            observer: Told of every solution, and of progress every 0.1 s.
         """
         began = time.perf_counter()
         config, paths, expanded = self._config, [], []
@@ -148,7 +143,7 @@ class AnaStar(Generic[State]):
                 stopped_by = "solution"
             elif config.max_expansions is not None and len(expanded) >= config.max_expansions:
                 stopped_by = "expansions"
-            elif len(self._state) >= config.max_states:
+            elif len(self._edge) >= _MAX_STATES:
                 stopped_by = "memory"
             if stopped_by != "exhausted":
                 break
@@ -158,7 +153,7 @@ class AnaStar(Generic[State]):
                 self._open.add(node, self._priority(node))
                 stopped_by = "time"
                 break
-            expanded.append(self._state[node])
+            expanded.append(self._edge[node].state)
             crowd = self._crowd[node]
             self._expanded_in[crowd] = self._expanded_in.get(crowd, 0) + 1
             if not paths:
@@ -168,21 +163,18 @@ class AnaStar(Generic[State]):
                 if path is not None:
                     paths.append(path)
                     break
-            if observer is not None and (now - reported >= config.report_interval or (paths and goals)):
+            if observer is not None and (now - reported >= _REPORT_INTERVAL or (paths and goals)):
                 reported = now
                 bound = paths[-1].bound if paths else math.inf
                 observer(Progress(now, len(expanded), len(self._open), self._best, bound, expanded[-1]))
         seconds = time.perf_counter() - began
         return AnaStarResult(
-            tuple(paths), stopped_by, self._lower_bound(), seconds, len(expanded), len(self._state), tuple(expanded)
+            tuple(paths), stopped_by, self._lower_bound(), seconds, len(expanded), len(self._edge), tuple(expanded)
         )
 
     def _expand(self, node: int) -> list[Edge[State]] | None:
-        """Open the children of a node that may improve; returns the edges to goals instead of opening them.
-
-        None where the problem had no time left.
-        """
-        g, state = self._g[node], self._state[node]
+        """Open the children that may improve and return the edges to goals; None where the problem had no time left."""
+        g, state = self._g[node], self._edge[node].state
         edges = self._problem.expand(state, self._best - g)
         if not edges:
             return None if edges is None else []
@@ -204,27 +196,22 @@ class AnaStar(Generic[State]):
             return
         node = self._index.get(edge.state)
         if node is None:
-            node = len(self._state)
+            node = len(self._edge)
             self._index[edge.state] = node
-            self._state.append(edge.state)
+            self._edge.append(edge)
             self._g.append(g)
             self._h.append(h)
             self._parent.append(parent)
-            self._edge_cost.append(edge.cost)
-            self._payload.append(edge.payload)
-            self._delay.append(edge.delay)
             self._crowd.append(crowd)
         elif g < self._g[node]:
-            self._g[node], self._parent[node] = g, parent
-            self._edge_cost[node], self._payload[node] = edge.cost, edge.payload
-            self._delay[node] = edge.delay
+            self._g[node], self._parent[node], self._edge[node] = g, parent, edge
         else:
             return
         self._open.add(node, self._priority(node))
 
     def _priority(self, node: int) -> float:
-        """Falls as e(s) rises."""
-        g, h = self._g[node], self._h[node] + self._delay[node]
+        """A number that falls as e(s) rises."""
+        g, h = self._g[node], self._h[node] + self._edge[node].delay
         if self._config.crowding > 0:
             h += self._crowding * self._expanded_in.get(self._crowd[node], 0)
         target = self._best if self._best < math.inf else self._config.initial_cost
@@ -245,7 +232,7 @@ class AnaStar(Generic[State]):
             return None
         states, payloads, cost = self._trail(node)
         if self._judge is not None:
-            key = (self._state[node], edge.state)
+            key = (self._edge[node].state, edge.state)
             if key in self._forbidden:
                 return None
             judged = self._judge(states, payloads, edge)
@@ -267,29 +254,27 @@ class AnaStar(Generic[State]):
     def _trail(self, node: int) -> tuple[list[State], list[Any], float]:
         """States from the start to a node, payloads between them and the sum of the edge costs.
 
-        The sum may be less than g: an ancestor may have reopened since.
+        The sum may be less than g, since an ancestor may have reopened in the meantime.
         """
-        states: list[State] = []
-        payloads: list[Any] = []
+        edges: list[Edge[State]] = []
         cost = 0.0
         while node >= 0:
-            states.append(self._state[node])
-            payloads.append(self._payload[node])
-            cost += self._edge_cost[node]
+            edges.append(self._edge[node])
+            cost += edges[-1].cost
             node = self._parent[node]
-        return states[::-1], payloads[-2::-1], cost
+        return [edge.state for edge in edges[::-1]], [edge.payload for edge in edges[-2::-1]], cost
 
     def _refuse(self, node: int, edge: Edge[State]) -> None:
         """Open a goal at which the judge would not end, as a state on the way to another one."""
         h = float(self._problem.heuristic([edge.state])[0])
         crowd = self._problem.crowd([edge.state])[0]
-        later = edge._replace(delay=edge.delay + self._config.refusal)
+        later = edge._replace(delay=edge.delay + _REFUSAL)
         self._improve(later, self._g[node] + edge.cost, h, node, crowd)
 
     def _lower_bound(self) -> float:
         """Least g + h of the open states, or G: no path costs less.
 
-        G over it is never above ANA*'s own bound max e(s), since G <= g + e h <= e (g + h) for e >= 1.
+        G over it never exceeds ANA*'s own bound max e(s), since G <= g + e h <= e (g + h) for e >= 1.
         """
         return min(self._best, min((self._g[node] + self._h[node] for node in self._open), default=math.inf))
 

@@ -1,4 +1,4 @@
-"""Graphs that are given by what can be reached from where, and what a search in them finds."""
+"""Graphs that are given by the edges out of each state, and what a search in them finds."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class Edge(NamedTuple, Generic[State]):
     """A way out of a state.
 
     Attributes:
-        state: where it leads.
-        cost: >= 0.
-        payload: anything the caller wants to find in the path.
-        delay: >= 0; added to the state's h for the order of expansion: pruning and bounds keep the true h.
+        state: The state to which it leads.
+        cost: Cost, >= 0.
+        payload: Anything that the caller wants to find in the path.
+        delay: Number >= 0, added to the state's h for the order of expansion. Pruning and bounds keep the true h.
     """
 
     state: State
@@ -29,7 +29,7 @@ class Edge(NamedTuple, Generic[State]):
 
 
 class SearchProblem(Protocol[State]):
-    """A graph, given by what can be reached from where."""
+    """A graph, given by the edges out of each state."""
 
     def start(self) -> State:
         """The state in which the search begins."""
@@ -51,12 +51,12 @@ class SearchProblem(Protocol[State]):
         ...
 
     def crowd(self, states: Sequence[State]) -> Sequence[Hashable]:
-        """What each state has in common with those like it."""
+        """A key for each state; similar states share it."""
         ...
 
 
 Judge = Callable[[Sequence[State], Sequence[Any], Edge[State]], Edge[State] | None]
-"""Of an edge that reaches a goal, told the states before it and the payloads of the edges between them."""
+"""Judges an edge to a goal; also gets the states before it and the payloads between them. See `AnaStar`."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +64,12 @@ class Path(Generic[State]):
     """A solution.
 
     Attributes:
-        states: from the start to a goal.
-        payloads: of the len(states) - 1 edges between them.
-        cost: sum of the edge costs.
-        bound: the cost is at most so many times the least one, by what was known when it was found; inf where the
-            heuristic says nothing.
-        seconds: since the search began.
-        expansions: before it was found.
+        states: States from the start to a goal.
+        payloads: Payloads of the len(states) - 1 edges between them.
+        cost: Sum of the edge costs.
+        bound: The cost is at most this multiple of the least one; inf where the heuristic says nothing.
+        seconds: Time from the start of the search until it was found.
+        expansions: Number of expansions until it was found.
     """
 
     states: tuple[State, ...]
@@ -86,12 +85,12 @@ class Progress(Generic[State]):
     """How a search is going.
 
     Attributes:
-        seconds: since it began.
-        expansions: so far.
-        open: states waiting.
-        cost: of the best solution, inf without one.
-        bound: of the best solution when it was found.
-        state: expanded last.
+        seconds: Time since it began.
+        expansions: Number of expansions so far.
+        open: Number of states that wait.
+        cost: Cost of the best solution; inf without one.
+        bound: Bound of the best solution when it was found.
+        state: The state that was expanded last.
     """
 
     seconds: float

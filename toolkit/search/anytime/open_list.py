@@ -15,26 +15,26 @@ Priority = Callable[[int], float]
 class OpenList:
     """Open nodes, sorted by a priority that may rise while they wait; the least is the best.
 
-    Random draws are uniform, or, with layers, take the best node of a random layer: of those nodes whose h lies in the
-    same interval. So every depth of the search gets its share, however many nodes are open at the others.
+    Random draws are uniform. With layers, a random draw takes the best node of a random layer, which holds the nodes
+    whose h lies in the same interval. So every depth of the search gets its share of the draws.
 
-    Whoever takes a node brings the function that gives its priority now: held here, it would tie the search and the
-    list into a circle, which keeps all their memory until the garbage collector comes round.
+    The caller passes the function that gives a node's priority now. If the list held it, search and list would refer
+    to each other, and their memory would stay until the garbage collector runs.
 
     Args:
-        g: of every node, kept up to date by the search: a node that has a lower one since it was added was added again.
-        h: of every node.
-        layer: width of the intervals of h; inf: uniform draws.
+        g: g of every node, kept up to date by the search. A node whose g falls must be added again.
+        h: h of every node.
+        layer: Width of the intervals of h; inf: uniform draws.
 
     Reference:
-        layers: Xie, Mueller, Holte, Imai: Type-based exploration with multiple search queues for satisficing planning,
+        Layers: Xie, Mueller, Holte, Imai: Type-based exploration with multiple search queues for satisficing planning,
         AAAI 2014.
     """
 
     def __init__(self, g: Sequence[float], h: Sequence[float], layer: float):
         self._g, self._h, self._layer = g, h, layer
-        self._nodes: list[int] = []  # in no order, for random draws
-        self._place: dict[int, int] = {}  # of each node in _nodes
+        self._nodes: list[int] = []  # unsorted, for random draws
+        self._place: dict[int, int] = {}  # index of each node in _nodes
         self._heap: list[_Entry] = []
         self._layers: dict[int, list[_Entry]] = {}
         self._pushes = 0
@@ -46,7 +46,7 @@ class OpenList:
         return iter(self._nodes)
 
     def add(self, node: int, priority: float) -> None:
-        """Open a node, or sort it in again."""
+        """Open a node, or give it a new place."""
         if node not in self._place:
             self._place[node] = len(self._nodes)
             self._nodes.append(node)
@@ -56,13 +56,13 @@ class OpenList:
             heapq.heappush(self._layers.setdefault(self._layer_of(node), []), entry)
 
     def take_best(self, priority: Priority) -> int:
-        """Close the best node."""
+        """Close the best node and return it."""
         node = self._take(self._heap, priority)
         assert node is not None  # every open node has a fresh entry
         return node
 
     def take_random(self, rng: np.random.Generator, priority: Priority) -> int:
-        """Close a random node; see the class."""
+        """Close a random node and return it; see the class."""
         if self._layer == math.inf:
             node = self._nodes[int(rng.integers(len(self._nodes)))]
             self._close(node)
@@ -76,7 +76,7 @@ class OpenList:
             del self._layers[layer]
 
     def reset(self, nodes: Iterable[int], priority: Priority) -> None:
-        """Keep these nodes alone and sort them anew."""
+        """Keep only these nodes and sort them again."""
         self._nodes = list(nodes)
         self._place = {node: place for place, node in enumerate(self._nodes)}
         self._heap, self._layers = [], {}
@@ -90,7 +90,7 @@ class OpenList:
 
     def _entry(self, node: int, priority: float) -> _Entry:
         self._pushes += 1
-        # Equal priorities: the newest first, which keeps the search going in depth.
+        # Of equal priorities the newest comes first, which keeps the search going in depth.
         return priority, -self._pushes, node, self._g[node]
 
     def _layer_of(self, node: int) -> int:
@@ -103,7 +103,7 @@ class OpenList:
             if node not in self._place or g != self._g[node]:
                 continue
             now = current(node)
-            if now > priority:  # it has become worse since: back with it
+            if now > priority:  # it has become worse since
                 heapq.heappush(heap, (now, order, node, g))
                 continue
             self._close(node)

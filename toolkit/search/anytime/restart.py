@@ -1,7 +1,7 @@
-"""Searches in turn: a hasty one for a first sequence, then a patient one from the start again.
+"""Searches in turn: a hasty one for a first sequence, then a patient one that begins again at the start.
 
-What gets to a goal soonest is seldom what holds: the hasty search would go on around its own first sequence, so the
-patient one does not build on it.
+The sequence that is found first is seldom one that holds. The hasty search would go on around its own first sequence,
+so the patient one does not build on it.
 
 Reference:
     Richter, Thayer, Ruml: The joy of forgetting: faster anytime search via restarting, ICAPS 2010.
@@ -26,19 +26,21 @@ def search_in_turn(
     time_limit: float,
     observer: Callable[[Progress[State]], None] | None = None,
 ) -> tuple[AnaStarResult[State], int]:
-    """Run one search after the other, each from the start; no later one where one ran out of time, or of all states.
+    """Run one search after the other, each from the start.
+
+    No later search runs where one ran out of time, or looked at every state of the whole graph.
 
     Args:
-        searches: graph and settings of each; graphs before the last one are the same, or parts of it.
-        rng: for the random expansions of the last search; those before it have streams of their own, so that they do
-            not change what it finds.
-        judge: see `AnaStar`.
-        time_limit: s, for all together.
-        observer: told of the progress of all as if they were one; its cost is the best of all so far.
+        searches: Graph and settings of each. The graphs before the last one are the same, or parts of it.
+        rng: Generator of the last search. Those before it get generators of their own, so that they do not change
+            what the last one finds.
+        judge: See `AnaStar`.
+        time_limit: Limit in s for all of them together.
+        observer: Told of the progress of all as if they were one; its cost is the best of all so far.
 
     Returns:
-        All paths in the order of their finding, whose costs fall strictly within each search; and how many of them are
-        of searches before the last one.
+        The result of all, whose paths are in the order in which they were found (costs fall strictly within each
+        search), and the number of paths that come from searches before the last one.
     """
     paths: list[Path[State]] = []
     expanded: list[State] = []
@@ -46,7 +48,7 @@ def search_in_turn(
     result: AnaStarResult[State] | None = None
     for (problem, config), generator in zip(searches, [*rng.spawn(len(searches) - 1), rng], strict=True):
         early, whole, before = len(paths), problem is searches[-1][0], len(expanded)
-        # Of a part of the graph the bound holds for that part: of the whole one only what h says at the start is known.
+        # The bound of a part of the graph does not hold for the whole one: there only h of the start is known.
         least = 0.0 if whole else float(problem.heuristic([problem.start()])[0])
         best = min(paths, key=lambda path: path.cost, default=None)
         tell = None if observer is None else partial(_tell, observer, seconds, before, best, least)
@@ -71,7 +73,7 @@ def _tell(
     least: float,
     progress: Progress[State],
 ) -> None:
-    """Tell of the progress of a search as if it had gone on from the searches before it and from their best path."""
+    """Report the progress of a search as if it continued the searches before it and their best path."""
     progress = replace(progress, bound=_loosened(progress.bound, progress.cost, least))
     if best is not None and best.cost < progress.cost:
         progress = replace(progress, cost=best.cost, bound=best.bound)
@@ -79,5 +81,5 @@ def _tell(
 
 
 def _loosened(bound: float, cost: float, least: float) -> float:
-    """A bound on suboptimality where no path costs less than `least`, if that is more."""
+    """The bound on suboptimality, given that no path costs less than `least`; never below `bound`."""
     return max(bound, cost / least) if least > 0.0 else bound

@@ -13,7 +13,7 @@ LEVELS = 4  # heights kept per cell
 
 @compiled
 def _add_level(levels, z, merge):
-    """Note a height in a list that falls, -inf where free; of close heights the highest stays."""
+    """Enter a height in a falling list whose free places are -inf; of heights closer than `merge` the highest stays."""
     for k in range(len(levels)):
         if abs(levels[k] - z) < merge:
             levels[k] = max(levels[k], z)
@@ -27,7 +27,7 @@ def _add_level(levels, z, merge):
 
 @compiled(kept=True)
 def sole_levels(corner, cell, half, offsets, merge, table, result):
-    """Fill heights (nx, ny, 4) at which a sole has room in each cell, in any of four headings, with a small shift."""
+    """Fill heights (nx, ny, 4) in m at which a slightly shifted sole has room in each cell, in any of four headings."""
     for a in range(result.shape[0]):
         for b in range(result.shape[1]):
             for k in range(len(offsets)):
@@ -51,7 +51,7 @@ def sole_levels(corner, cell, half, offsets, merge, table, result):
 
 @compiled(kept=True)
 def spread(levels, disc, merge, result):
-    """Add to a copy of the heights of each cell those of the cells around it, the nearer before the farther."""
+    """Add to a copy of the heights (nx, ny, 4) of each cell those of the cells around it, the nearest first."""
     for a in range(levels.shape[0]):
         for b in range(levels.shape[1]):
             for k in range(len(disc)):
@@ -72,7 +72,7 @@ def spread(levels, disc, merge, result):
 
 @compiled(kept=True)
 def number_nodes(levels, corner, cell, occupancy, box, nodes):
-    """Number in (nx, ny, 4, yaws) nodes the cells in which the body fits; returns how many there are."""
+    """Number the cells in which the body fits, in nodes (nx, ny, 4, yaws), and return their number."""
     count = 0
     yaws = nodes.shape[3]
     for a in range(levels.shape[0]):
@@ -91,9 +91,9 @@ def number_nodes(levels, corner, cell, occupancy, box, nodes):
 
 @compiled(kept=True)
 def link_nodes(nodes, levels, cell, climb, turn, start, end, weight):
-    """Compressed rows of the grid graph; every edge goes both ways.
+    """Compressed rows of the grid graph, whose edges all go both ways.
 
-    Fills start (count + 1,) and returns the number of edges; with room for them also their ends and lengths.
+    Fills start (count + 1,) and returns the number of edges; fills their ends and lengths where there is room for them.
     """
     used = 0
     yaws = nodes.shape[3]
@@ -128,7 +128,7 @@ def link_nodes(nodes, levels, cell, climb, turn, start, end, weight):
 
 @compiled
 def _cell_value(height, distance, i, j, z, layer, span):
-    """Least distance of a cell over the yaw layers around one, at the level nearest to a height."""
+    """Least distance of a cell over the `span` yaw layers on either side of one, at the level nearest to a height."""
     if i < 0 or j < 0 or i >= height.shape[0] or j >= height.shape[1]:
         return np.inf
     level = 0
@@ -145,7 +145,7 @@ def _cell_value(height, distance, i, j, z, layer, span):
 
 @compiled(kept=True)
 def query(position, yaw, corner, cell, height, distance, result):
-    """Fill distances (n,), interpolated between cells; others near stand in where the four around are blocked."""
+    """Fill distances (n,) in m, interpolated between the four cells around; where these are blocked, others near by."""
     yaws = distance.shape[3]
     for row in range(len(position)):
         x, y = (position[row, 0] - corner[0]) / cell, (position[row, 1] - corner[1]) / cell

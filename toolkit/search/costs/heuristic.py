@@ -1,14 +1,14 @@
-"""How far it is to the goal for a floating box on an SE(2) grid (paper, Sec. V).
+"""Distance to the goal for a floating box on an SE(2) grid (paper, Sec. V).
 
-Cells are 8-connected in XY with free turning in place. A cell counts where a sole finds a surface within half a stride
-(so that gaps up to the longest stride can be crossed, wider ones not) and the body fits above it. Since ground can
+Cells are 8-connected in XY with free turning in place. A cell counts where the body fits above it and a sole finds a
+surface within half a stride. So gaps up to the longest stride can be crossed, wider ones not. Since ground can
 lie above ground, a cell has one node for each height. Dijkstra runs once, from all cells in the goal region.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -21,7 +21,7 @@ from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.world import Goal
 
 _CELL = 0.1  # m; larger where the world would need more than _MAX_CELLS
-_MAX_CELLS = 200_000  # in XY
+_MAX_CELLS = 200_000  # cells in XY
 _YAWS = 8  # layers over half a turn (the box is the same both ways)
 CLIMB = 0.35  # m; largest change of height between neighbouring cells
 _MERGE = 0.3  # m; heights in one cell that differ by less are one
@@ -29,17 +29,13 @@ _TURN = 1e-4  # m; cost of one yaw layer, only there to prefer straight ways
 _OCTILE = 1.0 / 1.0823923  # largest ratio of 8-connected to straight distance, inverted: keeps the estimate low
 
 
-class Distance(Protocol):
-    """Estimates the way to the goal."""
-
-    def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """(n,) m to the goal region from the mean of the feet (n, 3) m with heading (n,) rad; inf: no way."""
-        ...
+Distance = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""(n,) m to the goal region from the mean of the feet (n, 3) m with heading (n,) rad; inf where no way leads there."""
 
 
 @dataclass(frozen=True)
 class EuclideanDistance:
-    """The straight line in XY, which knows nothing of walls and gaps."""
+    """The straight line in XY, which ignores walls and gaps."""
 
     goal: Goal
 
@@ -49,18 +45,10 @@ class EuclideanDistance:
 
 
 class GridDistance:
-    """Distance to the goal on the grid.
-
-    Args:
-        projector: finds where soles have room.
-        occupancy: of the world.
-        box: the body.
-        goal: where to.
-        bounds: (xmin, ymin, xmax, ymax) m of the grid.
-        stride: m; longest step.
+    """Distance to the goal on a grid with bounds (xmin, ymin, xmax, ymax) m, with steps of at most `stride` m.
 
     Attributes:
-        supported: whether any cell in the goal region has a surface for a sole.
+        supported: Whether any cell in the goal region has a surface for a sole.
     """
 
     def __init__(

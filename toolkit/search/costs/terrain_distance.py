@@ -1,4 +1,4 @@
-"""Grid distances over a world's terrain, and what stands in the way where there are none."""
+"""Grid distances over a world's terrain, and messages on what blocks the way."""
 
 from __future__ import annotations
 
@@ -16,15 +16,13 @@ from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.surface import Surface
 from toolkit.world.world import World
 
-_DETOURS = (2.0, 8.0)  # m around start and goal that the grid covers: the larger one where the smaller has no way
+_DETOURS = (2.0, 8.0)  # m around start and goal that the grid covers; the larger where the smaller has no way
 
 
 def resting_surfaces(surfaces: Sequence[Surface], friction: float | None) -> tuple[Surface, ...]:
-    """Surfaces, of which those no longer serve feet that are too steep for a foot to rest on.
+    """Surfaces, of which those that are too steep for a foot to rest on no longer serve feet.
 
-    Args:
-        surfaces: of a world.
-        friction: part of the friction coefficients that may be used; None: nothing changes.
+    A foot may use the part `friction` of the friction coefficients; None: nothing changes.
     """
     if friction is None:
         return tuple(surfaces)
@@ -40,14 +38,9 @@ def resting_surfaces(surfaces: Sequence[Surface], friction: float | None) -> tup
 class TerrainDistance:
     """Builds grid distances for one robot in one world.
 
-    Args:
-        robot: the robot.
-        world: the world.
-        projector: of the robot on the world's surfaces.
-
     Attributes:
-        box: the body.
-        occupancy: what the body can hit, around start and goal.
+        box: The body.
+        occupancy: Cells that the body can hit, around start and goal.
     """
 
     def __init__(self, robot: RobotModel, world: World, projector: Projector):
@@ -101,7 +94,7 @@ class TerrainDistance:
         return float(grid(start.position[None], np.array([start.yaw]))[0])
 
     def obstacle(self, start: Pose, stride: float) -> str:
-        """One line on why nothing leads to the goal."""
+        """One line on what blocks the way to the goal."""
         world = self._world
         x, y = world.goal.position[:2]
         head = f"{world.path}: nothing leads to the goal at ({x:.3g}, {y:.3g})"
@@ -118,7 +111,7 @@ class TerrainDistance:
         )
 
     def too_steep(self, friction: float) -> str:
-        """One line on why nothing leads to the goal for a robot whose feet must rest."""
+        """One line on the ground that is too steep for a robot whose feet must rest."""
         world = self._world
         steep = [s for s in world.surfaces if s.serves_foot and steepness(s.normal[2]) > friction * s.friction]
         worst = max(steep, key=lambda surface: steepness(surface.normal[2]) / surface.friction)
@@ -131,9 +124,9 @@ class TerrainDistance:
         )
 
     def forced_acceleration(self) -> float:
-        """m/s^2; most that the robot gains horizontally, whatever it does, on a foot surface on the way; 0: none.
+        """The most, in m/s^2, that a foot surface on the way forces the robot to accelerate horizontally; 0: none.
 
-        Foot surfaces steeper than their friction angle, on which no foot rests, are what forces it to.
+        Surfaces steeper than their friction angle force it, since no foot can rest on them.
         """
         table, bounds = self._projector.table, self._bounds[0]
         upright = np.clip(table.rotation[:, 2, 2], 1e-6, 1.0)

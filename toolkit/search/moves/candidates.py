@@ -1,9 +1,9 @@
-"""Candidate transitions out of one state: all that pass the screens, dynamics apart."""
+"""Candidate transitions out of one state: all that pass the screens, before their dynamics are judged."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,18 +15,20 @@ from toolkit.search.moves.reasons import Reason
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
 
+_SWING_SPEED = 4.0  # m/s; highest mean speed of a foot
+
 
 @dataclass(frozen=True)
 class Candidates:
     """Transitions out of one state.
 
     Attributes:
-        limb: (n,) int.
+        limb: (n,) int; the limb that moves.
         number: (n,) int; new contact, -1 where a palm breaks.
         contacts: (n, 4) int; contact numbers afterwards.
         centre: (n, 3) m; mean of the feet afterwards.
-        yaw: (n,) rad; its heading.
-        way: (n,) m; of the mean of the feet in XY.
+        yaw: (n,) rad; heading of the mean of the feet afterwards.
+        way: (n,) m; distance that the mean of the feet moves in XY.
         timing: (n,) int; index of the timing.
     """
 
@@ -45,11 +47,6 @@ class Candidates:
         """Some of them, by index or mask; an index may repeat."""
         return Candidates(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
-    def at(self, timing: np.ndarray) -> Candidates:
-        """The same with other timings (n,)."""
-        kept = (getattr(self, name) for name in self.__dataclass_fields__ if name != "timing")
-        return Candidates(*kept, timing=timing)
-
 
 def mean_feet(table: ContactTable, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean of the feet (n, 3) m and its heading (n,) rad of contact numbers (n, 4)."""
@@ -61,35 +58,31 @@ class CandidateGenerator:
     """Makes the candidates of one search.
 
     Args:
-        moves: screened moves of single limbs.
-        table: their contacts.
-        palms: that may be used; others that are in contact have to be broken first.
-        timings: to choose from.
-        swing_speed: m/s; a foot may not have to fly faster on average.
-        exclusions: transitions that later stages rejected.
-        rejected: (len(Reason),) int; candidates that fell, by reason; counted up.
+        moves: Screened moves of single limbs.
+        palms: The palms that may be used. Others that are in contact have to be broken first.
+        timings: The timings to choose from.
+        exclusions: Transitions that later stages rejected.
+        rejected: (len(Reason),) int; counts rejected candidates by reason.
     """
 
     def __init__(
         self,
         moves: MoveGenerator,
-        table: ContactTable,
         palms: Sequence[Limb],
         timings: tuple[Timing, ...],
-        swing_speed: float,
         exclusions: Sequence[Exclusion],
         rejected: np.ndarray,
     ):
-        self._moves, self._table, self._palms = moves, table, palms
+        self._moves, self._table, self._palms = moves, moves.table, palms
         self._exclusions, self._rejected = exclusions, rejected
-        self._ways = swing_speed * np.array([timing.swing for timing in timings])
+        self._ways = _SWING_SPEED * np.array([timing.swing for timing in timings])
 
     def out_of(self, contacts: np.ndarray, last: int) -> Candidates | None:
         """Candidates out of contact numbers (4,) whose limb `last` moved last; None where there are none."""
         limbs: list[np.ndarray] = []
         numbers: list[np.ndarray] = []
         held = [palm for palm in PALMS if contacts[palm] >= 0 and palm not in self._palms]
-        for palm in held:  # of the start, and not to be used
+        for palm in held:  # in contact at the start, and not to be used
             limbs.append(np.array([int(palm)]))
             numbers.append(np.array([-1]))
         for foot in FEET:
@@ -135,10 +128,10 @@ class CandidateGenerator:
 
     def timed(self, contacts: np.ndarray, candidates: Candidates) -> Candidates:
         """Each candidate out of contact numbers (4,) once for every timing that its swing allows."""
-        if len(self._ways) == 1:  # the speed was screened
+        if len(self._ways) == 1:  # the screen of the swings has checked the speed
             return candidates
         table, old = self._table, contacts[candidates.limb]
         way = np.hypot(*(table.position[candidates.number] - table.position[old])[:, :2].T)
         way[(candidates.limb > Limb.RIGHT_FOOT) | (candidates.number < 0)] = 0.0
         rows, timing = np.nonzero(way[:, None] <= self._ways)
-        return candidates.select(rows).at(timing)
+        return replace(candidates.select(rows), timing=timing)

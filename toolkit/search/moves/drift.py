@@ -1,4 +1,4 @@
-"""Where the CoM drifts while a limb moves, by the inverted pendulum: how far a transition must bend the motion.
+"""Drift of the CoM while a limb moves, by the inverted pendulum: how far a transition must bend the motion.
 
 With the weight on a point p of the ground at height h below the CoM, x'' = (x - p) g / h. With p_1 during the shift
 and p_2 during the swing the CoM ends at
@@ -6,9 +6,8 @@ and p_2 during the swing the CoM ends at
     x = x_0 cosh(w T) + v_0 sinh(w T) / w - p_1 (cosh(w T) - cosh(w T_2)) - p_2 (cosh(w T_2) - 1),  w^2 = g / h
 
 so that the CoMs within reach, p_1 and p_2 anywhere under the feet, are an interval along each axis. Transitions whose
-feet lie elsewhere are hardly feasible. Nor are slow ones on ground steeper than its friction angle, where whoever
-stands on one foot gains at least g (sin a - mu cos a) downhill. An estimate for the order in which transitions are
-judged, never a verdict.
+feet lie elsewhere are hardly feasible. Nor are slow ones on ground steeper than its friction angle, where a robot on
+one foot gains at least g (sin a - mu cos a) downhill. The estimate orders the transitions to judge; it rejects nothing.
 """
 
 from __future__ import annotations
@@ -23,28 +22,15 @@ from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
 
 _SLOW = 6.0  # w T beyond which everything is within reach
+_CENTRED = 0.02  # m; miss of feet at the edge of what is within reach; in its middle it is 0
+_BEHIND = 0.25  # m; the farthest that the mean of the feet may stay behind a CoM that slides
 
 
 class Drift:
-    """Drift of the CoM in the transitions of one search.
+    """Drift of the CoM in the transitions of one search, with its contacts and the timings to choose from."""
 
-    Args:
-        robot: the robot.
-        table: contacts.
-        timings: to choose from.
-        centred: m; counts for feet at the edge of what is within reach, in its middle nothing.
-        behind: m; how far the mean of the feet may stay behind a CoM that slides.
-    """
-
-    def __init__(
-        self,
-        robot: RobotModel,
-        table: ContactTable,
-        timings: tuple[Timing, ...],
-        centred: float = 0.02,
-        behind: float = 0.25,
-    ):
-        self._table, self._centred, self._behind = table, centred, behind
+    def __init__(self, robot: RobotModel, table: ContactTable, timings: tuple[Timing, ...]):
+        self._table = table
         self._sole = float(robot.half_sizes[FEET[0]].max())
         self._shift, self._swing = (np.array([getattr(t, name) for t in timings]) for name in ("shift", "swing"))
         rate = float(np.sqrt(-GRAVITY[2] / robot.com_height))
@@ -54,17 +40,13 @@ class Drift:
         self._from_shift, self._from_swing = np.cosh(total) - np.cosh(swing), np.cosh(swing) - 1.0
 
     def miss(self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray, candidates: Candidates) -> np.ndarray:
-        """(n,) m; how far the mean of the feet afterwards lies from where the CoM can drift, and from its middle.
+        """(n,) m; distance of the mean of the feet afterwards from where the CoM can drift, and from its middle.
 
-        Args:
-            contacts: (4,) int; numbers before.
-            com: (3,) m; before.
-            velocity: (3,) m/s.
-            candidates: n of them.
+        The n candidates lead out of contact numbers (4,) with the CoM (3,) m and its velocity (3,) m/s.
         """
         table, k = self._table, candidates.timing
         feet = table.position[contacts[:2], :2]
-        # A foot swings off: the other one carries; while a palm moves both do.
+        # While a foot moves, the other one carries the robot; while a palm moves, both feet do.
         foot = candidates.limb <= 1
         other = feet[np.where(foot, 1 - candidates.limb, 0)]
         low = np.where(foot[:, None], other, feet.min(0)) - self._sole
@@ -77,15 +59,15 @@ class Drift:
         outside = np.maximum(np.maximum(least - centre, centre - most), 0.0)
         off = np.minimum(np.abs(2 * centre - least - most) / (most - least), 1.0)
         slide = self._slide(contacts, com, velocity, candidates)
-        return np.hypot(*outside.T) + self._centred * np.hypot(*off.T) + slide
+        return np.hypot(*outside.T) + _CENTRED * np.hypot(*off.T) + slide
 
     def _slide(self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray, candidates: Candidates) -> np.ndarray:
-        """(n,) m; by how much the CoM must slide beyond the feet."""
+        """(n,) m; distance that the CoM must slide beyond the feet."""
         downhill, gain = self._table.slide(contacts[:2])
         result = np.zeros(len(candidates))
         if not gain.any() or (contacts[2:] >= 0).any():
             return result
-        both = bool(gain.all())  # whoever has one foot at rest need not slide
+        both = bool(gain.all())  # a robot with one foot at rest need not slide
         for foot in FEET:
             rows = np.flatnonzero(candidates.limb == foot)
             stand, k = int(foot.mirrored), candidates.timing[rows]
@@ -94,6 +76,6 @@ class Drift:
             if both:
                 shift = self._shift[k]
                 way += (velocity[:2] @ downhill[stand]) * (shift + t) + gain.min() * (shift**2 / 2 + shift * t)
-            ahead = (com[:2] - candidates.centre[rows, :2]) @ downhill[stand] - self._behind
+            ahead = (com[:2] - candidates.centre[rows, :2]) @ downhill[stand] - _BEHIND
             result[rows] = np.maximum(ahead + way, 0.0)
         return result

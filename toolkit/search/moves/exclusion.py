@@ -1,4 +1,4 @@
-"""Exclusions: contact transitions that later stages rejected, so that the next search keeps away from them."""
+"""Exclusions: contact transitions that later stages rejected, so that the next search avoids them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.geometry.limb import Limb
 
+_RADIUS = 0.03  # m; contacts no farther apart count as the same
+
 
 @dataclass(frozen=True)
 class Exclusion:
-    """A transition out of a stance that proved impossible, and those much like it.
+    """A transition out of a stance that proved impossible; it also stands for those that are nearly the same.
 
     Attributes:
-        limb: that moves.
+        limb: The limb that moves.
         before: (4, 3) m; positions of the contacts before, NaN where there is none.
         target: (3,) m; position of the new contact, NaN where a palm breaks.
     """
@@ -28,7 +30,7 @@ class Exclusion:
 
     @classmethod
     def of(cls, stance: Stance, transition: ContactTransition) -> Exclusion:
-        """Exclusion of a transition from a stance."""
+        """The exclusion of a transition out of a stance."""
         before = np.full((4, 3), np.nan)
         for contact in stance.contacts:
             before[contact.limb] = contact.pose.position
@@ -36,29 +38,23 @@ class Exclusion:
         return cls(transition.limb, before, target)
 
 
-def excluded(
-    exclusions: Sequence[Exclusion], before: np.ndarray, limb: np.ndarray, target: np.ndarray, *, radius: float = 0.03
-) -> np.ndarray:
-    """Which candidates are like an excluded transition.
+def excluded(exclusions: Sequence[Exclusion], before: np.ndarray, limb: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """(n,) bool; which candidates are nearly the same as an excluded transition.
 
     Args:
-        exclusions: to keep away from.
+        exclusions: The transitions to avoid.
         before: (4, 3) m; contacts of the state, NaN where there is none.
-        limb: (n,) int; that moves.
-        target: (n, 3) m; where to, NaN where a palm breaks.
-        radius: m; contacts no farther apart count as the same.
-
-    Returns:
-        (n,) bool.
+        limb: (n,) int; the limb that moves.
+        target: (n, 3) m; position of the new contact, NaN where a palm breaks.
     """
     result = np.zeros(len(limb), bool)
     for item in exclusions:
-        if _near(before, item.before, radius).all():
-            result |= (limb == item.limb) & _near(target, item.target, radius)
+        if _near(before, item.before).all():
+            result |= (limb == item.limb) & _near(target, item.target)
     return result
 
 
-def _near(a: np.ndarray, b: np.ndarray, radius: float) -> np.ndarray:
-    """(...,) bool: points (..., 3) within `radius`, or both absent (NaN)."""
+def _near(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(...,) bool; whether points (..., 3) are the same within `_RADIUS`, or both absent (NaN)."""
     absent = np.isnan(a[..., 0]) & np.isnan(b[..., 0])
-    return absent | (np.linalg.norm(a - b, axis=-1) <= radius)
+    return absent | (np.linalg.norm(a - b, axis=-1) <= _RADIUS)

@@ -1,4 +1,4 @@
-"""Compiled leg checks: which stances the legs can take under a CoM, one at a time, for thousands of candidates."""
+"""Compiled checks of the stances that the legs can take under a CoM, for thousands of candidates."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.moves.reasons import OF_LIMIT, Reason
 from toolkit.search.moves.shanks import legs_apart
 
-_FIELD = tuple(LegPosture._fields.index(limit.quantity) for limit in LIMITS)  # of each limit
+_FIELD = tuple(LegPosture._fields.index(limit.quantity) for limit in LIMITS)  # field of each limit's quantity
 _LENGTH = [limit.quantity for limit in LIMITS].index("length")
 
 
 class Legs(NamedTuple):
-    """Both legs as arrays, margins taken off.
+    """Both legs as arrays, with their margins taken off.
 
     Attributes:
-        hip: (2, 3) m; in the CoM's frame with the heading of the base.
-        ankle: (2, 3) m; in the sole's frame.
-        links: (2, 2) m; thigh and shin.
-        ranges: (2, k, 2) m or rad; in the order of `LIMITS`.
+        hip: (2, 3) m; hips in the CoM's frame with the heading of the base.
+        ankle: (2, 3) m; ankles in the sole's frame.
+        links: (2, 2) m; lengths of thigh and shin.
+        ranges: (2, k, 2) m or rad; least and greatest values in the order of `LIMITS`.
     """
 
     hip: np.ndarray
@@ -43,7 +43,7 @@ class Legs(NamedTuple):
 
 
 def legs_of(robot: RobotModel, margins: ReachMargins) -> Legs:
-    """Arrays of a robot's legs, `margins` inside their limits."""
+    """Arrays of a robot's legs, whose ranges are narrower than the limits by the margins."""
     legs = [robot.legs[limb] for limb in FEET]
     inward = np.array([[getattr(margins, limit.margin)] for limit in LIMITS]) * [1.0, -1.0]
     return Legs(
@@ -58,13 +58,8 @@ def legs_of(robot: RobotModel, margins: ReachMargins) -> Legs:
 def reach(legs, side, com, yaw, position, rotation):
     """The first limit that a leg breaks, as a `Reason`, and its hip, knee and ankle in m, zeros where it is too long.
 
-    Args:
-        legs: both legs.
-        side: 0 left, 1 right.
-        com: three numbers in m; CoM, world.
-        yaw: rad; heading of the base.
-        position: (3,) m; centre of the sole.
-        rotation: (3, 3); world_from_sole.
+    The leg of a side (0 left, 1 right) lies between the CoM com, three numbers in m in the world, and a sole with the
+    centre position (3,) m and the rotation (3, 3) world_from_sole. The heading of the base is yaw in rad.
     """
     heading, ranges = (np.cos(yaw), np.sin(yaw)), legs.ranges[side]
     hip, ankle = hip_at(com, heading, legs.hip[side]), ankle_at(position, rotation, legs.ankle[side])
@@ -83,21 +78,10 @@ def reach(legs, side, com, yaw, position, rotation):
 
 @compiled(kept=True)
 def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, right_rotation):
-    """Per stance why the legs cannot take it, with no drop of the CoM.
+    """(n,) int; why the legs cannot take each of n stances with the first drop, 0 where they can with some drop.
 
-    Args:
-        legs: both legs.
-        shanks: capsules inside them.
-        com: (n, 3) m.
-        drops: (k,) m; the CoM may be lower by any of these.
-        yaw: (n,) rad.
-        left: (n, 3) m; sole centres.
-        left_rotation: (n, 3, 3).
-        right: (n, 3) m.
-        right_rotation: (n, 3, 3).
-
-    Returns:
-        (n,) int; the `Reason` with the first drop, 0 where both legs reach with some drop.
+    The CoMs com (n, 3) m may be lower by any of the drops (k,) m; yaw (n,) rad is the heading of the base. The centres
+    left and right (n, 3) m of the soles come with their rotations (n, 3, 3); shanks (2,) m: see `Body`.
     """
     result = np.zeros(len(com), np.int64)
     for row in range(len(com)):

@@ -8,7 +8,7 @@ import numpy as np
 from toolkit.geometry.pose import Pose
 from toolkit.world.solids import height_field_triangles
 
-_SIDES = 16  # of a prism around a cylinder
+_SIDES = 16  # sides of a prism around a cylinder
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _FACES = np.array(
     [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
@@ -17,17 +17,9 @@ _FACES = np.array(
 
 
 def world_triangles(model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Triangles of all colliding geoms that come near a box.
+    """Triangles (t, 3, 3) m in the world frame of all colliding geoms that come near a box with corners (3,) m.
 
-    Rounded geoms stand as the boxes around them, cylinders as prisms around them.
-
-    Args:
-        model: the world compiled.
-        lower: (3,) m; corner of the box.
-        upper: (3,) m; the other corner.
-
-    Returns:
-        (t, 3, 3) float corners in the world frame.
+    Boxes around rounded geoms and prisms around cylinders stand for these.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -44,7 +36,7 @@ def world_triangles(model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray)
 
 
 def _local(model: mujoco.MjModel, index: int) -> np.ndarray:
-    """(t, 3, 3) triangles of a bounded geom in its own frame."""
+    """(t, 3, 3) m; triangles of a bounded geom in its own frame."""
     kind, size, types = model.geom_type[index], model.geom_size[index], mujoco.mjtGeom
     if kind == types.mjGEOM_MESH:
         mesh = int(model.geom_dataid[index])
@@ -83,7 +75,7 @@ def _local(model: mujoco.MjModel, index: int) -> np.ndarray:
 
 
 def _plane(pose: Pose, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """(2, 3, 3) triangles of an infinite plane, as large as the box needs."""
+    """(2, 3, 3) m; triangles of an infinite plane, as large as the box needs."""
     centre = pose.inverse() @ ((lower + upper) / 2)
     reach = float(np.linalg.norm(upper - lower)) * 2.0
     square = centre * [1, 1, 0] + reach * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])

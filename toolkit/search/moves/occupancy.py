@@ -14,14 +14,15 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.moves.obstacles import world_triangles
 
 _MAX_CELLS = 20_000_000
+_MARGIN = 0.02  # m around the body
 
 
 class BodyBox(NamedTuple):
     """The body from the knees up as an upright box over the mean of the feet.
 
     Attributes:
-        half_depth, half_width: m; along and across the heading.
-        bottom, top: m above the soles.
+        half_depth, half_width: Half extents in m along and across the heading.
+        bottom, top: Heights in m above the soles.
     """
 
     half_depth: float
@@ -30,7 +31,7 @@ class BodyBox(NamedTuple):
     top: float
 
     @classmethod
-    def of(cls, robot: RobotModel, margin: float = 0.02) -> BodyBox:
+    def of(cls, robot: RobotModel) -> BodyBox:
         """The box around torso, head, thighs and shoulders in the home posture; arms may fold in.
 
         Raises:
@@ -61,7 +62,7 @@ class BodyBox(NamedTuple):
         width = max(-low[1], high[1])
         for limb, arm in robot.arms.items():
             width = max(width, abs(arm.shoulder_in_com[1]) + 1.5 * float(robot.half_sizes[limb].min()))
-        return cls(max(-low[0], high[0]) + margin, width + margin, bottom, float(high[2]) + margin)
+        return cls(max(-low[0], high[0]) + _MARGIN, width + _MARGIN, bottom, float(high[2]) + _MARGIN)
 
 
 def _arm_bodies(robot: RobotModel) -> set[int]:
@@ -89,8 +90,8 @@ class Occupancy(NamedTuple):
 
     Attributes:
         corner: (3,) m; lower corner.
-        cell: m; edge of a cell, in all three directions.
-        below: (nx, ny, nz + 1) int16; occupied cells of a column below each height.
+        cell: Edge of a cell in m, in all three directions.
+        below: (nx, ny, nz + 1) int16; number of occupied cells of a column below each height.
     """
 
     corner: np.ndarray
@@ -137,7 +138,7 @@ def body_free(occupancy, box, x, y, z, yaw):
 
 @compiled
 def _clip(points, count, out, axis, bound, sign):
-    """Polygon cut by sign * point[axis] <= sign * bound (Sutherland and Hodgman); returns the number of corners."""
+    """Cut a polygon by sign * point[axis] <= sign * bound (Sutherland and Hodgman); returns the number of corners."""
     kept = 0
     for k in range(count):
         m = k + 1 if k + 1 < count else 0
@@ -165,9 +166,9 @@ def _cells(points, count, axis, most):
 
 @compiled(kept=True)
 def _rasterise(triangles, occupied, work, strip, column):
-    """Mark the cells that triangles (in cell units) touch: clip each to a strip, to a column, then by height.
+    """Mark the cells that triangles, in cell units, touch: clip each to a strip, to a column, then by height.
 
-    `work`, `strip` and `column` are (12, 3) scratch.
+    `work`, `strip` and `column` are scratch (12, 3).
     """
     for t in range(len(triangles)):
         i0, i1 = _cells(triangles[t], 3, 0, occupied.shape[0] - 1)

@@ -1,4 +1,4 @@
-"""Why a candidate contact falls."""
+"""Reasons for which candidates are rejected."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from toolkit.physics.leg import LIMITS
 
 
 class Reason(IntEnum):
-    """Reasons of rejection, numbered from 0, where there is none; kernels and Python write these numbers.
+    """Reasons of rejection, numbered from 0, which stands for none; kernels and Python write these numbers.
 
     Each limit of `toolkit.physics.leg.LIMITS` has the member that is its name in capitals.
 
     Attributes:
-        words: for messages.
-        of_palm: whether it is about palms alone. Palms are an option: where they find no wall is no reason why there
-            is no plan.
+        words: The reason in words, for messages.
+        of_palm: Whether it is about palms alone. Palms are an option, so a lack of walls explains no lack of plans.
     """
 
     words: str
@@ -56,4 +55,4 @@ class Reason(IntEnum):
 
 
 OF_LIMIT = tuple(Reason[limit.name.upper().replace(" ", "_")].value for limit in LIMITS)
-"""The reason of each limit of a leg, in their order."""
+"""The reason of each limit of a leg, in the order of `LIMITS`."""

@@ -1,6 +1,6 @@
-"""Compiled kinematic screens: which candidate contacts a body could serve at all, before anything else is asked.
+"""Compiled kinematic screens: the candidate contacts that a body could serve at all. They come before other checks.
 
-Each gives a code per candidate, which is a `Reason`: 0 where it passes.
+Each screen gives a code per candidate, which is a `Reason`: 0 where the candidate passes.
 """
 
 from __future__ import annotations
@@ -14,17 +14,19 @@ from toolkit.geometry.heading import mean_heading, wrapped
 from toolkit.search.moves.legs import Legs, reach
 from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
 from toolkit.search.moves.reasons import Reason
-from toolkit.search.moves.shanks import Shanks, leg_free, legs_apart
+from toolkit.search.moves.shanks import leg_free, legs_apart
+
+_SHIFTS = (0.0, -0.25, 0.25)  # parts of the way from one sole to the other, from their middle, where the CoM may be
 
 
 class Soles(NamedTuple):
     """New soles.
 
     Attributes:
-        surface: (n,) int; -1 where the projection found none.
-        position: (n, 3) m.
-        rotation: (n, 3, 3).
-        yaw: (n,) rad.
+        surface: (n,) int; surface, -1 where the projection found none.
+        position: (n, 3) m; centre.
+        rotation: (n, 3, 3); world_from_sole.
+        yaw: (n,) rad; heading.
     """
 
     surface: np.ndarray
@@ -34,13 +36,7 @@ class Soles(NamedTuple):
 
 
 class Sole(NamedTuple):
-    """One sole in contact.
-
-    Attributes:
-        position: (3,) m.
-        rotation: (3, 3).
-        yaw: rad.
-    """
+    """One sole in contact, with its centre (3,) m, rotation world_from_sole (3, 3) and heading in rad."""
 
     position: np.ndarray
     rotation: np.ndarray
@@ -48,37 +44,35 @@ class Sole(NamedTuple):
 
 
 class Body(NamedTuple):
-    """What of the robot the screens know, and the world that it may hit.
+    """The robot as the screens see it, and the world that it may hit.
 
     Attributes:
-        legs: both legs.
-        shanks: capsules inside them.
-        box: the body from the knees up.
-        occupancy: of the world.
+        legs: Both legs.
+        shanks: (2,) m; radius of the capsules inside thighs and shins.
+        box: The body from the knees up.
+        occupancy: Occupied cells of the world.
     """
 
     legs: Legs
-    shanks: Shanks
+    shanks: np.ndarray
     box: BodyBox
     occupancy: Occupancy
 
 
 class StepLimits(NamedTuple):
-    """Where soles and CoM may be in a step.
+    """Limits on soles and CoM in a step.
 
     Attributes:
-        half: (2,) m; half extents of a sole with half the distance that must stay between two.
-        climb: m; largest difference of height.
-        com_height: m; of the CoM above the mean of the soles, standing straight.
-        drops: (k,) m; how much lower the CoM may be.
-        shifts: (m,) parts of the way from one sole to the other, from their middle, where the CoM may be.
+        half: (2,) m; half extents of a sole, with half the distance that must stay between two of them.
+        climb: Largest difference of height in m.
+        com_height: Height in m of the CoM above the mean of the soles, standing straight.
+        drops: (k,) m by which the CoM may be lower.
     """
 
     half: np.ndarray
     climb: float
     com_height: float
     drops: np.ndarray
-    shifts: np.ndarray
 
 
 @compiled
@@ -95,12 +89,12 @@ def rectangles_overlap(ax, ay, ayaw, bx, by, byaw, hx, hy):
 
 @compiled
 def _legs_code(body, limits, side, position, rotation, stand, heading):
-    """Why the legs cannot stand on a new sole and a standing one, whatever the CoM may do; 0 where they can."""
+    """Why the legs cannot stand on a new sole and a standing one with any allowed CoM; 0 where they can."""
     p, q = position, stand.position
     x, y, z = (p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2 + limits.com_height
     code = 0
-    for m in range(len(limits.shifts)):
-        cx, cy = x + limits.shifts[m] * (p[0] - q[0]), y + limits.shifts[m] * (p[1] - q[1])
+    for m in range(len(_SHIFTS)):
+        cx, cy = x + _SHIFTS[m] * (p[0] - q[0]), y + _SHIFTS[m] * (p[1] - q[1])
         for k in range(len(limits.drops)):
             com = (cx, cy, z - limits.drops[k])
             broken, new = reach(body.legs, side, com, heading, p, rotation)
@@ -121,15 +115,9 @@ def _legs_code(body, limits, side, position, rotation, stand, heading):
 
 @compiled(kept=True)
 def screen_steps(soles, side, stand, limits, body, codes):
-    """Fill codes (n,) of new soles beside a standing one, whatever the CoM may do.
+    """Fill codes (n,) int of new `Soles` beside a standing `Sole`, for all CoMs within `StepLimits`.
 
-    Args:
-        soles: n `Soles`.
-        side: of the new soles: 0 left, 1 right.
-        stand: the standing `Sole`.
-        limits: `StepLimits`.
-        body: `Body`.
-        codes: (n,) int; filled.
+    The side is that of the new soles: 0 left, 1 right.
     """
     half, q = limits.half, stand.position
     for row in range(len(codes)):
@@ -151,18 +139,10 @@ def screen_steps(soles, side, stand, limits, body, codes):
 
 @compiled(kept=True)
 def screen_swings(position, yaw, old, stand, half, longest, still, still_yaw, codes):
-    """Fill codes of swings of a foot from its old place past the standing one.
+    """Fill codes (n,) int of swings of a foot from the `Sole` `old` past the standing one `stand`.
 
-    Args:
-        position: (n, 3) m; new soles.
-        yaw: (n,) rad.
-        old: the `Sole` before.
-        stand: the standing `Sole`.
-        half: (2,) m; as in `StepLimits`.
-        longest: m; longest way in XY.
-        still: m; a shorter way is no movement, unless it turns by more than `still_yaw`.
-        still_yaw: rad.
-        codes: (n,) int; filled.
+    The new soles have centres position (n, 3) m and headings yaw (n,) rad; `half` is that of `StepLimits`. No way in XY
+    may be longer than `longest` m. A way shorter than `still` m with a turn below `still_yaw` rad is no movement.
     """
     p, q = old.position, stand.position
     for row in range(len(yaw)):
@@ -199,15 +179,15 @@ def screen_palms(
 
     Args:
         surface: (n,) int; -1 where the projection found none.
-        position: (n, 3) m.
-        normal: (n, 3).
-        shoulder: (3,) m.
+        position: (n, 3) m; centres of the palms.
+        normal: (n, 3); normals of the surfaces.
+        shoulder: (3,) m; the arm's shoulder.
         centre: (3,) m; mean of the feet.
-        yaw: rad; heading of the body.
+        yaw: Heading of the body in rad.
         sign: +1 for the left palm, -1 for the right one.
-        reach: m; least and greatest distance from the shoulder.
-        side: m; least distance to the side of the body's middle.
-        facing: cosine of the largest angle between the arm and the surface's normal.
+        reach: Least and greatest distance in m from the shoulder.
+        side: Least distance in m to the side of the body's middle.
+        facing: Cosine of the largest angle between the arm and the surface's normal.
     """
     codes = np.zeros(len(surface), np.int64)
     arm = position - shoulder

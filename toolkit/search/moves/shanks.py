@@ -1,13 +1,11 @@
 """Compiled checks of thighs and shins as capsules: against the world and against each other.
 
 Capsules lie between the hip, the knee and the ankle of a leg that reaches (`toolkit.search.moves.legs.reach`).
-Against the world a capsule is a row of balls on the occupancy grid. Half a cell is taken off their radius, since cells
-count as occupied that are only touched; inverse kinematics has the last word.
+Against the world a capsule is a row of balls on the occupancy grid. Half a cell is taken off their radius, since a cell
+counts as occupied that is only touched; inverse kinematics checks it exactly.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -17,29 +15,17 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.physics.leg import distance
 from toolkit.robot.model import RobotModel
 
-
-class Shanks(NamedTuple):
-    """Capsules inside both legs.
-
-    Attributes:
-        radius: (2,) m; of thigh and shin.
-        free: (2,) part of each link, thigh and shin from the knee on, that is checked.
-        slack: m; legs may overlap by this much, since the base may turn to help.
-    """
-
-    radius: np.ndarray
-    free: np.ndarray
-    slack: float
+_FREE = (0.6, 0.75)  # part of thigh and shin, from the knee on, that is checked
+_SLACK = 0.01  # m by which legs may overlap, since the base may turn to help
 
 
-def shanks_of(robot: RobotModel, slack: float = 0.01) -> Shanks:
-    """Capsules of a robot's legs: as thick as the thinner side of the thickest long geom that collides."""
-    radius = np.min([_radii(robot, limb) for limb in FEET], axis=0)
-    return Shanks(radius, np.array([0.6, 0.75]), slack)
+def shanks_of(robot: RobotModel) -> np.ndarray:
+    """(2,) m; radius of the capsules inside thighs and shins: half the thinner side of the thickest long geom there."""
+    return np.min([_radii(robot, limb) for limb in FEET], axis=0)
 
 
 def _radii(robot: RobotModel, limb: Limb) -> np.ndarray:
-    """(2,) m; of a leg's thigh and shin, 0 where nothing there collides."""
+    """(2,) m; radius of a leg's thigh and shin, 0 where nothing there collides."""
     model, leg = robot.mujoco_model, robot.legs[limb]
     body = model.body(robot.limbs[limb].body).id
     joints: list[int] = []
@@ -83,20 +69,14 @@ def _between(a, b, t):
 
 @compiled
 def leg_free(occupancy, shanks, points):
-    """Whether the checked parts of both links, from the knee on, meet no occupied cell.
-
-    Args:
-        occupancy: of the world.
-        shanks: capsules.
-        points: hip, knee and ankle, three numbers in m each.
-    """
+    """Whether the checked parts of both links of a leg (hip, knee and ankle in m) meet no occupied cell."""
     knee = points[1]
     for link in range(2):
         end = points[2 * link]
-        balls = int(np.ceil(distance(end, knee) * shanks.free[link] / occupancy.cell)) + 1
+        balls = int(np.ceil(distance(end, knee) * _FREE[link] / occupancy.cell)) + 1
         for b in range(balls):
-            x, y, z = _between(knee, end, shanks.free[link] * b / (balls - 1))
-            if not ball_free(occupancy, x, y, z, shanks.radius[link]):
+            x, y, z = _between(knee, end, _FREE[link] * b / (balls - 1))
+            if not ball_free(occupancy, x, y, z, shanks[link]):
                 return False
     return True
 
@@ -123,12 +103,12 @@ def segment_distance(a, b, p, q):
 
 @compiled
 def legs_apart(shanks, left, right):
-    """Whether two legs, hip, knee and ankle each, keep their links apart: knees, shins and the lower thighs."""
-    ends_left = (_between(left[1], left[0], shanks.free[0]), left[2])
-    ends_right = (_between(right[1], right[0], shanks.free[0]), right[2])
+    """Whether two legs (hip, knee and ankle in m) keep their links apart: knees, shins and the lower thighs."""
+    ends_left = (_between(left[1], left[0], _FREE[0]), left[2])
+    ends_right = (_between(right[1], right[0], _FREE[0]), right[2])
     for i in range(2):
         for j in range(2):
-            least = shanks.radius[i] + shanks.radius[j] - shanks.slack
+            least = shanks[i] + shanks[j] - _SLACK
             if segment_distance(left[1], ends_left[i], right[1], ends_right[j]) < least:
                 return False
     return True

@@ -8,29 +8,20 @@ from toolkit.contacts.projection import shifts
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import WorldError
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.robot.model import RobotModel
 from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reasons import Reason
-from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.world import PALM_SITE_REACH, PALM_SITES, World
 
-_SEARCH, _STEP = 0.1, 0.02  # m; how far from the point nearest to its site a palm may start
+_SEARCH, _STEP = 0.1, 0.02  # m; farthest from the point nearest to its site that a palm may start, and the grid's step
 
 
-def with_palms(robot: RobotModel, world: World, feet: Stance, moves: MoveGenerator, table: ContactTable) -> Stance:
-    """The start stance with the palms that the world asks for, each as near to its site as it can be held.
-
-    Args:
-        robot: the robot.
-        world: its sites say which palms.
-        feet: stance of the feet.
-        moves: projects and screens palms.
-        table: of `moves`.
+def with_palms(world: World, feet: Stance, moves: MoveGenerator) -> Stance:
+    """The start stance with the palms that the world's sites ask for, each as near to its site as it can be held.
 
     Raises:
-        WorldError: the robot has no such arm, or it cannot hold its palm there.
+        WorldError: The robot has no such arm, or it cannot hold its palm there.
     """
-    left, right = (table.add_contact(feet[foot]) for foot in FEET)
+    robot, (left, right) = moves.robot, (moves.table.add_contact(feet[foot]) for foot in FEET)
     stance = feet
     for limb, site in world.start_palms.items():
         if limb not in robot.arms:
@@ -38,23 +29,13 @@ def with_palms(robot: RobotModel, world: World, feet: Stance, moves: MoveGenerat
                 f"{world.path}: site '{PALM_SITES[limb]}' asks for a palm that robot {robot.name} does not have; "
                 "remove the site, or take a robot with such an arm"
             )
-        reach = robot.arms[limb].max_reach
-        stance = stance.replace(_placed(world, limb, site, reach, moves, table, left, right))
+        stance = stance.replace(_placed(world, limb, site, moves, left, right))
     return stance
 
 
-def _placed(
-    world: World,
-    limb: Limb,
-    site: np.ndarray,
-    reach: float,
-    moves: MoveGenerator,
-    table: ContactTable,
-    left: int,
-    right: int,
-) -> Contact:
-    """The palm's contact nearest to its site (3,) m, with the feet at `left` and `right`; the arm reaches `reach` m."""
-    shoulder = moves.shoulder(limb, left, right)
+def _placed(world: World, limb: Limb, site: np.ndarray, moves: MoveGenerator, left: int, right: int) -> Contact:
+    """The palm's contact nearest to its site (3,) m, with the feet at `left` and `right`."""
+    shoulder, reach = moves.shoulder(limb, left, right), moves.robot.arms[limb].max_reach
     rays = _points(world, site) - shoulder
     distance = np.maximum(np.linalg.norm(rays, axis=1), 1e-9)
     palms, codes = moves.aimed(limb, left, right, rays / distance[:, None])
@@ -62,7 +43,7 @@ def _placed(
     far = np.linalg.norm(palms.position - site, axis=1)  # what is hit before the point may be elsewhere
     codes[(codes == 0) & (far > PALM_SITE_REACH + _SEARCH)] = Reason.NO_WALL
     if not (codes == 0).any():
-        code = Reason.POSTURE if (codes == Reason.POSTURE).any() else codes[0]  # how far any came, or the nearest point
+        code = Reason.POSTURE if (codes == Reason.POSTURE).any() else codes[0]  # the last screen, or the nearest point
         at, above = (f"({x:.3g}, {y:.3g}, {z:.3g})" for x, y, z in (site, shoulder))
         raise WorldError(
             f"{world.path}: the {limb.label.replace('_', ' ')} cannot start at site '{PALM_SITES[limb]}' {at}, from "
@@ -70,11 +51,11 @@ def _placed(
             "the wall or away from it, or remove the site"
         )
     row = int(np.argmin(np.where(codes == 0, far, np.inf)))
-    return table.contact(int(table.add(limb, palms.select(np.array([row])))[0]))
+    return moves.table.contact(int(moves.table.add(limb, palms.select(np.array([row])))[0]))
 
 
 def _points(world: World, site: np.ndarray) -> np.ndarray:
-    """(n, 3) m; where the palm may go: about the nearest point of every surface for palms near the site."""
+    """(n, 3) m; places for the palm about the nearest point of every palm surface near the site."""
     spread = shifts(_SEARCH, _STEP)
     points = []
     for surface in world.surfaces:

@@ -1,1 +1,1 @@
-"""What a state of the contact search is: contacts by number, CoM, velocity; where it starts."""
+"""States of the contact search: contacts by number, CoM and velocity; and the stance at the start."""

@@ -1,4 +1,4 @@
-"""Every contact a search has met, once, as rows of arrays; states then name contacts by number."""
+"""A table of every contact that a search has met, as rows of arrays; states name contacts by number."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class ContactTable:
         friction: (S,) coefficient of each surface of the world.
 
     Attributes:
-        position: (capacity, 3) m.
-        rotation: (capacity, 3, 3).
+        position: (capacity, 3) m; world.
+        rotation: (capacity, 3, 3); world_from_contact.
         yaw: (capacity,) rad; heading of the x axis.
-        surface: (capacity,) int.
-        limb: (capacity,) int.
+        surface: (capacity,) int; index of the surface.
+        limb: (capacity,) int; the limb in contact.
     """
 
     def __init__(self, friction: np.ndarray):
@@ -90,10 +90,11 @@ class ContactTable:
         return steepness(self.rotation[numbers, 2, 2]) / np.maximum(self.friction(numbers), 1e-9)
 
     def slide(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where whoever stands on contacts (n,) alone slides.
+        """Slides of a robot that stands on contacts (n,) alone.
 
         Returns:
-            (n, 2) unit; downhill in XY. (n,) m/s^2; least horizontal acceleration that way, 0 where friction holds.
+            Downhill unit vectors (n, 2) in XY, and the least horizontal accelerations (n,) m/s^2 that way, 0 where
+            friction holds.
         """
         normal, friction = self.rotation[numbers, :, 2], self.friction(numbers)
         steep = np.hypot(normal[:, 0], normal[:, 1])  # sine of the angle

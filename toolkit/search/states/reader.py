@@ -1,4 +1,4 @@
-"""States of the contact search in the words of contacts: stances and transitions."""
+"""Reading states of the contact search as stances and transitions."""
 
 from __future__ import annotations
 
@@ -16,12 +16,7 @@ _LIMBS = tuple(Limb)
 
 
 class StateReader:
-    """Reads the states of one search.
-
-    Args:
-        table: The contacts that states name by number.
-        timings: The timings of transitions to choose from.
-    """
+    """Reads the states of one search, which name the contacts of `table` by number and `timings` by index."""
 
     def __init__(self, table: ContactTable, timings: tuple[Timing, ...]):
         self._table, self._timings = table, timings

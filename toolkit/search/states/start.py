@@ -13,11 +13,11 @@ from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
 from toolkit.world.world import World
 
-_BELOW, _ABOVE = 0.3, 0.15  # m; where the ground is looked for, relative to the start site
-_SEARCH = 0.16  # m; how far from its place a foot may start
+_BELOW, _ABOVE = 0.3, 0.15  # m below and above the start site between which the ground is looked for
+_SEARCH = 0.16  # m; farthest from its place that a foot may start
 
 
-def home_feet(robot: RobotModel) -> dict[Limb, np.ndarray]:
+def _home_feet(robot: RobotModel) -> dict[Limb, np.ndarray]:
     """(3,) x m, y m, yaw rad of each sole in the home posture, seen from between the feet."""
     data = mujoco.MjData(robot.mujoco_model)
     data.qpos[:] = robot.home
@@ -34,12 +34,12 @@ def place_feet(robot: RobotModel, world: World, projector: Projector) -> list[St
     """Stances at the start, both feet at their home distance or as near to it as the ground allows; best first.
 
     Raises:
-        PlanningError: a foot finds no room.
+        PlanningError: A foot finds no room.
     """
     spread = shifts(_SEARCH, 0.02)
     start = world.start
     places: dict[Limb, list[Contact]] = {}
-    for limb, foot in home_feet(robot).items():
+    for limb, foot in _home_feet(robot).items():
         at = (start @ Pose.from_yaw(np.array([foot[0], foot[1], 0.0]), foot[2])).position
         yaw = start.yaw + foot[2]
         offsets = spread * [1.0, 1.0 if limb.is_left else -1.0]

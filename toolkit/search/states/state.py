@@ -4,8 +4,8 @@ A state (44 bytes) is the numbers of its contacts (-1 where a palm has none), th
 start; it may not move again at once), the CoM in mm and its velocity in mm/s. Rounding to 1 mm is the paper's
 identification of states; contacts are rounded in the contact table.
 
-A pending state (52 bytes) stands for a transition that is still to be judged: contacts and limb as after it, CoM and
-velocity as before it, the old contact of the limb, and the transition's timing.
+A pending state (52 bytes) stands for a transition that is still to be judged. Its contacts and limb are those after the
+transition, its CoM and velocity those before it. The old contact of the limb and the transition's timing follow.
 """
 
 from __future__ import annotations
@@ -20,14 +20,7 @@ OLD, TIMING = 11, 12
 
 
 def pack(contacts: np.ndarray, last: np.ndarray, com: np.ndarray, velocity: np.ndarray) -> list[bytes]:
-    """States of n rows.
-
-    Args:
-        contacts: (n, 4) int; contact numbers by limb.
-        last: (n,) int; limb moved last.
-        com: (n, 3) m.
-        velocity: (n, 3) m/s.
-    """
+    """States of contact numbers (n, 4), limbs (n,) that moved last, CoMs (n, 3) m and velocities (n, 3) m/s."""
     rows = np.empty((len(contacts), SIZE), np.int32)
     rows[:, CONTACTS], rows[:, LAST] = contacts, last
     rows[:, COM] = np.round(com * 1000)
@@ -36,13 +29,9 @@ def pack(contacts: np.ndarray, last: np.ndarray, com: np.ndarray, velocity: np.n
 
 
 def pack_pending(before: np.ndarray, contacts: np.ndarray, limb: np.ndarray, timing: np.ndarray) -> list[bytes]:
-    """Pending states of n transitions out of one state.
+    """Pending states of n transitions out of the state with the row `before` (11,).
 
-    Args:
-        before: (11,) int; row of the state.
-        contacts: (n, 4) int; contact numbers afterwards.
-        limb: (n,) int; that moves.
-        timing: (n,) int; index.
+    The transitions move limbs (n,) with timings (n,) by index to the contact numbers (n, 4).
     """
     rows = np.empty((len(contacts), PENDING), np.int32)
     rows[:, CONTACTS], rows[:, LAST], rows[:, TIMING] = contacts, limb, timing
@@ -51,7 +40,7 @@ def pack_pending(before: np.ndarray, contacts: np.ndarray, limb: np.ndarray, tim
 
 
 def moved_last(state: bytes, limb: int) -> bytes:
-    """The same state after another last limb, so that this one may not move at once."""
+    """The same state with another limb that moved last, so that this one may not move at once."""
     row = unpack([state]).copy()
     row[:, LAST] = limb
     return row.tobytes()
@@ -68,13 +57,13 @@ def unpack(states: Sequence[bytes]) -> np.ndarray:
 
 
 def unpack_all(states: Sequence[bytes]) -> np.ndarray:
-    """(n, 11) int rows of states of both kinds; of pending ones the part that they share."""
+    """(n, 11) int rows of states of both kinds; pending ones without their last two numbers."""
     size = 4 * SIZE
     return np.frombuffer(b"".join([state[:size] for state in states]), np.int32).reshape(len(states), SIZE)
 
 
 def origin_of(row: np.ndarray) -> np.ndarray:
-    """The row of a state, or, of a pending one, that of the state that it comes from (its last limb apart)."""
+    """The row of a state; of a pending one, the row of the state that it comes from, except for its last limb."""
     if len(row) <= OLD:
         return row
     before = row.copy()
