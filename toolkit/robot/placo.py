@@ -84,7 +84,7 @@ class PinocchioMap:
         return a
 
     def matrix_to_mujoco(self, qpos: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        """Turn a symmetric matrix (6 + n, 6 + n) over Pinocchio velocities, such as the mass matrix, into one over qvel."""
+        """Turn a symmetric matrix (6 + n, 6 + n) over Pinocchio velocities, such as inertia, into one over qvel."""
         basis = np.stack([self.v_from_qvel(qpos, row) for row in np.eye(len(matrix))], axis=1)  # v = basis @ qvel
         return basis.T @ matrix @ basis
 

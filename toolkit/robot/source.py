@@ -128,7 +128,7 @@ def _prepare_urdf(path: Path, root: ElementTree.Element) -> None:
     for extension in root.findall("mujoco"):
         root.remove(extension)
     extension = ElementTree.SubElement(root, "mujoco")
-    options = dict.fromkeys(("strippath", "fusestatic", "discardvisual"), "false")
+    options = {"strippath": "false", "fusestatic": "false", "discardvisual": "false"}
     ElementTree.SubElement(extension, "compiler", options)
 
 
