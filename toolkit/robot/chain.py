@@ -26,9 +26,8 @@ def arm_joints(model: mujoco.MjModel, limb: Limb) -> list[int]:
     for other in (item for item in Limb if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, item.label) >= 0):
         if other != limb:
             trunk.update(_up_from(model, model.site_bodyid[model.site(other.label).id]))
-    carrying = {
-        above for body in model.jnt_bodyid for above in _up_from(model, body)
-    }  # bodies with a joint at or below them
+    # Bodies with a joint at or below them.
+    carrying = {above for body in model.jnt_bodyid for above in _up_from(model, body)}
     joints: list[int] = []
     body = int(model.site_bodyid[model.site(limb.label).id])
     while body not in trunk:
