@@ -74,7 +74,7 @@ def compare_dynamics(
         mass = pinocchio.crba(other, data, q)
         mass = np.triu(mass) + np.triu(mass, 1).T
         compare("mass matrix", order.matrix_to_mujoco(qpos, mass), _mass_matrix(model, state))
-        # The force that keeps qacc at zero is MuJoCo's bias; forces change frames as velocities do.
+        # The force that keeps qacc at zero is MuJoCo's bias; its frame is converted like that of a velocity.
         bias = pinocchio.rnea(other, data, q, v, order.a_from_qacc(qpos, qvel, np.zeros_like(qvel)))
         compare("bias forces", order.qvel_from_v(qpos, bias), state.qfrc_bias)
     return worst

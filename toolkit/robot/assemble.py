@@ -84,7 +84,7 @@ def exclude_pairs(assembly: Assembly, pairs: Sequence[tuple[str, str]]) -> Assem
     if not pairs:
         return assembly
     lines = [f"<exclude body1={quoteattr(first)} body2={quoteattr(second)}/>" for first, second in pairs]
-    end = assembly.mjcf.rindex("</mujoco>")  # sections of one kind add up
+    end = assembly.mjcf.rindex("</mujoco>")  # MuJoCo merges sections of one kind
     mjcf = "\n    ".join([f"{assembly.mjcf[:end]}\n  <contact>", *lines]) + "\n  </contact>\n</mujoco>\n"
     return replace(assembly, mjcf=mjcf, mujoco_model=mujoco.MjModel.from_xml_string(mjcf, assembly.assets))
 

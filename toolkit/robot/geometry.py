@@ -15,7 +15,7 @@ from toolkit.robot.model import ArmGeometry, LegGeometry
 STRAIGHT_LEG_MARGIN = 0.015  # share of the length from hip to ankle
 STRAIGHT_ARM_MARGIN = 0.05  # share of the length from shoulder to palm
 _ROLES = ("roll", "pitch", "yaw")
-_ALIGNED = 0.72  # least |cosine| between a joint axis in the home posture and the base axis that names its role
+_ALIGNED = 0.72  # least |cosine| between a joint axis in the home posture and the base axis that defines its role
 
 
 def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegGeometry:

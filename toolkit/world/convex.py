@@ -7,7 +7,7 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-_FLAT = 1e-9  # cross products below this count as straight
+_FLAT = 1e-9  # a corner with a smaller cross product is straight
 
 
 def ring_points(polygon: Polygon) -> np.ndarray:

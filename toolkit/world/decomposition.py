@@ -24,7 +24,7 @@ _MOST_PARTS = 4000
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Convex solids that stand for a mesh.
+    """Convex solids that replace a mesh.
 
     Attributes:
         facets: Flat facets of the mesh, in the frame of its vertices.
@@ -142,7 +142,7 @@ def _frusta(mesh: trimesh.Trimesh, fronts: list[tuple[np.ndarray, np.ndarray]]) 
 
 
 def _thickness(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Distance (n,) from points on a mesh to the next triangle behind them; inf where none is near.
+    """Distance (n,) from points on a mesh to the next triangle behind them; inf if none is near.
 
     Each ray is tested against the triangles whose boxes meet its box (Moeller and Trumbore 1997).
     """

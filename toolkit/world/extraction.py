@@ -20,7 +20,7 @@ from toolkit.world.surface import Surface
 
 _BATCH = 64  # faces that are processed together
 _LARGEST = 12  # shadows that are subtracted one after the other
-_MANY = 50  # from this many faces on, a group is joined at once; smaller groups are joined face by face
+_MANY = 50  # groups of at least this many faces are joined at once, others face by face
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def extract_surfaces(
         config: What counts as a surface.
         progress: Called with the share that is done, in [0, 1].
     """
-    least = min(config.foot_area, config.palm_area) / 3  # flush faces of several geoms may be large enough together
+    least = min(config.foot_area, config.palm_area) / 3  # several flush faces may be large enough together
     faces = faces_of(source, square=square, least_area=least)
     faces = [face for face, served in zip(faces, _serves(faces, config).tolist(), strict=True) if any(served)]
     faces = _merged(faces, config)
@@ -106,7 +106,7 @@ def _serves(faces: list[Face], config: SurfaceConfig) -> np.ndarray:
     """Whether faces serve feet and palms, by the angle of their normals, (n, 2) bool."""
     normals = np.array([face.frame.normal for face in faces]).reshape(-1, 3)
     angle = np.arccos(np.clip(normals[:, 2], -1.0, 1.0))
-    slack = 1e-6  # a wall of exactly the limit counts
+    slack = 1e-6  # rad; a wall of exactly the limit is accepted
     palm = (angle >= config.palm_angle_min - slack) & (angle <= config.palm_angle_max + slack)
     return np.column_stack([angle <= config.foot_angle + slack, palm])
 

@@ -117,7 +117,7 @@ def facet_of(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
     frame = _plane_frame(weight @ corners.mean(axis=1), normal / np.linalg.norm(normal))
     flat = frame.inverse() @ corners
     shape = _union(flat[..., :2]) if len(flat) > 1 else Polygon(flat[0, :, :2])
-    if not isinstance(shape, Polygon):  # of pieces that only touch in a point, the largest is kept
+    if not isinstance(shape, Polygon):  # the pieces touch only in points, and the largest is kept
         parts = [part for part in shapely.get_parts(shapely.make_valid(shape)) if isinstance(part, Polygon)]
         shape = max(parts, key=lambda part: part.area, default=Polygon())
     return Facet(frame, shape, np.sort(group))

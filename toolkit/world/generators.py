@@ -194,7 +194,7 @@ def training(
     for side in (first, -first)[:walls]:
         bearing = side * np.radians(90.0 + rng.uniform(-45.0, 45.0))
         distance, lean = rng.uniform(0.4, 0.9), rng.uniform(-tilt, tilt)
-        # z of the panel looks back at the robot and leans up or down.
+        # The z axis of the panel points back at the robot and leans up or down.
         turn = Rotation.from_euler("ZY", [bearing, np.radians(lean) - np.pi / 2])
         centre = distance * np.array([np.cos(bearing), np.sin(bearing), 0.0]) + [0.0, 0.0, 1.0]
         name = "wall" if side == first else "other_wall"

@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from toolkit.geometry.pose import Pose
 
 _WIDE = 100.0  # m; width and depth of the half space under a plane beyond the square
-_SIDES = 48  # sides of a prism that stands for a cylinder
+_SIDES = 48  # sides of a prism that replaces a cylinder
 
 
 @dataclass(frozen=True)
