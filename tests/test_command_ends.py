@@ -88,6 +88,7 @@ def test_a_file_that_cannot_be_read_is_one_line():
 def test_a_mistake_in_the_options_is_one_line(capsys):
     parser = cli.parser("plan", "Plan.")
     cli.add_planning_options(parser)
+    cli.add_robot_options(parser)
     for option, value, message in (
         ("--seed", "-1", "-1: give a whole number from 0 to 2147483647"),
         ("--seed", "9" * 5000, "give a whole number from 0"),
@@ -97,6 +98,7 @@ def test_a_mistake_in_the_options_is_one_line(capsys):
         ("--expansions", "9" * 20, "the most that is accepted"),
         ("--time-limit", "inf", "not above zero"),
         ("--planner", "a\nb", "invalid choice"),
+        ("--robot", "--", "argument --robot: -- is no value"),
         ("--un\nknown", "a", "unrecognized arguments"),
     ):
         with pytest.raises(SystemExit) as left:

@@ -41,6 +41,14 @@ class _Parser(argparse.ArgumentParser):
         """Leave with exit code 2."""
         self.exit(2, f"error: {' '.join(message.split())}; see {self.prog} --help\n")
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse; `--option=--`, of which argparse makes an empty list, is a mistake."""
+        words = sys.argv[1:] if args is None else list(args)
+        for word in words:
+            if word.startswith("--") and word.endswith("=--"):
+                self.error(f"argument {word[:-3]}: -- is no value")
+        return super().parse_known_args(words, namespace)
+
     def print_help(self, file: Any = None) -> None:
         """Print the help; unlike argparse's own, this notices where it cannot be printed."""
         (file or sys.stdout).write(self.format_help())

@@ -34,7 +34,7 @@ def _finite(text: str) -> float:
     value = float(text)
     if not abs(value) <= GREATEST:
         raise argparse.ArgumentTypeError(f"{text} is not a number from -{GREATEST:g} to {GREATEST:g}")
-    return value
+    return value + 0.0  # no -0
 
 
 def arguments() -> argparse.ArgumentParser:
@@ -70,12 +70,16 @@ def main(argv: list[str] | None = None) -> int:
     options = vars(arguments().parse_args(argv))
     import numpy as np
 
+    from toolkit.errors import InputError
     from toolkit.report.drafts import write_whole
     from toolkit.world.generators import KINDS
     from toolkit.world.loader import load_world
 
     kind, seed, out = options.pop("kind"), options.pop("seed"), options.pop("out")
-    text = KINDS[kind](np.random.default_rng(seed), **options)
+    try:
+        text = KINDS[kind](np.random.default_rng(seed), **options)
+    except (ValueError, OverflowError) as error:
+        raise InputError(f"{kind}: these options make no world ({error})") from error
     load_world(out or Path(f"{kind}.xml"), mjcf=text)  # what is written can be used
     if out is None:
         sys.stdout.write(text)

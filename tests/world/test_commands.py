@@ -33,6 +33,7 @@ def test_terrain_goes_to_standard_output_and_takes_options(tmp_path, capsys):
     ("arguments", "message"),
     [
         (["stairs", "--friction", "0"], "friction 0"),
+        (["training", "--tilt", "-20"], "training: these options make no world"),
         (["stairs", "--shift", "-1"], "transition_timing"),
         (["slope", "--angle", "60"], "."),
         (["gap", "--out", "/proc/none/x.xml"], "cannot be written"),
