@@ -93,7 +93,11 @@ def add_planning_options(target: argparse.ArgumentParser) -> None:
         "planner chooses for each transition",
     )
     target.add_argument(
-        "--time-limit", type=positive(float), default=30.0, metavar="S", help="of the search (default: %(default)s)"
+        "--time-limit",
+        type=positive(float),
+        default=30.0,
+        metavar="S",
+        help="time limit of the search (default: %(default)s)",
     )
     target.add_argument(
         "--expansions",
@@ -106,7 +110,10 @@ def add_planning_options(target: argparse.ArgumentParser) -> None:
     target.add_argument("--no-palms", action="store_true", help="plan with the feet alone")
     target.add_argument("--steps", type=int, choices=(38, 60), default=60, help="foot transition model (default: 60)")
     target.add_argument(
-        "--heuristic", choices=("grid", "euclidean"), default="grid", help="of the search (default: %(default)s)"
+        "--heuristic",
+        choices=("grid", "euclidean"),
+        default="grid",
+        help="heuristic of the search (default: %(default)s)",
     )
 
 
@@ -163,8 +170,16 @@ def add_disturbance_options(target: argparse.ArgumentParser) -> None:
     """Add what may differ between the simulation and the plan; nothing does by default."""
     group = target.add_argument_group("disturbances", "what differs between the simulation and the plan")
     group.add_argument("--push", type=_finite, default=0.0, metavar="N", help="horizontal push at the base, for 0.2 s")
-    group.add_argument("--mass-error", type=_finite, default=0.0, metavar="X", help="of the robot, e.g. 0.05")
-    group.add_argument("--friction-error", type=_finite, default=0.0, metavar="X", help="of the world, e.g. -0.1")
+    group.add_argument(
+        "--mass-error", type=_finite, default=0.0, metavar="X", help="error of the mass as a fraction, e.g. 0.05"
+    )
+    group.add_argument(
+        "--friction-error",
+        type=_finite,
+        default=0.0,
+        metavar="X",
+        help="error of the friction as a fraction, e.g. -0.1",
+    )
     group.add_argument(
         "--terrain-error",
         type=_terrain_error,
@@ -173,9 +188,15 @@ def add_disturbance_options(target: argparse.ArgumentParser) -> None:
         help="surfaces lie elsewhere by up to so many metres and degrees, e.g. 0.01,2",
     )
     group.add_argument(
-        "--state-noise", type=_finite, default=0.0, metavar="X", help="m and rad; ten times as many m/s and rad/s"
+        "--state-noise",
+        type=_finite,
+        default=0.0,
+        metavar="X",
+        help="noise of the state in m and rad, and ten times as much in m/s and rad/s",
     )
-    group.add_argument("--delay", type=_finite, default=0.0, metavar="S", help="of what the controller is told")
+    group.add_argument(
+        "--delay", type=_finite, default=0.0, metavar="S", help="delay of the state that the controller is told"
+    )
 
 
 def add_execution_options(target: argparse.ArgumentParser) -> None:
@@ -264,6 +285,14 @@ def seed(text: str) -> int:
         value = -1
     if not 0 <= value <= LARGEST:
         raise argparse.ArgumentTypeError(f"{text}: give a whole number from 0 to {LARGEST}")
+    return value
+
+
+def at_least_zero(text: str) -> float:
+    """An argparse type: a finite number that is not negative."""
+    value = _finite(text)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f"{text} is below zero")
     return value
 
 

@@ -46,7 +46,7 @@ def arguments() -> argparse.ArgumentParser:
     for kind, generator in KINDS.items():
         text = inspect.getdoc(generator) or ""
         options = kinds.add_parser(kind, description=text.splitlines()[0])
-        options.add_argument("--seed", type=cli.seed, default=0, help="of everything random (default: 0)")
+        options.add_argument("--seed", type=cli.seed, default=0, help="seed of every random draw (default: 0)")
         options.add_argument("--out", type=cli.path, metavar="FILE", help="file to write (default: standard output)")
         described = dict(line.strip().split(": ", 1) for line in text.splitlines() if ": " in line)
         for name, parameter in inspect.signature(generator, eval_str=True).parameters.items():

@@ -160,6 +160,14 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
     return 0
 
 
+def _learning_rate(text: str) -> float:
+    """An argparse type: a learning rate above 0 and at most 1."""
+    value = cli.positive(float)(text)
+    if value > 1.0:
+        raise argparse.ArgumentTypeError(f"{text} is above 1, the most that is accepted")
+    return value
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run one of the subcommands; returns the exit code."""
     parser = cli.parser("train", DESCRIPTION)
@@ -168,21 +176,27 @@ def main(argv: list[str] | None = None) -> int:
     def add(name: str, help_text: str) -> argparse.ArgumentParser:
         sub = commands.add_parser(name, help=help_text, description=help_text)
         cli.add_robot_options(sub)
-        sub.add_argument("--seed", type=int, default=0, help="seed of every random draw (default: %(default)s)")
+        sub.add_argument("--seed", type=cli.seed, default=0, help="seed of every random draw (default: %(default)s)")
         return sub
 
     def add_executor(sub: argparse.ArgumentParser) -> None:
-        sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: cores)")
+        sub.add_argument(
+            "--workers", type=cli.positive(int), default=cli.cores(), help="number of processes (default: all cores)"
+        )
         sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
 
     def add_categories(sub: argparse.ArgumentParser) -> None:
         numbers = [int(category) for category in Category]
         metavar = f"{numbers[0]}..{numbers[-1]}"
-        sub.add_argument("--categories", type=int, nargs="+", choices=numbers, metavar=metavar, help="only these")
+        sub.add_argument(
+            "--categories", type=int, nargs="+", choices=numbers, metavar=metavar, help="only these categories"
+        )
 
     sub = add("collect", "label transitions with the centroidal optimiser; continues where it was stopped")
     sub.add_argument("--out", type=Path, required=True, help="data set folder, new or begun")
-    sub.add_argument("--samples", type=cli.positive(int), default=100_000, help="per category (default: %(default)s)")
+    sub.add_argument(
+        "--samples", type=cli.positive(int), default=100_000, help="samples per category (default: %(default)s)"
+    )
     add_executor(sub)
     sub.set_defaults(run=run_collect)
 
@@ -190,7 +204,7 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument("--data", type=Path, required=True, help="data set folder")
     sub.add_argument("--out", type=Path, required=True, help="data set folder for the result, new or begun")
     sub.add_argument(
-        "--draws", type=cli.positive(int), default=200, help="per category and shard (default: %(default)s)"
+        "--draws", type=cli.positive(int), default=200, help="draws per category and shard (default: %(default)s)"
     )
     sub.add_argument(
         "--networks",
@@ -205,25 +219,37 @@ def main(argv: list[str] | None = None) -> int:
     sub = add("fit", "train a classifier and a regressor per category")
     sub.add_argument("--data", type=Path, required=True, nargs="+", help="data set folder, or several")
     sub.add_argument("--out", type=Path, help="folder for the networks (default: the robot's networks/)")
-    sub.add_argument("--epochs", type=cli.positive(int), default=120, help="at most (default: %(default)s)")
+    sub.add_argument("--epochs", type=cli.positive(int), default=120, help="epochs at most (default: %(default)s)")
     sub.add_argument("--batch", type=cli.positive(int), default=512, help="samples per step (default: %(default)s)")
     sub.add_argument("--limit", type=cli.positive(int), help="transitions per category at most")
     sub.add_argument("--resume", action="store_true", help="keep what was trained with the same settings before a stop")
-    sub.add_argument("--learning-rate", type=cli.positive(float), default=4e-3, help="peak (default: %(default)s)")
     sub.add_argument(
-        "--sensitivity-weight", type=float, default=20.0, help="of the derivatives' loss (default: %(default)s)"
+        "--learning-rate",
+        type=_learning_rate,
+        default=4e-3,
+        help="highest learning rate, at most 1 (default: %(default)s)",
+    )
+    sub.add_argument(
+        "--sensitivity-weight",
+        type=cli.at_least_zero,
+        default=20.0,
+        help="weight of the derivatives in the loss (default: %(default)s)",
     )
     sub.add_argument("--refine", action="store_true", help="train the regressors in --out further, keep classifiers")
     sub.add_argument("--keep-classifiers", action="store_true", help="keep the classifiers in --out, train regressors")
     add_categories(sub)
-    sub.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="threads (default: all cores)")
+    sub.add_argument(
+        "--workers", type=cli.positive(int), default=cli.cores(), help="number of threads (default: all cores)"
+    )
     sub.add_argument("--device", default="cpu", help="where torch computes, such as cuda (default: %(default)s)")
     sub.set_defaults(run=run_fit)
 
     sub = add("evaluate", "score the networks on transitions that they have not seen")
     sub.add_argument("--data", type=Path, required=True, help="data set collected with another seed")
     sub.add_argument("--networks", type=Path, help="folder of networks (default: the robot's networks/)")
-    sub.add_argument("--count", type=cli.positive(int), default=1000, help="per category (default: %(default)s)")
+    sub.add_argument(
+        "--count", type=cli.positive(int), default=1000, help="transitions per category (default: %(default)s)"
+    )
     sub.set_defaults(run=run_evaluate)
 
     args = parser.parse_args(argv)

@@ -195,12 +195,12 @@ def main(argv: list[str] | None = None) -> int:
         epilog=cli.EXIT_CODES,
     )
     parser.add_argument(
-        "--trials", type=cli.positive(int), default=50, help="per category and setting (default: %(default)s)"
+        "--trials", type=cli.positive(int), default=50, help="trials per category and setting (default: %(default)s)"
     )
     parser.add_argument(
         "--walks", type=cli.positive(int), default=5, help="random walks of each length (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of every random draw (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of every random draw (default: %(default)s)")
     parser.add_argument(
         "--results",
         type=Path,

@@ -29,7 +29,10 @@ def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> 
         conflict_handler="resolve",
     )
     made.add_argument(
-        "--trials", type=cli.positive(int), default=trials, help="of each random kind of world (default: %(default)s)"
+        "--trials",
+        type=cli.positive(int),
+        default=trials,
+        help="trials of each random kind of world (default: %(default)s)",
     )
     made.add_argument("--kinds", nargs="+", default=list(kinds), metavar="KIND", help=f"default: {' '.join(kinds)}")
     cli.add_robot_options(made)

@@ -200,7 +200,9 @@ def main(argv: list[str] | None = None) -> int:
     parser = options.parser("planning", DESCRIPTION, KINDS, 50)
     parser.add_argument("--no-baseline", action="store_true", help="leave the quasi-static planner out")
     parser.add_argument("--lengths", type=cli.positive(float), nargs="*", default=[4.0, 8.0, 16.0, 32.0], metavar="M")
-    parser.add_argument("--growth-trials", type=cli.positive(int), default=24, metavar="N", help="of each length")
+    parser.add_argument(
+        "--growth-trials", type=cli.positive(int), default=24, metavar="N", help="trials of each length"
+    )
     args = parser.parse_args(argv)
     for kind in args.kinds:
         kind_of(kind)

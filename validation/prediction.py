@@ -136,8 +136,12 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     cli.add_robot_options(made)
     made.add_argument("--networks", type=Path, help="folder of networks (default: the robot's networks/)")
     made.add_argument("--data", type=Path, help="data set to test on (default: one is collected into --out)")
-    made.add_argument("--count", type=cli.positive(int), default=1000, help="per category (default: %(default)s)")
-    made.add_argument("--seed", type=int, default=1001, help="of the test set, not the training's (default: 1001)")
+    made.add_argument(
+        "--count", type=cli.positive(int), default=1000, help="transitions per category (default: %(default)s)"
+    )
+    made.add_argument(
+        "--seed", type=int, default=1001, help="seed of the test set; not the one of the training (default: 1001)"
+    )
     made.add_argument("--sequences", type=int, default=200, help="whole sequences; 0: none (default: 200)")
     made.add_argument("--train-data", type=Path, help="training data, to compare encodings on (default: left out)")
     made.add_argument("--encoding-category", type=int, choices=[int(c) for c in Category], default=9)

@@ -70,3 +70,21 @@ def test_a_device_that_is_not_there_is_refused(dataset, tmp_path):
     with pytest.raises(InputError, match="--device nonsense: torch cannot compute there .*; use --device cpu"):
         fit(dataset, tmp_path / "new", "--device", "nonsense")
     assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("--sensitivity-weight", "inf", "not finite"),
+        ("--sensitivity-weight", "nan", "not finite"),
+        ("--sensitivity-weight", "-5", "below zero"),
+        ("--learning-rate", "1e300", "above 1"),
+        ("--seed", "9" * 23, "give a whole number"),
+        ("--seed", "-1", "give a whole number"),
+    ],
+)
+def test_numbers_that_no_training_can_use_are_refused(dataset, tmp_path, capsys, option, value, message):
+    with pytest.raises(SystemExit) as left:
+        fit(dataset, tmp_path / "out", f"{option}={value}")
+    assert left.value.code == 2 and message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
