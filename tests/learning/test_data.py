@@ -13,6 +13,7 @@ from toolkit.learning.dataset import (
     SCHEMA,
     Manifest,
     read_dataset,
+    read_manifest,
     read_shard,
     shard_path,
     write_shard,
@@ -21,7 +22,7 @@ from toolkit.learning.evaluate import balanced, score
 from toolkit.learning.samples import Samples
 from toolkit.learning.sensitivity import unknown_sensitivity
 from toolkit.prediction.features import feature_size
-from toolkit.prediction.network import OBJECTIVE_SCALE, load_network, network_path
+from toolkit.prediction.network import OBJECTIVE_SCALE, load_network, network_path, training_summary
 from toolkit.prediction.networks import NetworkEvaluator
 
 CATEGORY = Category.BREAK_ONLY_PALM
@@ -148,3 +149,35 @@ def test_a_query_with_nan_is_refused(saved):
     assert batch.com.shape == (1, 3)
     with pytest.raises(NetworkError, match="NaN or infinite"):
         evaluator.evaluate(stance, com * np.nan, velocity, [transition])
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "{}", "[1]", '{"schema": ' + "9" * 5000 + "}", "\udcff"])
+def test_a_damaged_manifest_is_refused(tmp_path, text):
+    (tmp_path / "manifest.json").write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(DatasetError, match="not a manifest"):
+        read_manifest(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("features", np.array(["a", "b"])), ("feasible", np.array(True)), ("targets", np.ones((2, 7), complex))],
+)
+def test_a_shard_of_other_types_is_refused(tmp_path, name, value):
+    path = tmp_path / "shard.npz"
+    arrays = dict(
+        features=np.zeros((2, feature_size(CATEGORY)), np.float32),
+        feasible=np.ones(2, bool),
+        targets=np.zeros((2, 7), np.float32),
+        sensitivity=np.zeros((2, 1), np.float32),
+    )
+    np.savez(path, **{f"{key}_{int(CATEGORY)}": item for key, item in (arrays | {name: value}).items()})
+    with pytest.raises(DatasetError, match="arrays of other types"):
+        read_shard(path)
+
+
+@pytest.mark.parametrize("notes", ["no JSON", "[1]", "[" * 100_000])
+def test_notes_on_the_training_that_are_no_json_are_refused(saved, notes):
+    path, values = saved
+    save_file(values, path, METADATA | {"training": notes})
+    with pytest.raises(NetworkError, match="no JSON"):
+        training_summary(load_network(path, CATEGORY, "abc"))

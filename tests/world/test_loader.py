@@ -137,6 +137,7 @@ CASES = {
     "timing_negative": (mjcf_of(FLOOR, more=TIMING.format("1 -1")), "'transition_timing' is '1 -1'"),
     "timing_one": (mjcf_of(FLOOR, more=TIMING.format("1")), "'transition_timing' is '1'; give two"),
     "timing_three": (mjcf_of(FLOOR, more=TIMING.format("1 1 1")), "'transition_timing' is '1 1 1'; give two"),
+    "timing_long": (mjcf_of(FLOOR, more=TIMING.format("1 1e9")), "'1 1e\\+09'; give two times .* at most 10"),
     "timing_infinite": (mjcf_of(FLOOR, more=TIMING.format("1 inf")), "'transition_timing' is '1 inf'; give two"),
     "broken_xml": (mjcf_of(FLOOR).replace("</worldbody>", ""), "MuJoCo cannot read this world: "),
     "not_xml": ("hello", "MuJoCo cannot read this world: "),

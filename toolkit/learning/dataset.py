@@ -68,7 +68,7 @@ def read_manifest(folder: Path) -> Manifest:
         )
     try:
         manifest = Manifest(**json.loads(path.read_text()))
-    except (json.JSONDecodeError, TypeError) as error:
+    except (OSError, ValueError, TypeError, RecursionError) as error:
         raise DatasetError(f"{path}: not a manifest ({error}); collect into another folder") from None
     if manifest.schema != SCHEMA:
         raise DatasetError(f"{path}: schema {manifest.schema!r}, expected {SCHEMA!r}; collect the data again")
@@ -162,6 +162,9 @@ def read_shard(path: Path) -> dict[Category, Samples]:
         if not all(name in arrays for name in names):
             raise DatasetError(f"{path}: incomplete arrays for category {int(category)}; {remedy}")
         group = Samples(*(arrays[name] for name in names))
+        kinds = [arrays[name].dtype.kind for name in names]
+        if kinds != ["f", "b", "f", "f"] or group.feasible.ndim != 1:
+            raise DatasetError(f"{path}: category {int(category)} has arrays of other types; {remedy}")
         n = len(group.feasible)
         expected = [(n, feature_size(category)), (n,), (n, TARGETS), (n, sensitivity_size(category))]
         shapes = [arrays[name].shape for name in names]

@@ -163,5 +163,15 @@ def _tensor(path: Path, tensors: dict[str, np.ndarray], name: str, shape: tuple[
 
 
 def training_summary(network: TransitionNetwork) -> dict:
-    """The file's notes on its training, as a dictionary."""
-    return json.loads(network.metadata.get("training", "{}"))
+    """The file's notes on its training, as a dictionary.
+
+    Raises:
+        NetworkError: The notes are no JSON dictionary.
+    """
+    try:
+        notes = json.loads(network.metadata.get("training", "{}"))
+    except (ValueError, RecursionError):
+        notes = None
+    if not isinstance(notes, dict):
+        raise NetworkError("the notes on the training in a network's file are no JSON; train the networks again")
+    return notes

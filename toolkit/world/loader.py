@@ -15,7 +15,7 @@ from toolkit.world.extraction import SurfaceConfig, extract_surfaces
 from toolkit.world.solids import solids_of
 from toolkit.world.source import read_source
 from toolkit.world.surface import Surface
-from toolkit.world.timing import Timing
+from toolkit.world.timing import LONGEST, Timing
 from toolkit.world.world import PALM_SITE_REACH, PALM_SITES, Goal, World
 
 _DEFAULT = SurfaceConfig()
@@ -102,10 +102,10 @@ def _timing(path: Path, model: mujoco.MjModel) -> Timing:
         return Timing()
     first, count = int(model.numeric_adr[index]), int(model.numeric_size[index])
     values = model.numeric_data[first : first + count]
-    if count != 2 or not np.isfinite(values).all() or not (values > 0).all():
+    if count != 2 or not ((0.0 < values) & (values <= LONGEST)).all():
         raise WorldError(
             f"{path}: numeric 'transition_timing' is '{' '.join(f'{value:g}' for value in values)}'; "
-            "give two times above zero in seconds: shift and swing"
+            f"give two times in seconds above zero and at most {LONGEST:g}: shift and swing"
         )
     return Timing(float(values[0]), float(values[1]))
 
