@@ -12,6 +12,7 @@ import pytest
 from tests.robot.samples import LEG, TOML, URDF_TOML, biped_mjcf, biped_urdf, write_robot
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.robot.description import read_description
 from toolkit.robot.loader import default_robot, find_robots, load_robot, robots_folder
 from toolkit.search.moves.occupancy import BodyBox
 
@@ -145,6 +146,10 @@ def test_body_named_like_its_limb(tmp_path: Path) -> None:
         tmp_path / "b", biped_mjcf().replace("_foot_link", "_foot"), TOML.replace("_foot_link", "_foot")
     )
     assert load_robot(str(folder)).limbs[Limb.LEFT_FOOT].body == "left_foot_link"
+    taken = biped_mjcf().replace("left_foot_link", "left_foot").replace("left_knee_link", "left_foot_link")
+    folder = write_robot(tmp_path / "c", taken, TOML.replace("left_foot_link", "left_foot"))
+    with pytest.raises(RobotError, match="has bodies 'left_foot' and 'left_foot_link'; rename one"):
+        load_robot(str(folder))
 
 
 def test_overlapping_neighbours_are_excluded(tmp_path: Path) -> None:
@@ -392,6 +397,10 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     (folder / "robot.toml").write_bytes(b"\xff")
     with pytest.raises(RobotError, match="robot.toml: not valid TOML: 'utf-8' codec can't decode"):
         load_robot("biped", tmp_path)
+    (folder / "robot.toml").unlink()
+    (folder / "robot.toml").symlink_to("/dev/full")
+    with pytest.raises(RobotError, match="robot.toml: cannot be read .it is not a file"):
+        read_description(folder / "robot.toml")
 
 
 def test_mimic_joints_must_be_locked(tmp_path: Path) -> None:

@@ -100,3 +100,9 @@ def test_parts_have_their_face_on_the_mesh_and_stay_inside(thickness):
 def test_mesh_without_area():
     with pytest.raises(ValueError, match="no triangle with an area"):
         decompose_mesh(np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0.0]]), np.array([[0, 1, 2]]))
+
+
+def test_a_spike_of_no_width_is_cut_off():
+    spiked = Polygon([(0.1, -0.3), (0.1, 0.3), (-0.3, 0.3), (-0.1, 0.3), (-0.1, -0.3)])
+    pieces = convex_partition(spiked)
+    assert sum(Polygon(piece).area for piece in pieces) == pytest.approx(0.12, abs=1e-6)

@@ -203,3 +203,8 @@ def test_world_model_holds_only_static_geoms_with_full_contact_bits(make_world):
     geom = np.zeros(1, np.int32)
     down = np.array([0, 0, -1.0])
     assert mujoco.mj_ray(model, data, np.array([0, 0, 5.0]), down, RAY_GROUPS, True, -1, geom) == pytest.approx(5)
+
+
+def test_a_device_is_no_world():
+    with pytest.raises(WorldError, match="/dev/full: no such world file"):
+        load_world("/dev/full")

@@ -161,7 +161,10 @@ def _check_names(source: ModelSource) -> None:
     # A contact site is named after its limb, and no body may have that name in placo's list of frames.
     for limb in Limb:
         if limb.label in bodies:
-            source.spec.body(limb.label).name = f"{limb.label}_link"
+            name = f"{limb.label}_link"
+            if name in bodies:
+                raise RobotError(f"{source.path}: has bodies '{limb.label}' and '{name}'; rename one of them")
+            source.spec.body(limb.label).name = name
 
 
 def _set_joints(description: RobotDescription, source: ModelSource, bare: mujoco.MjModel) -> dict[str, float]:

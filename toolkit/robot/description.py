@@ -101,6 +101,8 @@ def read_description(path: Path) -> RobotDescription:
     Raises:
         RobotError: The file is missing or not valid TOML, or a key is unknown, missing or of the wrong kind.
     """
+    if path.exists() and not path.is_file():  # a device may be read without end
+        raise RobotError(f"{path}: cannot be read (it is not a file)")
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

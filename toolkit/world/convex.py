@@ -30,11 +30,12 @@ def convex_partition(region: Polygon) -> list[np.ndarray]:
     """
     if not region.interiors and is_convex(ring_points(region)):
         return [ring_points(region)]
-    triangles = [
-        ring_points(part)
-        for part in shapely.get_parts(shapely.constrained_delaunay_triangles(region))
-        if part.area > 1e-12
-    ]
+    try:
+        found = shapely.constrained_delaunay_triangles(region)
+    except shapely.errors.GEOSException:  # the region has a spike thinner than rounding, which is cut off
+        opened = region.buffer(-1e-7, join_style="mitre").buffer(1e-7, join_style="mitre")
+        found = shapely.constrained_delaunay_triangles(opened)
+    triangles = [ring_points(part) for part in shapely.get_parts(found) if part.area > 1e-12]
     points, corner = np.unique(np.concatenate(triangles), axis=0, return_inverse=True)
     rings: dict[int, list[int]] = {i: list(corner.reshape(-1)[3 * i : 3 * i + 3]) for i in range(len(triangles))}
     owner = {(a, b): i for i, ring in rings.items() for a, b in zip(ring, ring[1:] + ring[:1], strict=True)}

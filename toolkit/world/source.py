@@ -91,6 +91,8 @@ def _unused(name: str, taken: set[str]) -> str:
 def _compiled(path: Path, mjcf: str | None) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     if mjcf is None:
         try:
+            if path.exists() and not path.is_file():  # a device may be read without end
+                raise FileNotFoundError
             path.read_text(encoding="utf-8")
         except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
             raise WorldError(f"{path}: no such world file; give the path of an MJCF file") from None
