@@ -296,15 +296,16 @@ def at_least_zero(text: str) -> float:
     return value
 
 
-def positive(kind: Callable[[str], float], largest: int = LARGEST) -> Callable[[str], float]:
-    """An argparse type: a number of `kind` above zero; a count is at most `largest`, any other number is finite."""
+def positive(kind: Callable[[str], float], largest: float | None = None) -> Callable[[str], float]:
+    """An argparse type: a finite number of `kind` above zero and at most `largest`, which for counts is `LARGEST`."""
+    most = LARGEST if largest is None and kind is int else largest
 
     def convert(text: str) -> float:
         value = kind(text)
         if not 0 < value < float("inf"):
             raise argparse.ArgumentTypeError(f"{text} is not above zero")
-        if kind is int and value > largest:
-            raise argparse.ArgumentTypeError(f"{text} is above {largest}, the most that is accepted")
+        if most is not None and value > most:
+            raise argparse.ArgumentTypeError(f"{text} is above {most}, the most that is accepted")
         return value
 
     convert.__name__ = f"positive {kind.__name__}"

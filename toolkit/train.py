@@ -160,14 +160,6 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
     return 0
 
 
-def _learning_rate(text: str) -> float:
-    """An argparse type: a learning rate above 0 and at most 1."""
-    value = cli.positive(float)(text)
-    if value > 1.0:
-        raise argparse.ArgumentTypeError(f"{text} is above 1, the most that is accepted")
-    return value
-
-
 def main(argv: list[str] | None = None) -> int:
     """Run one of the subcommands; returns the exit code."""
     parser = cli.parser("train", DESCRIPTION)
@@ -225,7 +217,7 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument("--resume", action="store_true", help="keep what was trained with the same settings before a stop")
     sub.add_argument(
         "--learning-rate",
-        type=_learning_rate,
+        type=cli.positive(float, 1),
         default=4e-3,
         help="highest learning rate, at most 1 (default: %(default)s)",
     )
