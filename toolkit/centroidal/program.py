@@ -163,7 +163,7 @@ class Program:
         regularisers: Regularisers,
         landings: Sequence[Landing] | None = None,
     ):
-        self.problem, self._robot, self._body, self._regularisers = problem, robot, body, regularisers
+        self.problem, self.robot, self._body, self._regularisers = problem, robot, body, regularisers
         self._landings = list(landings or ())
         self.layout = Layout.of(problem.active, None if landings is None else [item.step for item in landings])
         self._heading = rotation_about_z(problem.yaw)
@@ -271,7 +271,7 @@ class Program:
         knots, limbs, positions, rotations = self._knot_contacts
         com, slack, parts = np.arange(3), self.layout.slack, []
         for limb in FEET:
-            leg = self._robot.legs[limb]
+            leg = self.robot.legs[limb]
             here = np.flatnonzero(limbs == limb)
             at, rotation = knots[here], rotations[here]
             ankle = positions[here] + rotation @ leg.ankle_in_sole
@@ -286,7 +286,7 @@ class Program:
         """Joint torques of stance legs in the middle of the steps."""
         p, parts = self.problem, []
         for limb in FEET:
-            leg, step = self._robot.legs[limb], np.flatnonzero(p.active[:, limb])
+            leg, step = self.robot.legs[limb], np.flatnonzero(p.active[:, limb])
             sole, rotation = p.position[step, limb], p.rotation[step, limb]
             fixed = [leg.thigh, leg.shin], [leg.torques[role] / self._weight for role in TORQUE_ROLES]
             links, limits = (np.tile(item, (len(step), 1)) for item in fixed)
@@ -311,12 +311,12 @@ class Program:
         parts = []
         knots, delays, limbs, tips, tangents = swing_ankles(self.problem)
         for limb in FEET:
-            leg, here = self._robot.legs[limb], limbs == limb
+            leg, here = self.robot.legs[limb], limbs == limb
             root = (self._heading @ leg.hip_in_com)[knots[here]]
             span = 0.0, leg.max_length
             parts.append(self._distance(knots[here], delays[here], root, tips[here], span, limb, tangents[here]))
         knots, limbs, tips, _ = self._knot_contacts
-        for limb, arm in self._robot.arms.items():
+        for limb, arm in self.robot.arms.items():
             here = limbs == limb
             root, span = (self._heading @ arm.shoulder_in_com)[knots[here]], (arm.min_reach, arm.max_reach)
             none = np.zeros((here.sum(), 3, 4))

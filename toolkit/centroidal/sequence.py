@@ -1,7 +1,8 @@
 """The whole-sequence optimisation: the motion that is executed.
 
 The paper's objective is minimised under exact cones, the limits of the body (`toolkit.centroidal.body`) and margins, by
-the stage-structured interior-point method of `toolkit.centroidal.stages`. The wanted margins may be relaxed at a price, so they shrink where nothing else is feasible; the motion says how far.
+the stage-structured interior-point method of `toolkit.centroidal.stages`. The wanted margins may be relaxed at a price,
+so they shrink where nothing else is feasible; the motion says how far.
 """
 
 from __future__ import annotations
@@ -81,8 +82,7 @@ def optimise(
     if not program.finite():
         raise InputError("a contact pose, a friction coefficient or a timing of the sequence is not finite")
     y, status, iterations = _solve(program)
-    slack = y[np.arange(len(y))[:, None], program.layout.slack]
-    motion = judged(_motion(program, y, status), robot, slack)
+    motion = motion_of(program, y, status)
     failure = None if motion.failure is None else _placed(motion.failure, problem, schedule)
     return replace(motion, failure=failure, iterations=iterations, seconds=time.perf_counter() - start)
 
@@ -98,8 +98,8 @@ def _placed(failure: Failure, problem: CentroidalProblem, schedule: ContactSched
 
 
 def _solve(program: Program) -> tuple[np.ndarray, str, int]:
-    """(N + 1, m) variables of the stages at the solution, whether the solver converged, in words, and its iterations."""
-    layout, y = program.layout, _guess(program)
+    """Variables (N + 1, m) of the stages at the solution, whether the solver converged, and its iterations."""
+    layout, y = program.layout, guess(program)
     work = Work.of(len(layout.size), layout.states, y.shape[1])
     options = Options(program.problem.final_at_rest)
     found = minimise(program.steps, program.prices, program.blocks, layout.size, y, work, options)
@@ -107,7 +107,7 @@ def _solve(program: Program) -> tuple[np.ndarray, str, int]:
     return y, CONVERGED if converged else "the solver stopped early", iterations
 
 
-def _guess(program: Program) -> np.ndarray:
+def guess(program: Program) -> np.ndarray:
     """Start of the solver: the CoM follows the mean of the feet, and the contacts share the weight."""
     p, layout = program.problem, program.layout
     n = p.steps
@@ -158,8 +158,8 @@ def _landed(program: Program, y: np.ndarray) -> np.ndarray | None:
     return position
 
 
-def _motion(program: Program, y: np.ndarray, status: str) -> CentroidalMotion:
-    """The motion of the program's variables."""
+def motion_of(program: Program, y: np.ndarray, status: str) -> CentroidalMotion:
+    """The motion of the variables (N + 1, m) of a program's stages, with its verdict; `status` is the solver's."""
     p, layout = program.problem, program.layout
     n, weight = p.steps, p.mass * STANDARD_GRAVITY
     local, moment = np.zeros((n, 4, 3)), np.zeros((n, 4, 3))
@@ -168,7 +168,7 @@ def _motion(program: Program, y: np.ndarray, status: str) -> CentroidalMotion:
     local[step, limb], moment[step, limb] = wrench[:, :3], wrench[:, 3:]
     load = np.where(local[..., 2] > 1e-7 * weight, local[..., 2], np.inf)
     *cop, torque = pressure((*np.moveaxis(local, -1, 0), *np.moveaxis(moment, -1, 0)), load)
-    return CentroidalMotion(
+    motion = CentroidalMotion(
         problem=p,
         feasible=False,
         status=status,
@@ -180,3 +180,4 @@ def _motion(program: Program, y: np.ndarray, status: str) -> CentroidalMotion:
         yaw_torque=torque,
         landed=_landed(program, y),
     )
+    return judged(motion, program.robot, y[np.arange(n + 1)[:, None], layout.slack])

@@ -41,9 +41,17 @@ class Block(NamedTuple):
     def of(cls, stage: np.ndarray, variables: np.ndarray, parameters: np.ndarray, rows: int) -> Block:
         """A block whose work arrays are empty."""
         n, k = variables.shape
-        work = [np.zeros((n, rows)) for _ in range(5)]
-        integers = [np.ascontiguousarray(item, np.int64) for item in (stage, variables)]
-        return cls(*integers, np.ascontiguousarray(parameters, float), work[0], np.zeros((n, rows, k)), *work[1:])
+        return cls(
+            stage=np.ascontiguousarray(stage, np.int64),
+            variables=np.ascontiguousarray(variables, np.int64),
+            parameters=np.ascontiguousarray(parameters, float),
+            value=np.zeros((n, rows)),
+            slope=np.zeros((n, rows, k)),
+            slack=np.zeros((n, rows)),
+            multiplier=np.zeros((n, rows)),
+            slack_change=np.zeros((n, rows)),
+            multiplier_change=np.zeros((n, rows)),
+        )
 
 
 @compiled(reordered=True)
@@ -80,7 +88,6 @@ def add_curvature(block, hessian):
     """Add J' (z / s) J of all rows to the stages' Hessians."""
     rows, k = block.value.shape[1], block.variables.shape[1]
     local = np.empty((k, k))
-    scaled = np.empty(k)
     for i in range(block.value.shape[0]):
         local[:] = 0.0
         for a in range(rows):

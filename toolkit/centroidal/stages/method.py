@@ -16,7 +16,6 @@ from toolkit.centroidal.stages import blocks, newton, rows
 from toolkit.centroidal.stages import steps as dynamics
 from toolkit.centroidal.stages.blocks import Block
 from toolkit.centroidal.stages.newton import Sweep, allocate
-from toolkit.centroidal.stages.steps import Steps
 from toolkit.compiled import compiled
 
 SMALL = 1e-3
@@ -73,8 +72,15 @@ class Work(NamedTuple):
     def of(cls, stages: int, states: int, variables: int) -> Work:
         """Room for so many stages of at most so many variables."""
         t, n, m = stages, states, variables
-        shapes = (t, m, m), (t, m), (t, m), (t - 1, n, m), (t - 1, n), (t, m)
-        return cls(*(np.zeros(shape) for shape in shapes), allocate(t, n, m))
+        return cls(
+            hessian=np.zeros((t, m, m)),
+            gradient=np.zeros((t, m)),
+            condensed=np.zeros((t, m)),
+            following=np.zeros((t - 1, n, m)),
+            defect=np.zeros((t - 1, n)),
+            change=np.zeros((t, m)),
+            sweep=allocate(t, n, m),
+        )
 
 
 class Options(NamedTuple):

@@ -47,7 +47,10 @@ def allocate(stages: int, states: int, variables: int) -> Sweep:
 
 @compiled(reordered=True)
 def factor(size, hessian, following, sweep):
-    """Factor Hessians (T, m, m), which are overwritten, of stages with `size` (T,) variables and dynamics (T-1, n, m)."""
+    """Factor the Hessians (T, m, m) of stages with `size` (T,) variables and dynamics (T - 1, n, m).
+
+    The Hessians' lower triangles count, and are overwritten.
+    """
     stages, n = sweep.slope.shape
     m = hessian.shape[1]
     product = np.empty((n, m))

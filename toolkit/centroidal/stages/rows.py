@@ -34,7 +34,8 @@ _LENGTH = next(number for number, limit in enumerate(PLANNED) if limit.quantity 
 _FORWARD = (1.0, 0.0)  # a heading; the angles that depend on it are not planned
 
 # Parameters of a contact.
-_MU, _HALF, _WANTED, _COP, _YAW, _LEAST, _LEAST_COP, _LEAST_YAW, _WEIGHTS, _LOAD, _PRICE = 0, 1, 3, 4, 6, 7, 8, 10, 11, 17, 18
+_MU, _HALF, _WANTED, _COP, _YAW = 0, 1, 3, 4, 6
+_LEAST, _LEAST_COP, _LEAST_YAW, _WEIGHTS, _LOAD, _PRICE = 7, 8, 10, 11, 17, 18
 # Parameters of a leg's posture: hip from the CoM, ankle, rotation of the sole, thigh, shin.
 _HIP, _ANKLE, _TURN, _LINKS, POSTURE = 0, 3, 6, 15, 17
 
@@ -43,10 +44,10 @@ _HIP, _ANKLE, _TURN, _LINKS, POSTURE = 0, 3, 6, 15, 17
 def prepare_contacts(block):
     """Fill the slopes of a contact's linear rows: all but the cone.
 
-    Variables: wrench (6) in weights, slacks of friction and CoP, excess. Slacks are in weights: at the normal force the
-    least margin is left. Parameters: mu, (2) half extents; wanted friction factor, (2) CoP margin in m, yaw factor, and
-    the least of each; (6) square roots of the weights of force, lateral force, torque (in weights), CoP, CoP times load,
-    and distance from a wanted normal force; that force; price of a slack.
+    Variables: wrench (6) in weights, slacks of friction and CoP, excess. Slacks are in weights: at the normal force
+    the least margin is left. Parameters: mu, (2) half extents; wanted friction factor, (2) CoP margin in m, yaw factor,
+    and the least of each; (6) square roots of the weights of force, lateral force, torque (in weights), CoP, CoP times
+    load, and distance from a wanted normal force; that force; price of a slack.
     """
     for i in range(block.stage.shape[0]):
         p, slope = block.parameters[i], block.slope[i]
@@ -199,7 +200,7 @@ def posture(p, turn, x, y, z):
 
 @compiled(reordered=True)
 def hip_of(p, turn, y, t, com, offset, out):
-    """Fill `out` (3,) with a hip, given the CoM; the sole's displacement is taken off it, as only the difference counts."""
+    """Fill `out` (3,) with a hip, given the CoM, less the sole's displacement: only the difference counts."""
     for a in range(3):
         out[a] = com[a] + p[_HIP + a]
         if offset.shape[0] == 2:
@@ -254,7 +255,9 @@ def fill_legs(block, y, hessian, gradient):
                     out[a] = sign * slopes[q, a]
                 out[3] = factor * margin
                 for k in range(offset.shape[0]):
-                    out[4 + k] = -sign * (slopes[q, 0] * turn[0, k] + slopes[q, 1] * turn[1, k] + slopes[q, 2] * turn[2, k])
+                    out[4 + k] = -sign * (
+                        slopes[q, 0] * turn[0, k] + slopes[q, 1] * turn[1, k] + slopes[q, 2] * turn[2, k]
+                    )
         bend_length(block, i, 2 * _LENGTH + 1, found[_LENGTH], row, local, force, hessian[t], gradient[t])
     return 0.0
 
@@ -413,9 +416,9 @@ def fill_heights(block, y):
 def fill_final(block, y, hessian, gradient):
     """Box of the last CoM along the axes of the last heading, and what the last state costs.
 
-    Variables: the state (12), displacements of both feet (4 or none). Parameters: centre (3), half sizes (3), cosine and
-    sine of the heading, weights of centring, acceleration and angular momentum; how the centre follows the displacements
-    (3 x 4, row-major).
+    Variables: the state (12), displacements of both feet (4 or none). Parameters: centre (3), half sizes (3), cosine
+    and sine of the heading, weights of centring, acceleration and angular momentum; how the centre follows the
+    displacements (3 x 4, row-major).
     """
     size = block.variables.shape[1]
     row, off = np.empty(size), np.empty(3)

@@ -51,7 +51,7 @@ class Steps(NamedTuple):
 
 @compiled(reordered=True)
 def rates(steps, t, y, acceleration, spin_rate):
-    """Fill acceleration (3,) of the CoM and rate (3,) of kappa in step t; also returns the sum of the forces in N/kg."""
+    """Fill acceleration (3,) of the CoM and rate (3,) of kappa in step t; returns the contacts' force in N/kg."""
     middle = mean_com(steps.dt[t], G, y)
     fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(steps.first[t], steps.first[t + 1]):
@@ -137,7 +137,11 @@ def linearise(steps, size, y, hessian, gradient, following, defect):
             row[ACCELERATION + a] = -1.0
             change = acceleration[a] - now[ACCELERATION + a]
             add_square(weights[JERK], change, row, size[t], hessian[t], gradient[t])
-            for part, weight in ((V, weights[MOMENTUM]), (ACCELERATION, weights[MOMENTUM_RATE]), (SPIN, weights[ANGULAR])):
+            for part, weight in (
+                (V, weights[MOMENTUM]),
+                (ACCELERATION, weights[MOMENTUM_RATE]),
+                (SPIN, weights[ANGULAR]),
+            ):
                 gradient[t + 1, part + a] += 2 * weight * after[part + a]
                 hessian[t + 1, part + a, part + a] += 2 * weight
         gradient[t + 1, R + 2] += 2 * weights[HEIGHT] * (after[R + 2] - steps.height[t])
