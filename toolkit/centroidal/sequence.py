@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from toolkit.centroidal.body import BodyMargins, mean_feet
-from toolkit.centroidal.build import ProblemConfig, sequence_problem
+from toolkit.centroidal.build import ProblemConfig, sequence_problem, transition_problem
 from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalMotion, CentroidalProblem, Margins, Weights
 from toolkit.centroidal.program import Landing, Program, Regularisers, indices
 from toolkit.centroidal.stages.method import Options, Work, minimise
@@ -21,6 +21,8 @@ from toolkit.centroidal.stages.steps import WRENCH
 from toolkit.centroidal.verdict import judged
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Stance
 from toolkit.errors import InputError
 from toolkit.geometry.limb import FEET
 from toolkit.physics.wrench import pressure
@@ -75,16 +77,56 @@ def optimise(
     Raises:
         InputError: As `sequence_problem`, or a contact is not finite.
     """
-    start = time.perf_counter()
     problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem)
     landings = None if room is None else _landings(problem, schedule, room)
+    motion = _solved(robot, problem, config, landings)
+    failure = None if motion.failure is None else _placed(motion.failure, problem, schedule)
+    return replace(motion, failure=failure)
+
+
+def optimise_transition(
+    robot: RobotModel,
+    stance: Stance,
+    com: np.ndarray,
+    com_velocity: np.ndarray,
+    transition: ContactTransition,
+    *,
+    config: SequenceConfig = SequenceConfig(),
+    final_at_rest: bool = False,
+) -> CentroidalMotion:
+    """Optimise the motion of one transition alone, under the limits and margins of whole sequences.
+
+    It is feasible where a motion leads from the CoM state to some state whose CoM is in the final box of
+    `ProblemConfig`, and at rest if that is wanted.
+
+    Args:
+        robot: The robot.
+        stance: The contacts before the transition.
+        com: (3,) m; initial CoM in the world.
+        com_velocity: (3,) m/s.
+        transition: The limb that moves, its new contact and the timing.
+        config: Settings.
+        final_at_rest: Whether the CoM must be at rest at the end.
+
+    Raises:
+        InputError: As `build.transition_problem`, or a contact is not finite.
+    """
+    given = robot, stance, com, com_velocity, transition
+    problem = transition_problem(*given, config=config.problem, final_at_rest=final_at_rest)
+    return _solved(robot, problem, config, None)
+
+
+def _solved(
+    robot: RobotModel, problem: CentroidalProblem, config: SequenceConfig, landings: list[Landing] | None
+) -> CentroidalMotion:
+    """The motion of a problem with its verdict."""
+    start = time.perf_counter()
     program = Program(problem, robot, config.body, config.regularisers, landings)
     if not program.finite():
         raise InputError("a contact pose, a friction coefficient or a timing of the sequence is not finite")
     y, status, iterations = _solve(program)
     motion = motion_of(program, y, status)
-    failure = None if motion.failure is None else _placed(motion.failure, problem, schedule)
-    return replace(motion, failure=failure, iterations=iterations, seconds=time.perf_counter() - start)
+    return replace(motion, iterations=iterations, seconds=time.perf_counter() - start)
 
 
 def _placed(failure: Failure, problem: CentroidalProblem, schedule: ContactSchedule) -> Failure:
