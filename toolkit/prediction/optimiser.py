@@ -21,15 +21,13 @@ class OptimiserEvaluator(TransitionEvaluator):
     Args:
         robot: The robot.
         final_at_rest: Whether the CoM must be at rest after the transition, as at the goal.
-        config: Settings of the optimiser.
+        config: Settings of the optimiser; the default ones where None.
     """
 
     costly = True
 
-    def __init__(
-        self, robot: RobotModel, *, final_at_rest: bool = False, config: SequenceConfig = SequenceConfig()
-    ):
-        self._robot, self._final_at_rest, self._config = robot, final_at_rest, config
+    def __init__(self, robot: RobotModel, *, final_at_rest: bool = False, config: SequenceConfig | None = None):
+        self._robot, self._final_at_rest, self._config = robot, final_at_rest, config or SequenceConfig()
 
     def evaluate(
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
