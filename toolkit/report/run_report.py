@@ -10,30 +10,46 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.centroidal.problem import CentroidalMotion
-from toolkit.centroidal.residual import check, cop_margin, friction_margin
+from toolkit.centroidal.problem import Weights
+from toolkit.centroidal.residual import check, cop_margin, friction_margin, objective
 from toolkit.execution.check import Check
 from toolkit.execution.result import Execution
+from toolkit.pipeline.candidate import Candidate
 from toolkit.pipeline.loop import PipelineResult
 from toolkit.report.files import check_entries, write_json
 from toolkit.world.world import World
 
-SCHEMA = 2
+SCHEMA = 3
 PACKAGES = ("mujoco", "placo", "pin", "casadi", "daqp", "numpy", "scipy", "numba", "rerun-sdk")
 
 SURFACES = ("count", "foot", "palm", "seconds")
 PLANNING = (
     "found",
-    "first_solution_seconds",
+    "first_feasible_seconds",
+    "first_feasible_optimiser_seconds",
     "seconds",
     "heuristic_seconds",
     "expansions",
     "solutions",
     "contacts",
     "palm_contacts",
+    "sequences",
     "sequences_tested",
 )
-DYNAMICS = ("feasible", "seconds", "objective", "max_residual", "min_friction_margin", "min_cop_margin", "status")
+DYNAMICS = (
+    "feasible",
+    "seconds",
+    "true_cost",
+    "cost_terms",
+    "objective",
+    "paper_objective",
+    "plan_seconds",
+    "walking_seconds",
+    "max_residual",
+    "min_friction_margin",
+    "min_cop_margin",
+    "status",
+)
 WHOLEBODY = ("feasible", "seconds", "max_position_error", "max_orientation_error", "limits_respected", "reason")
 EXECUTION = (
     "completed",
@@ -105,7 +121,7 @@ class RunReport:
         stages = {
             "surfaces": _surfaces(result.world, surface_seconds),
             "planning": _planning(result),
-            "dynamics": _dynamics(None if trial is None else trial.plan.motion),
+            "dynamics": _dynamics(result),
             "wholebody": _figures(WHOLEBODY, None if trial is None else trial.trajectory),
             "execution": _execution(None if trial is None else trial.execution),
         }
@@ -163,28 +179,55 @@ def _planning(result: PipelineResult) -> dict[str, Any]:
         for s in search.solutions
     ]
     chosen = chosen or (search.solutions[-1] if search.solutions else None)
+    first = result.first_feasible
     made = [t.limb for t in chosen.sequence.transitions if t.contact is not None] if chosen else []
     return {
         "found": bool(search.solutions),
-        "first_solution_seconds": search.solutions[0].seconds if search.solutions else None,
+        "first_feasible_seconds": None if first is None else first.seconds,
+        "first_feasible_optimiser_seconds": None if first is None else first.plan.motion.seconds,
         "seconds": search.seconds,
         "heuristic_seconds": search.heuristic_seconds,
         "expansions": search.expansions,
         "solutions": solutions,
         "contacts": len(chosen.sequence.transitions) if chosen else None,
         "palm_contacts": sum(not limb.is_foot for limb in made) if chosen else None,
-        "sequences_tested": result.tested,
+        "sequences": [_sequence(result, candidate) for candidate in result.candidates],
+        "sequences_tested": len(result.trials),
     }
 
 
-def _dynamics(motion: CentroidalMotion | None) -> dict[str, Any]:
-    """Figures of the centroidal motion; its residual and margins are recomputed without the solver."""
-    if motion is None:
+def _sequence(result: PipelineResult, candidate: Candidate) -> dict[str, Any]:
+    """Figures of one sequence that was optimised."""
+    return {
+        "number": candidate.number,
+        "source": candidate.source,
+        "search": candidate.search,
+        "seconds": candidate.seconds,
+        "transitions": len(candidate.solution.sequence.transitions),
+        "palm_contacts": candidate.palm_contacts,
+        "predicted_cost": candidate.solution.cost,
+        "true_cost": candidate.cost.total if candidate.feasible else None,
+        "feasible": candidate.feasible,
+        "reason": result.reason_against(candidate),
+        "chosen": result.is_chosen(candidate),
+    }
+
+
+def _dynamics(result: PipelineResult) -> dict[str, Any]:
+    """Figures of the centroidal motion and what it costs; residual and margins are recomputed without the solver."""
+    trial, cost = result.trial, result.cost
+    if trial is None or cost is None:
         return _figures(DYNAMICS, None)
+    motion = trial.plan.motion
     return {
         "feasible": motion.feasible,
         "seconds": motion.seconds,
+        "true_cost": cost.total if motion.feasible else None,
+        "cost_terms": cost.terms if motion.feasible else None,
         "objective": motion.objective if motion.feasible else None,
+        "paper_objective": objective(motion, Weights()) if motion.feasible else None,
+        "plan_seconds": cost.seconds,
+        "walking_seconds": trial.plan.sequence.duration,
         "max_residual": check(motion).largest,
         "min_friction_margin": friction_margin(motion) if motion.feasible else None,
         "min_cop_margin": cop_margin(motion) if motion.feasible else None,
