@@ -29,11 +29,11 @@ def judged(motion: CentroidalMotion, robot: RobotModel, slack: np.ndarray) -> Ce
         slack: (N + 1, 2); the excess beyond the contacts' physical limits in weights, and the body's slack, by knot.
             They only tell where an infeasible sequence is worst.
     """
-    verdict = motion
-    for margins in (None, *_wider(motion)):
-        verdict = confirmed(replace(motion, kept=margins))
-        if verdict.feasible:
-            break
+    verdict = confirmed(motion)
+    if not verdict.feasible:
+        verdict = confirmed(replace(motion, kept=Margins()))
+        offers = _wider(motion) if verdict.feasible else []
+        verdict = next((item for item in (confirmed(replace(motion, kept=m)) for m in offers) if item.feasible), verdict)
     body = body_residuals(verdict, robot)
     if verdict.feasible and body.largest <= BODY_TOLERANCE:
         return verdict

@@ -12,7 +12,6 @@ _COM = np.array([0.12, 0.12, 0.08])  # m; deviations of the largest disturbance 
 _VELOCITY = np.array([0.6, 0.5, 0.25])  # m/s; the same of its velocity
 _CONTACT = np.array([0.3, 0.3, 0.1])  # m; the same of the new contact, in its own frame
 _GROWTH = (1.0, 2.0, 4.0)  # parts of the disturbance that are tried until one is infeasible
-_BISECTIONS = 3
 
 
 def at_boundary(problem: TransitionProblem, rng: np.random.Generator) -> list[tuple[TransitionProblem, bool]]:
@@ -21,28 +20,20 @@ def at_boundary(problem: TransitionProblem, rng: np.random.Generator) -> list[tu
     The CoM, its velocity or the new contact moves in a random direction, or several of them.
 
     Returns:
-        The changed transitions and whether each is feasible: an infeasible one, and the farthest feasible one that was
-        met. Only a feasible one where nothing that was tried is infeasible.
+        The changed transitions and whether each is feasible.
     """
     moved = rng.normal(size=(3, 3)) * (rng.random((3, 1)) < 0.5)
     if not moved[:2].any():
         moved[int(rng.integers(2))] = rng.normal(size=3)
-    feasible, infeasible = 0.0, np.inf
+    judged, least = [], 0.0
     for part in _GROWTH:
-        if not transition_feasible(_changed(problem, moved, part)):
-            infeasible = part
-            break
-        feasible = part
-    if infeasible == np.inf:
-        return [(_changed(problem, moved, feasible), True)]
-    for _ in range(_BISECTIONS):
-        middle = (feasible + infeasible) / 2
-        if transition_feasible(_changed(problem, moved, middle)):
-            feasible = middle
-        else:
-            infeasible = middle
-    found = [(_changed(problem, moved, infeasible), False)]
-    return [*found, (_changed(problem, moved, feasible), True)] if feasible > 0.0 else found
+        changed = _changed(problem, moved, part)
+        judged.append((changed, transition_feasible(changed)))
+        if not judged[-1][1]:
+            between = _changed(problem, moved, (least + part) / 2)
+            return [*judged, (between, transition_feasible(between))]
+        least = part
+    return judged
 
 
 def _changed(problem: TransitionProblem, moved: np.ndarray, part: float) -> TransitionProblem:

@@ -57,7 +57,7 @@ class CollectConfig:
     searches: int = 2
     expansions: tuple[int, int] = (60, 400)
     kept: int = 3
-    variants: int = 3
+    variants: int = 10
     infeasible: float = 0.33
 
     @property
