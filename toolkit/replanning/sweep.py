@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from toolkit.centroidal.kernels import elimination
-from toolkit.centroidal.kernels.elimination import cholesky, solve_lower, solve_upper
+from toolkit.replanning import elimination
+from toolkit.replanning.elimination import cholesky, solve_lower, solve_upper
 from toolkit.compiled import compiled
 
 GIVEN = 12  # number of states that are given at the start; the ones after them are free
