@@ -244,8 +244,6 @@ class _Run:
             return []
         if self._local is None:
             self._local = LocalSearch(config, self._weights, self._optimise, self._tester.slide)
-        if self._local.spent >= config.optimisations:
-            return []
         began, before = time.perf_counter(), self._local.spent
         exclusions = [*self._exclusions, *blamed]
         self._observer.started("refinement")

@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.centroidal.plan import MotionPlan, keeps_margins
 from toolkit.contacts.room import RoomConfig
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.refine.foresight import Foresight
+from toolkit.refine.foresight import Foresight, travel
 from toolkit.refine.variants import left_out, relinked, swapped, without_palms
 from toolkit.search.costs.edge_cost import CostConfig, arrival_radius
 from toolkit.search.costs.plan_cost import PlanCost, plan_cost
@@ -33,8 +33,9 @@ class RefineConfig:
     """Settings of the local search.
 
     Attributes:
-        optimisations: Most motions to optimise in one run.
         starts: Number of the truly cheapest sequences from which it starts.
+        optimisations: Most motions to optimise for each of them. A quarter is kept to find out in the end whether
+            contacts can be left out.
         batch: Motions that are optimised before the cheapest of them is taken, if it is cheaper than the sequence is.
         gain: Least part of the true cost by which a variant has to be cheaper.
         prospect: Variants whose guessed cost is higher than the sequence's by more than this part are not optimised,
@@ -44,10 +45,10 @@ class RefineConfig:
         landing: How far they move each time.
     """
 
+    starts: int = 2
     optimisations: int = 60
-    starts: int = 1
     batch: int = 6
-    gain: float = 0.003
+    gain: float = 0.005
     prospect: float = 0.05
     patience: int = 12
     slides: int = 3
@@ -70,7 +71,7 @@ class LocalSearch:
     def __init__(self, config: RefineConfig, cost: CostConfig, optimise: Optimise, slide: Slide):
         self._config, self._cost, self._optimise, self._slide = config, cost, optimise, slide
         self._known: dict[bytes, tuple[MotionPlan, PlanCost]] = {}
-        self.spent = 0
+        self._limit = self.spent = 0
 
     def improved(
         self, plan: MotionPlan, origin: ContactSequence, screen: SequenceScreen, allowed: Allowed
@@ -84,36 +85,55 @@ class LocalSearch:
             screen: The screens of that search.
             allowed: Whether a sequence may be tried.
         """
+        before, self._limit = self.spent, self.spent + 3 * self._config.optimisations // 4
+        best = self._searched(plan, origin, screen, allowed)
+        self._limit = before + self._config.optimisations
+        return self._descended(*best, screen, allowed, all_kinds=False)[0] if screen.passes(best[0].sequence) else plan
+
+    def _searched(
+        self, plan: MotionPlan, origin: ContactSequence, screen: SequenceScreen, allowed: Allowed
+    ) -> tuple[MotionPlan, PlanCost]:
+        """The best plan of the search in all kinds of variants."""
         best = plan, plan_cost(plan, self._cost)
         if not screen.passes(plan.sequence):
             better = self._best_variant(*best, origin, screen, allowed)
             if better is None:
-                return plan
+                return best
             best = better
         while True:
             best = self._descended(*best, screen, allowed)
             slid = self._slid(*best, screen, allowed)
             if slid is None:
-                return best[0]
+                return best
             best = slid
 
     def _descended(
-        self, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen, allowed: Allowed
+        self, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen, allowed: Allowed, *, all_kinds: bool = True
     ) -> tuple[MotionPlan, PlanCost]:
-        """The best of the plan's variants, the best of that one's variants, and so on, as long as they are cheaper."""
+        """The best of the plan's variants, the best of that one's variants, and so on, as long as they are cheaper.
+
+        They only leave contacts out, unless all kinds of variants are asked for.
+        """
         while True:
-            better = self._best_variant(plan, cost, plan.sequence, screen, allowed)
+            better = self._best_variant(plan, cost, plan.sequence, screen, allowed, all_kinds=all_kinds)
             if better is None:
                 return plan, cost
             plan, cost = better
 
     def _best_variant(
-        self, plan: MotionPlan, cost: PlanCost, sequence: ContactSequence, screen: SequenceScreen, allowed: Allowed
+        self,
+        plan: MotionPlan,
+        cost: PlanCost,
+        sequence: ContactSequence,
+        screen: SequenceScreen,
+        allowed: Allowed,
+        *,
+        all_kinds: bool = True,
     ) -> tuple[MotionPlan, PlanCost] | None:
         """The cheapest of the first variants of a sequence, as soon as one is cheaper than the plan; None: none is."""
         best: tuple[MotionPlan, PlanCost] | None = None
         least, tried = cost.total * (1.0 - self._config.gain), 0
-        for variant in self._variants(sequence, plan, cost, screen):
+        for variant in self._variants(sequence, plan, cost, screen, all_kinds=all_kinds):
             if not allowed(variant) or not _arrives(variant, plan):
                 continue
             if best is not None and tried >= self._config.batch:
@@ -125,16 +145,16 @@ class LocalSearch:
         return best
 
     def _variants(
-        self, sequence: ContactSequence, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen
+        self, sequence: ContactSequence, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen, *, all_kinds: bool
     ) -> Iterator[ContactSequence]:
         """Variants that pass the screens, those that are guessed to be the cheapest first."""
         guess = Foresight(plan.sequence, cost, self._cost, plan.world.goal)
         fewer = {each.identity: each for each in (*without_palms(sequence, screen), *left_out(sequence, screen))}
-        groups = chain(relinked(sequence, screen), ([each] for each in swapped(sequence, screen)))
+        groups = chain(relinked(sequence, screen), ([each] for each in swapped(sequence, screen))) if all_kinds else ()
         most = cost.total * (1.0 + self._config.prospect)
         others: dict[bytes, ContactSequence] = {}
         for group in groups:
-            best = min(group, key=guess, default=sequence)
+            best = min(group, key=travel, default=sequence)  # those of a group take equally long
             if best.identity not in fewer and guess(best) <= most:
                 others[best.identity] = best
         others.pop(sequence.identity, None)
@@ -151,7 +171,7 @@ class LocalSearch:
         """
         identity = sequence.identity
         if identity not in self._known:
-            if self.spent >= self._config.optimisations:
+            if self.spent >= self._limit:
                 return None
             self.spent += 1
             plan = self._optimise(sequence)
@@ -187,7 +207,7 @@ class LocalSearch:
         sequence = plan.sequence
         share = np.ones(len(sequence.transitions))
         for less in (*_SHARES, 0.0):
-            if self.spent >= self._config.optimisations:
+            if self.spent >= self._limit:
                 return None
             self.spent += 1
             moved = self._slide(plan, self._config.landing, share)
