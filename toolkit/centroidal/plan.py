@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,7 +77,7 @@ def plan_motion(
 
 
 def slid(
-    plan: MotionPlan, landing: RoomConfig, config: SequenceConfig, fixed: Collection[int] = ()
+    plan: MotionPlan, landing: RoomConfig, config: SequenceConfig, share: np.ndarray | None = None
 ) -> MotionPlan | None:
     """The plan with landing points where the optimiser moves them, and the motion to it.
 
@@ -86,14 +85,15 @@ def slid(
         plan: The plan, with a feasible motion or without.
         landing: How far feet may land from where the plan has them.
         config: Settings of the optimiser.
-        fixed: Transitions whose contacts stay.
+        share: (transitions,) part of this room that each transition's contact has; None for all of it.
 
     Returns:
         The new plan; `motion.feasible` says whether there is a motion. None where no contact has room to move.
     """
     robot, world, schedule, problem = plan.robot, plan.world, plan.schedule, plan.motion.problem
     room = landing_room(robot, world.surfaces, plan.sequence, landing, world.goal)
-    room[list(fixed)] = 0.0
+    if share is not None:
+        room *= share[:, None, None]
     if not room.any():
         return None
     moved = optimise(robot, schedule, problem.com, problem.com_velocity, config=config, room=room)

@@ -244,12 +244,11 @@ class _Run:
             return []
         if self._local is None:
             self._local = LocalSearch(config, self._weights, self._optimise, self._tester.slide)
-        if self._local.spent >= config.optimisations:
-            return []
         began, before = time.perf_counter(), self._local.spent
         exclusions = [*self._exclusions, *blamed]
         self._observer.started("refinement")
-        plan = self._local.improved(candidate.plan, screen, lambda sequence: not _meets(sequence, exclusions))
+        origin = candidate.solution.sequence
+        plan = self._local.improved(candidate.plan, origin, screen, lambda each: not _meets(each, exclusions))
         cost = plan_cost(plan, self._weights)
         detail = f"true cost {candidate.cost.total:.0f} to {cost.total:.0f} with {self._local.spent - before} motions"
         self._observer.finished("refinement", True, time.perf_counter() - began, detail)
@@ -261,7 +260,7 @@ class _Run:
     def _optimise(self, sequence: ContactSequence) -> MotionPlan:
         """The motion of a variant."""
         self._observer.progress("refinement", None, f"{len(sequence.transitions)} transitions")
-        return self._tester.optimise(sequence)[0]
+        return self._tester.motion_of(sequence)
 
     def _allowed(self, candidate: Candidate) -> bool:
         """Whether one more trial may be made; half of them are for the feet alone."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -82,24 +81,31 @@ class Tester:
 
     def optimise(self, sequence: ContactSequence) -> tuple[MotionPlan, Failure | None]:
         """Optimise the motion of a sequence; also why there is none."""
-        config = self._config
-        plan = plan_motion(
-            self._robot,
-            self._world,
-            sequence,
-            initial_rest=config.initial_rest,
-            final_rest=config.final_rest,
-            landing=config.landing,
-            config=config.sequence,
-        )
+        plan = self._motion(sequence, self._config.landing)
         motion = plan.motion
         if motion.feasible:
             return plan, None
         return plan, _because(f"no feasible centroidal motion: {motion.outcome}", motion.failure)
 
-    def slide(self, plan: MotionPlan, landing: RoomConfig, fixed: Collection[int]) -> MotionPlan | None:
+    def motion_of(self, sequence: ContactSequence) -> MotionPlan:
+        """Optimise the motion of a sequence with its contacts where they are."""
+        return self._motion(sequence, None)
+
+    def _motion(self, sequence: ContactSequence, landing: RoomConfig | None) -> MotionPlan:
+        config = self._config
+        return plan_motion(
+            self._robot,
+            self._world,
+            sequence,
+            initial_rest=config.initial_rest,
+            final_rest=config.final_rest,
+            landing=landing,
+            config=config.sequence,
+        )
+
+    def slide(self, plan: MotionPlan, landing: RoomConfig, share: np.ndarray) -> MotionPlan | None:
         """Move the landing points of a plan; see `toolkit.centroidal.plan.slid`."""
-        return slid(plan, landing, self._config.sequence, fixed)
+        return slid(plan, landing, self._config.sequence, share)
 
     def test(self, candidate: Candidate) -> Trial:
         """Put a candidate through the stages after the optimiser; stop at the first that fails."""

@@ -10,8 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.contacts.stance import Stance
-from toolkit.geometry.limb import Limb
 from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.plan_cost import PlanCost, known_cost
 from toolkit.world.world import Goal
@@ -33,33 +31,37 @@ class Foresight:
 
     def __init__(self, sequence: ContactSequence, cost: PlanCost, config: CostConfig, goal: Goal):
         self._config, self._goal = config, goal
-        self._scale = cost.dynamics / max(_travel(sequence), 1e-9)
+        self._scale = cost.dynamics / max(travel(sequence), 1e-9)
         self._rests = cost.total - cost.dynamics - known_cost(sequence, goal, config)
 
     def __call__(self, sequence: ContactSequence) -> float:
         """The guess for a variant."""
-        return known_cost(sequence, self._goal, self._config) + self._rests + self._scale * _travel(sequence)
+        return known_cost(sequence, self._goal, self._config) + self._rests + self._scale * travel(sequence)
 
 
-def _travel(sequence: ContactSequence) -> float:
+def travel(sequence: ContactSequence) -> float:
     """Sum of |way|^2 / time in m^2/s of straight lines between the places of the CoM in the middle of each swing."""
-    stances = sequence.stances
-    places, times, now = [stances[0].mean_feet.position], [-_REST], 0.0
+    n = len(sequence.transitions)
+    feet = np.array([[contact.pose.position for contact in sequence.start.feet]] * (n + 1))
+    standing, times, now, held = np.full(n, -1), np.empty(n + 2), 0.0, set(sequence.start.palms)
+    over = np.full(n, _HELD)
+    times[0] = -_REST
     for index, transition in enumerate(sequence.transitions):
-        timing = transition.timing
-        times.append(now + timing.shift + timing.swing / 2)
-        places.append(_over(stances[index], stances[index + 1], transition.limb))
-        now += timing.shift + timing.swing
-    places.append(stances[-1].mean_feet.position)
-    times.append(now + _REST)
-    way = np.diff(np.array(places), axis=0)
-    return float(((way**2).sum(1) / np.diff(times)).sum())
-
-
-def _over(before: Stance, after: Stance, limb: Limb) -> np.ndarray:
-    """(3,) m; where the CoM is in the middle of a swing, seen from above, at the height of the feet."""
-    middle = (before.mean_feet.position + after.mean_feet.position) / 2
-    if not limb.is_foot:
-        return middle
-    standing = before[limb.mirrored].pose.position
-    return middle + (_HELD if before.palms else _OVER) * (standing - middle)
+        if not held:
+            over[index] = _OVER
+        if transition.contact is None:
+            held.discard(transition.limb)
+        elif transition.limb.is_foot:
+            feet[index + 1 :, transition.limb] = transition.contact.pose.position
+            standing[index] = transition.limb.mirrored
+        else:
+            held.add(transition.limb)
+        times[index + 1] = now + transition.timing.shift + transition.timing.swing / 2
+        now += transition.timing.shift + transition.timing.swing
+    times[-1] = now + _REST
+    middle = feet.mean(1)
+    places = np.empty((n + 2, 3))
+    places[0], places[-1], places[1:-1] = middle[0], middle[-1], (middle[:-1] + middle[1:]) / 2
+    steps = np.flatnonzero(standing >= 0)
+    places[1 + steps] += over[steps, None] * (feet[steps, standing[steps]] - places[1 + steps])
+    return float(((np.diff(places, axis=0) ** 2).sum(1) / np.diff(times)).sum())

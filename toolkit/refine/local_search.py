@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -11,20 +11,21 @@ import numpy as np
 from toolkit.centroidal.plan import MotionPlan, keeps_margins
 from toolkit.contacts.room import RoomConfig
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.refine.foresight import Foresight
-from toolkit.refine.variants import left_out, merged, swapped, without_palms
+from toolkit.refine.foresight import Foresight, travel
+from toolkit.refine.variants import left_out, relinked, swapped, without_palms
 from toolkit.search.costs.edge_cost import CostConfig, arrival_radius
 from toolkit.search.costs.plan_cost import PlanCost, plan_cost
 from toolkit.search.sequence_screen import SequenceScreen
 
 Optimise = Callable[[ContactSequence], MotionPlan]
-"""The motion of a sequence."""
-Slide = Callable[[MotionPlan, RoomConfig, Collection[int]], "MotionPlan | None"]
-"""A plan with landing points moved, but for the transitions that stay; see `toolkit.centroidal.plan.slid`."""
+"""The motion of a sequence with its contacts where they are."""
+Slide = Callable[[MotionPlan, RoomConfig, np.ndarray], "MotionPlan | None"]
+"""A plan with landing points moved, each within a share of its room; see `toolkit.centroidal.plan.slid`."""
 Allowed = Callable[[ContactSequence], bool]
 """Whether a sequence may be tried at all."""
 
-_REPAIRS = 2  # times that landing points which the screens reject are put back
+_SHARES = (0.4, 0.0)  # parts of their room that landing points get after the screens rejected them once, and twice
+_SLIDE = 1.03  # variants that lack margins but cost at most this much more than is wanted get their contacts moved
 
 
 @dataclass(frozen=True)
@@ -32,21 +33,24 @@ class RefineConfig:
     """Settings of the local search.
 
     Attributes:
-        optimisations: Most motions to optimise in one run.
         starts: Number of the truly cheapest sequences from which it starts.
+        optimisations: Most motions to optimise for each of them. A quarter is kept to find out in the end whether
+            contacts can be left out.
         batch: Motions that are optimised before the cheapest of them is taken, if it is cheaper than the sequence is.
         gain: Least part of the true cost by which a variant has to be cheaper.
         prospect: Variants whose guessed cost is higher than the sequence's by more than this part are not optimised,
             unless they only leave contacts out.
+        patience: Most variants of one sequence that are optimised, not counting those that only leave contacts out.
         slides: Most times in a row that landing points are moved.
         landing: How far they move each time.
     """
 
+    starts: int = 2
     optimisations: int = 60
-    starts: int = 1
     batch: int = 6
-    gain: float = 0.003
+    gain: float = 0.005
     prospect: float = 0.05
+    patience: int = 12
     slides: int = 3
     landing: RoomConfig = field(default_factory=lambda: RoomConfig(reach=(0.15, 0.1)))
 
@@ -67,89 +71,117 @@ class LocalSearch:
     def __init__(self, config: RefineConfig, cost: CostConfig, optimise: Optimise, slide: Slide):
         self._config, self._cost, self._optimise, self._slide = config, cost, optimise, slide
         self._known: dict[bytes, tuple[MotionPlan, PlanCost]] = {}
-        self.spent = 0
+        self._limit = self.spent = 0
 
-    def improved(self, plan: MotionPlan, screen: SequenceScreen, allowed: Allowed) -> MotionPlan:
+    def improved(
+        self, plan: MotionPlan, origin: ContactSequence, screen: SequenceScreen, allowed: Allowed
+    ) -> MotionPlan:
         """The cheapest plan that is found from a plan with a feasible motion; the plan itself where none is cheaper.
 
         Args:
             plan: The plan.
-            screen: The screens of the search that found its sequence.
+            origin: Its sequence as the search found it, to start from where the screens reject a landing point to which
+                the optimiser moved a foot.
+            screen: The screens of that search.
             allowed: Whether a sequence may be tried.
         """
+        before, self._limit = self.spent, self.spent + 3 * self._config.optimisations // 4
+        best = self._searched(plan, origin, screen, allowed)
+        self._limit = before + self._config.optimisations
+        return self._descended(*best, screen, allowed, all_kinds=False)[0] if screen.passes(best[0].sequence) else plan
+
+    def _searched(
+        self, plan: MotionPlan, origin: ContactSequence, screen: SequenceScreen, allowed: Allowed
+    ) -> tuple[MotionPlan, PlanCost]:
+        """The best plan of the search in all kinds of variants."""
         best = plan, plan_cost(plan, self._cost)
+        if not screen.passes(plan.sequence):
+            better = self._best_variant(*best, origin, screen, allowed)
+            if better is None:
+                return best
+            best = better
         while True:
             best = self._descended(*best, screen, allowed)
             slid = self._slid(*best, screen, allowed)
             if slid is None:
-                return best[0]
+                return best
             best = slid
 
     def _descended(
-        self, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen, allowed: Allowed
+        self, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen, allowed: Allowed, *, all_kinds: bool = True
     ) -> tuple[MotionPlan, PlanCost]:
-        """The best of the plan's variants, the best of that one's variants, and so on, as long as they are cheaper."""
+        """The best of the plan's variants, the best of that one's variants, and so on, as long as they are cheaper.
+
+        They only leave contacts out, unless all kinds of variants are asked for.
+        """
         while True:
-            better = self._best_variant(plan, cost, screen, allowed)
+            better = self._best_variant(plan, cost, plan.sequence, screen, allowed, all_kinds=all_kinds)
             if better is None:
                 return plan, cost
             plan, cost = better
 
     def _best_variant(
-        self, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen, allowed: Allowed
+        self,
+        plan: MotionPlan,
+        cost: PlanCost,
+        sequence: ContactSequence,
+        screen: SequenceScreen,
+        allowed: Allowed,
+        *,
+        all_kinds: bool = True,
     ) -> tuple[MotionPlan, PlanCost] | None:
-        """The cheapest of the first variants among which one is cheaper than the plan; None where none is."""
+        """The cheapest of the first variants of a sequence, as soon as one is cheaper than the plan; None: none is."""
         best: tuple[MotionPlan, PlanCost] | None = None
         least, tried = cost.total * (1.0 - self._config.gain), 0
-        for variant in self._variants(plan, cost, screen):
+        for variant in self._variants(sequence, plan, cost, screen, all_kinds=all_kinds):
             if not allowed(variant) or not _arrives(variant, plan):
                 continue
             if best is not None and tried >= self._config.batch:
                 break
-            found = self._judged(variant, plan, screen)
+            found = self._judged(variant, plan, screen, least)
             tried += 1
             if found is not None and found[1].total < least:
                 best, least = found, found[1].total
         return best
 
-    def _variants(self, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen) -> Iterator[ContactSequence]:
+    def _variants(
+        self, sequence: ContactSequence, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen, *, all_kinds: bool
+    ) -> Iterator[ContactSequence]:
         """Variants that pass the screens, those that are guessed to be the cheapest first."""
-        sequence = plan.sequence
-        foresight = Foresight(sequence, cost, self._cost, plan.world.goal)
-        seen = {sequence.identity}
-        guesses: list[tuple[float, ContactSequence]] = []
+        guess = Foresight(plan.sequence, cost, self._cost, plan.world.goal)
+        fewer = {each.identity: each for each in (*without_palms(sequence, screen), *left_out(sequence, screen))}
+        groups = chain(relinked(sequence, screen), ([each] for each in swapped(sequence, screen))) if all_kinds else ()
         most = cost.total * (1.0 + self._config.prospect)
-        fewer = chain(without_palms(sequence, screen), left_out(sequence, screen))
-        others = chain(merged(sequence, screen), swapped(sequence, screen))
-        for always, variants in ((True, fewer), (False, others)):
-            for variant in variants:
-                if variant.identity not in seen:
-                    seen.add(variant.identity)
-                    guess = foresight(variant)
-                    if always or guess <= most:
-                        guesses.append((guess, variant))
-        for _, variant in sorted(guesses, key=lambda item: item[0]):
-            yield variant
+        others: dict[bytes, ContactSequence] = {}
+        for group in groups:
+            best = min(group, key=travel, default=sequence)  # those of a group take equally long
+            if best.identity not in fewer and guess(best) <= most:
+                others[best.identity] = best
+        others.pop(sequence.identity, None)
+        ranked = sorted(others.values(), key=guess)[: self._config.patience]
+        yield from sorted([*fewer.values(), *ranked], key=guess)
 
     def _judged(
-        self, sequence: ContactSequence, base: MotionPlan, screen: SequenceScreen
+        self, sequence: ContactSequence, base: MotionPlan, screen: SequenceScreen, wanted: float
     ) -> tuple[MotionPlan, PlanCost] | None:
-        """A sequence with its motion and true cost; None where the budget is spent or the motion does not hold."""
+        """A sequence with its motion and true cost; None where the budget is spent or the motion does not hold.
+
+        The motion has to keep the margins of the base. Where it does not, but costs little more than is wanted at most,
+        landing points are moved.
+        """
         identity = sequence.identity
         if identity not in self._known:
-            if self.spent >= self._config.optimisations:
+            if self.spent >= self._limit:
                 return None
             self.spent += 1
             plan = self._optimise(sequence)
             self._known[identity] = plan, plan_cost(plan, self._cost)
         plan, cost = self._known[identity]
-        return (plan, cost) if self._holds(plan, base, screen) else None
-
-    def _holds(self, plan: MotionPlan, base: MotionPlan, screen: SequenceScreen) -> bool:
-        """Whether a plan's motion is feasible with the margins of the one before, and within the search's limits."""
-        if not plan.motion.feasible or not keeps_margins(plan, base):
-            return False
-        return screen.passes(plan.sequence) and not screen.reach_codes(plan).any()
+        if not plan.motion.feasible or screen.reach_codes(plan).any():
+            return None
+        if keeps_margins(plan, base):
+            return plan, cost
+        return self._slid_once(plan, base, screen) if cost.total < _SLIDE * wanted else None
 
     def _slid(
         self, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen, allowed: Allowed
@@ -157,29 +189,42 @@ class LocalSearch:
         """The plan with its landing points moved as long as that helps; None where it does not."""
         best: tuple[MotionPlan, PlanCost] | None = None
         for _ in range(self._config.slides):
-            found = self._slid_once(plan, screen, allowed)
+            found = self._slid_once(plan, plan, screen)
             if found is None or found[1].total > cost.total * (1.0 - self._config.gain):
+                break
+            if not allowed(found[0].sequence):
                 break
             best = plan, cost = found
         return best
 
     def _slid_once(
-        self, plan: MotionPlan, screen: SequenceScreen, allowed: Allowed
+        self, plan: MotionPlan, base: MotionPlan, screen: SequenceScreen
     ) -> tuple[MotionPlan, PlanCost] | None:
-        """The plan with its landing points moved; those that the screens reject stay, with those just before."""
-        fixed: set[int] = set()
-        for _ in range(1 + _REPAIRS):
-            if self.spent >= self._config.optimisations:
+        """The plan with its landing points moved, less or not at all where the screens reject where they went.
+
+        None where the motion does not keep the margins of the base.
+        """
+        sequence = plan.sequence
+        share = np.ones(len(sequence.transitions))
+        for less in (*_SHARES, 0.0):
+            if self.spent >= self._limit:
                 return None
             self.spent += 1
-            moved = self._slide(plan, self._config.landing, fixed)
-            if moved is None or not moved.motion.feasible or not keeps_margins(moved, plan):
+            moved = self._slide(plan, self._config.landing, share)
+            if moved is None or not moved.motion.feasible or not keeps_margins(moved, base):
                 return None
             wrong = np.flatnonzero(screen.codes(moved.sequence) | screen.reach_codes(moved))
             if not len(wrong):
-                return (moved, plan_cost(moved, self._cost)) if allowed(moved.sequence) else None
-            fixed |= {index for item in wrong.tolist() for index in (item - 1, item) if index >= 0}
+                return moved, plan_cost(moved, self._cost)
+            for index in wrong.tolist():
+                share[_contacts_of(sequence, index)] = less
         return None
+
+
+def _contacts_of(sequence: ContactSequence, index: int) -> list[int]:
+    """The transitions that made the contacts of the stance before a transition, and the transition itself."""
+    last = {item.limb: number for number, item in enumerate(sequence.transitions[:index])}
+    return [*last.values(), index]
 
 
 def _arrives(sequence: ContactSequence, base: MotionPlan) -> bool:

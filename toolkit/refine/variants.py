@@ -1,4 +1,4 @@
-"""Variants of a contact sequence: a few transitions left out, swapped, or replaced by fewer."""
+"""Variants of a contact sequence: a few transitions left out, swapped, or replaced by others."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.search.sequence_screen import SequenceScreen
 
 _APART = 3  # transitions; two that are farther apart can be left out together if each of them can be left out alone
-_WINDOW = 7  # most transitions that are replaced by fewer
-_LESS = 3  # most by which their number falls
-_BEAM = 5  # most places that are tried for a new contact in between
+_WINDOW = 7  # most transitions that are replaced together
+_LESS, _MORE = 3, 2  # most by which their number falls or rises
+_STEPS = 5  # most transitions that replace them
+_BEAM = 4  # most places that are tried for a new contact in between
 _TURN = 0.1  # m of distance that 1 rad of turning counts as, to compare places
 
 
@@ -65,8 +66,10 @@ def swapped(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[Conta
             yield variant
 
 
-def merged(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[ContactSequence]:
-    """Sequences in which fewer steps lead from one stance to a later one.
+def relinked(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[list[ContactSequence]]:
+    """Sequences in which other steps lead from one stance to a later one: fewer, as many or a few more.
+
+    Those with as many steps between the same stances come together, since they differ little.
 
     New contacts in between are steps that the search itself would consider, near the straight way of their foot.
     """
@@ -76,13 +79,15 @@ def merged(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[Contac
             window = transitions[first:last]
             if not window[-1].limb.is_foot:
                 break
-            for count in range(max(1, len(window) - _LESS), len(window)):
+            for count in range(max(1, len(window) - _LESS), min(len(window) + _MORE, _STEPS) + 1):
                 before = transitions[first - 1].limb if first else None
+                group = []
                 for chain in _chains(stances[first], before, stances[last], count, window, screen):
-                    made = (*transitions[:first], *chain, *transitions[last:])
-                    variant = replace(sequence, transitions=made)
-                    if screen.passes(variant):
-                        yield variant
+                    changed = ContactSequence(stances[first], (*chain, *transitions[last : last + 1]))
+                    if screen.passes(changed, before):
+                        made = (*transitions[:first], *chain, *transitions[last:])
+                        group.append(replace(sequence, transitions=made))
+                yield group
 
 
 def _without(sequence: ContactSequence, dropped: set[int]) -> ContactSequence:

@@ -8,7 +8,7 @@ import numpy as np
 
 from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
-from toolkit.contacts.stance import Stance
+from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.search.moves.candidates import SWING_SPEED, Candidates
 from toolkit.search.moves.moves import MoveGenerator
@@ -31,28 +31,37 @@ class SequenceScreen:
     def __init__(self, moves: MoveGenerator, palms: Sequence[Limb]):
         self._moves, self._palms = moves, palms
         self._known: dict[tuple, int] = {}
+        self._numbers: dict[int, tuple[Contact, int]] = {}  # by the contact's id, which stays its own while it is kept
 
     def numbers(self, sequence: ContactSequence) -> np.ndarray:
         """(transitions + 1, 4) contact numbers of all stances in the search's table, -1 where a palm has no contact."""
         numbers = np.full((len(sequence.transitions) + 1, 4), -1)
         for contact in sequence.start.contacts:
-            numbers[:, contact.limb] = self._moves.table.add_contact(contact)
+            numbers[:, contact.limb] = self._number(contact)
         for index, transition in enumerate(sequence.transitions):
             contact = transition.contact
-            numbers[index + 1 :, transition.limb] = -1 if contact is None else self._moves.table.add_contact(contact)
+            numbers[index + 1 :, transition.limb] = -1 if contact is None else self._number(contact)
         return numbers
 
-    def passes(self, sequence: ContactSequence) -> bool:
-        """Whether all transitions of a sequence pass; stops at the first that does not."""
-        return not any(self._codes(sequence))
+    def _number(self, contact: Contact) -> int:
+        known = self._numbers.get(id(contact))
+        if known is None:
+            if len(self._numbers) >= _KEPT:
+                self._numbers.clear()
+            known = self._numbers[id(contact)] = contact, self._moves.table.add_contact(contact)
+        return known[1]
+
+    def passes(self, sequence: ContactSequence, moved_last: Limb | None = None) -> bool:
+        """Whether all transitions of a sequence pass; `moved_last` is the limb that moved before the first one."""
+        return not any(self._codes(sequence, moved_last))
 
     def codes(self, sequence: ContactSequence) -> np.ndarray:
         """(transitions,) int; the `Reason` against each transition, 0 where there is none."""
-        return np.array(list(self._codes(sequence)), int)
+        return np.array(list(self._codes(sequence, None)), int)
 
-    def _codes(self, sequence: ContactSequence) -> Iterator[int]:
+    def _codes(self, sequence: ContactSequence, last: Limb | None) -> Iterator[int]:
         """See `codes`, one after the other."""
-        numbers, last = self.numbers(sequence), None
+        numbers = self.numbers(sequence)
         for before, after, transition in zip(numbers, numbers[1:], sequence.transitions, strict=False):
             limb, timing = transition.limb, transition.timing
             yield Reason.STILL if limb == last else self.code(before, limb, int(after[limb]), timing)
