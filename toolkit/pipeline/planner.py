@@ -60,11 +60,15 @@ def make_planner(
         if len(config.timings) < 2:  # this planner counts steps; each of them takes as long as any other
             config = replace(config, cost=replace(config.cost, time=0.0))
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
-    # Imported here: without a cache the fast solver takes seconds to compile, and only these kinds need it.
-    from toolkit.prediction.optimiser import OptimiserEvaluator
-
     optimiser = OptimiserEvaluator(robot)
+    judge = NetworkEvaluator(load_networks(robot), optimiser) if kind == "learned" else optimiser
     at_rest = OptimiserEvaluator(robot, final_at_rest=True)
-    if kind == "learned":
-        return ContactPlanner(robot, world, NetworkEvaluator(load_networks(robot), optimiser), config, at_rest)
-    return ContactPlanner(robot, world, optimiser, config, at_rest)
+    return ContactPlanner(robot, world, judge, config, partial(_objective, robot, world), at_rest)
+
+
+def _objective(robot: RobotModel, world: World, sequence: ContactSequence) -> float | None:
+    """Objective of a sequence's motion as a run plans it by default; None where there is none."""
+    run = PipelineConfig()
+    rests = {"initial_rest": run.initial_rest, "final_rest": run.final_rest}
+    motion = plan_motion(robot, world, sequence, **rests, landing=run.landing, config=run.sequence).motion
+    return motion.objective if motion.feasible else None

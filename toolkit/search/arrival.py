@@ -1,14 +1,14 @@
-"""Whether a search may end: after the last transition the robot stands at rest.
+"""Whether a search may end: the whole sequence has a motion that ends at rest, and what that motion costs.
 
-The paper asks this of the last transition alone, but a robot that arrives fast cannot do it. In that case the last few
-transitions and a moment on the final stance are optimised together, as they will be in the whole sequence.
+So the cost of a solution is the true one, and a search goes on until it finds what is truly cheaper.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from toolkit.contacts.sequence import ContactSequence
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.search.anytime.graph import Edge
 from toolkit.search.costs.edge_cost import EdgeCost
@@ -20,38 +20,51 @@ from toolkit.search.states.state import is_pending
 _WINDOWS = (1, 3, 6)  # transitions that are optimised together, in the order in which they are tried
 _REST = 0.6  # s on the final stance that are optimised with them
 
+Finish = Callable[[ContactSequence], float | None]
+"""Objective of the motion of a whole sequence from rest to rest; None where there is no such motion."""
+
 
 class Arrival:
-    """Judge of the last transition, for ANA*; the objective of the last edge becomes the cost of coming to rest.
+    """Judge of the last transition, for ANA*; its cost becomes what is missing to the true cost of the sequence.
 
-    The evaluator judges one transition as the last one, and whether several come to rest; `tally` counts rejections.
+    Args:
+        finish: Optimises whole sequences.
+        screen: Says quickly whether the last few transitions come to rest, where a robot may arrive too fast; None
+            where it need not be asked.
+        reader: Reads states.
+        cost: Costs of the search.
+        tally: Counts rejections.
     """
 
-    def __init__(self, evaluator: TransitionEvaluator, reader: StateReader, cost: EdgeCost, tally: Tally):
-        self._evaluator, self._reader, self._cost, self._tally = evaluator, reader, cost, tally
+    def __init__(
+        self, finish: Finish, screen: TransitionEvaluator | None, reader: StateReader, cost: EdgeCost, tally: Tally
+    ):
+        self._finish, self._screen, self._reader, self._cost, self._tally = finish, screen, reader, cost, tally
 
     def __call__(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> Edge[bytes] | None:
         """See `toolkit.search.anytime.graph.Judge`."""
-        last = self._reader.transition(edge.state, edge.payload)
-        batch = self._evaluator.evaluate(*self._reader.origin(states[-1]), [last])
-        objective = float(batch.objective[0]) if batch.feasible[0] else self._together(states, payloads, edge)
+        judged = [payload for payload in payloads if payload is not None]
+        passed = [state for state in states if not is_pending(state)]
+        ends = [*passed[1:], edge.state]
+        transitions = [self._reader.transition(*step) for step in zip(ends, [*judged, edge.payload], strict=True)]
+        objective = None
+        if self._comes_to_rest(passed, transitions):
+            objective = self._finish(ContactSequence(self._reader.origin(passed[0])[0], tuple(transitions)))
         if objective is None:
             self._tally.rejected[Reason.DYNAMICS] += 1
             return None
-        cost = edge.cost + self._cost.dynamics * (objective - edge.payload[0])
-        return edge._replace(cost=cost, payload=(objective, edge.payload[1]))
+        predicted = sum(payload[0] for payload in judged) + edge.payload[0]
+        return edge._replace(cost=edge.cost + self._cost.dynamics * (objective - predicted))
 
-    def _together(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> float | None:
-        """The last edge's part of the objective of coming to rest; None where that is infeasible."""
-        judged = [payload for payload in payloads if payload is not None]
-        passed = [state for state in states if not is_pending(state)]
-        transitions = [self._reader.transition(edge.state, edge.payload)]
-        transitions += [self._reader.transition(*step) for step in zip(passed[:0:-1], judged[::-1], strict=True)]
-        for count in _WINDOWS:
-            if count > len(transitions):
-                break
-            start = self._reader.origin(passed[-count])
-            objective = self._evaluator.halt(*start, transitions[count - 1 :: -1], _REST)
-            if objective is not None:
-                return max(objective - sum(payload[0] for payload in judged[len(judged) - count + 1 :]), 0.0)
-        return None
+    def _comes_to_rest(self, passed: list[bytes], transitions: list) -> bool:
+        """Whether the last transition, or the last few of them together, end at rest."""
+        if self._screen is None:
+            return True
+        if self._screen.evaluate(*self._reader.origin(passed[-1]), transitions[-1:]).feasible[0]:
+            return True
+        windows = [count for count in _WINDOWS if count <= len(transitions)]
+        starts = [self._reader.origin(passed[-count]) for count in windows]
+        return any(
+            self._screen.halt(*start, transitions[-count:], _REST) is not None
+            for count, start in zip(windows, starts, strict=True)
+        )

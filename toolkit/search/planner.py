@@ -15,7 +15,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import AnaStarResult
 from toolkit.search.anytime.graph import Progress
 from toolkit.search.anytime.restart import search_in_turn
-from toolkit.search.arrival import Arrival
+from toolkit.search.arrival import Arrival, Finish
 from toolkit.search.costs.delay import Delay, Haste
 from toolkit.search.costs.edge_cost import EdgeCost
 from toolkit.search.ground import Ground, Way
@@ -47,8 +47,8 @@ class ContactPlanner:
         world: The world.
         evaluator: Judges the dynamics of transitions.
         config: Settings; the default ones where None.
-        goal_evaluator: Judges the transition that reaches the goal, after which the robot rests; None: that transition
-            is judged like any other.
+        finish: Optimises the whole sequences that reach the goal; None: they are not optimised.
+        at_rest: Judges whether the last transitions end at rest, where the robot has to hurry; None: it is not asked.
 
     Attributes:
         ground: The world as the robot can walk it.
@@ -60,10 +60,11 @@ class ContactPlanner:
         world: World,
         evaluator: TransitionEvaluator,
         config: PlannerConfig | None = None,
-        goal_evaluator: TransitionEvaluator | None = None,
+        finish: Finish | None = None,
+        at_rest: TransitionEvaluator | None = None,
     ):
         self.robot, self.world, self.config = robot, world, config or PlannerConfig()
-        self._evaluator, self._goal_evaluator = evaluator, goal_evaluator
+        self._evaluator, self._finish, self._at_rest = evaluator, finish, at_rest
         self.ground = Ground(robot, world, self.config)
         self._timings = self.config.timings or (world.timing,)
 
@@ -102,8 +103,9 @@ class ContactPlanner:
         searches = [(ContactProblem(parts, state), strategy.patient)]
         if strategy.hasty is not None:  # a sequence that begins with the right foot often mirrors one that does not
             searches.insert(0, (ContactProblem(parts, moved_last(state, Limb.RIGHT_FOOT)), strategy.hasty))
-        goal = self._goal_evaluator
-        judge = None if goal is None else Arrival(goal, parts.reader, parts.cost, tally)
+        judge = None
+        if self._finish is not None:
+            judge = Arrival(self._finish, self._at_rest if way.slides else None, parts.reader, parts.cost, tally)
         result, early = search_in_turn(searches, rng, judge, time_limit, observer)
         return SearchResult(
             solutions=tuple(Solution.of(parts.reader, path) for path in result.paths),
@@ -128,7 +130,7 @@ class ContactPlanner:
         untrained = self._evaluator.evaluate(start, com, np.zeros(3), still).untrained
         tally.untrained += untrained
         stand_in = self._evaluator.stand_in
-        for other in (stand_in, self._goal_evaluator):
+        for other in (stand_in, self._at_rest):
             if other is not None:
                 other.evaluate(start, com, np.zeros(3), still[:1])
         return stand_in if stand_in is not None and untrained == len(still) else self._evaluator
