@@ -26,6 +26,7 @@ LAYERS = [
     "execution",
     "pipeline",
     "report",
+    "exchange",
 ]
 WITHIN = {
     "toolkit.search": ["anytime", "states", "moves", "costs"]
