@@ -42,14 +42,22 @@ def working_backend(backends: Sequence[str] = BACKENDS) -> str:
     wanted = os.environ.get("MUJOCO_GL", "").lower()
     reasons = []
     for backend in sorted(backends, key=lambda name: name != wanted):
-        environment = os.environ | {"MUJOCO_GL": backend}
-        command = [sys.executable, "-c", _PROBE, backend]
-        outcome = subprocess.run(command, capture_output=True, text=True, env=environment)
-        if outcome.returncode == 0:
+        reason = why_not(backend)
+        if not reason:
             return backend
-        last = outcome.stderr.strip().splitlines()[-1:] or [f"exit code {outcome.returncode}"]
-        reasons.append(f"{backend}: {last[0][:100]}")
+        reasons.append(f"{backend}: {reason}")
     raise InputError(f"cannot render off screen ({'; '.join(reasons)}): {REMEDY}")
+
+
+def why_not(backend: str) -> str:
+    """Why one of MuJoCo's context modules does not render here; "" where it does. It is tried in its own process."""
+    environment = os.environ | {"MUJOCO_GL": backend}
+    command = [sys.executable, "-c", _PROBE, backend]
+    outcome = subprocess.run(command, capture_output=True, text=True, env=environment)
+    if outcome.returncode == 0:
+        return ""
+    last = outcome.stderr.strip().splitlines()[-1:] or [f"exit code {outcome.returncode}"]
+    return last[0][:100]
 
 
 def open_context(width: int, height: int) -> Any:
