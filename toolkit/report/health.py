@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import platform
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -127,7 +128,9 @@ def check_cache() -> Finding:
 
 def check_renderers() -> Iterator[Finding]:
     """Which of MuJoCo's renderers work; pictures and videos need the first or the second."""
-    reasons = {name: why_not(name) for name in RENDERERS}
+    # MuJoCo sets this variable for the renderer that this process uses; the others would refuse it.
+    environment = {name: value for name, value in os.environ.items() if name != "PYOPENGL_PLATFORM"}
+    reasons = {name: why_not(name, environment) for name in RENDERERS}
     for name, reason in reasons.items():
         yield Finding(f"renderer {name}", State.NOTE if reason else State.GOOD, reason or "works")
     if reasons["egl"] and reasons["osmesa"]:

@@ -7,7 +7,7 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,11 +49,10 @@ def working_backend(backends: Sequence[str] = BACKENDS) -> str:
     raise InputError(f"cannot render off screen ({'; '.join(reasons)}): {REMEDY}")
 
 
-def why_not(backend: str) -> str:
+def why_not(backend: str, environment: Mapping[str, str] = os.environ) -> str:
     """Why one of MuJoCo's context modules does not render here; "" where it does. It is tried in its own process."""
-    environment = os.environ | {"MUJOCO_GL": backend}
     command = [sys.executable, "-c", _PROBE, backend]
-    outcome = subprocess.run(command, capture_output=True, text=True, env=environment)
+    outcome = subprocess.run(command, capture_output=True, text=True, env={**environment, "MUJOCO_GL": backend})
     if outcome.returncode == 0:
         return ""
     last = outcome.stderr.strip().splitlines()[-1:] or [f"exit code {outcome.returncode}"]
