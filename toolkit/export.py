@@ -66,7 +66,7 @@ def main(argv: list[str] | None = None) -> int:
         check_robot(record, robot)
         run = args.run.resolve()
         out = args.out or run.with_name(f"{run.name}-{args.to}")
-        with RunFolder(out, str(record.report["world"]), robot.name, robot.assets, FILES, "export") as folder:
+        with RunFolder(out, record.report["world"], robot.name, robot.assets, FILES, "export") as folder:
             status.update("computing the frames")
             frames = frames_of(record, robot, args.fps or FORMATS[args.to].fps, planned=args.planned)
             status.update("writing")

@@ -171,7 +171,7 @@ def test_planned_states_are_exported_where_asked_for(run_folder, walking, tmp_pa
 @pytest.mark.parametrize(
     ("file", "content", "message"),
     [
-        ("report.json", b"{}", "report.json: lacks checks; it is not the report of a run"),
+        ("report.json", b"{}", "report.json: has no valid world; it is not the report of a run"),
         ("scene.mjb", b"12", "scene.mjb: MuJoCo .* cannot read it"),
         ("execution.npz", b"12", "execution.npz: cannot be read"),
         ("motion.npz", None, "has no motion.npz; only a run that came to its execution"),
@@ -189,6 +189,49 @@ def test_broken_runs_are_refused_in_one_line(run_folder, tmp_path, file, content
     assert "\n" not in str(error.value) and not (tmp_path / "out").exists()
 
 
+def test_a_run_that_diverged_is_refused(run_folder, tmp_path):
+    diverged = tmp_path / "diverged"
+    shutil.copytree(run_folder, diverged)
+    with np.load(diverged / "execution.npz") as content:
+        arrays = dict(content)
+    arrays["qpos"][5, 2] = np.nan
+    np.savez(diverged / "execution.npz", **arrays)
+    with pytest.raises(InputError, match="qpos is not finite everywhere"):
+        main([str(diverged), "--to", "csv"])
+
+
+def damaged(content, rng):
+    """JSON in which something, somewhere, is missing or another thing."""
+    place = content
+    while True:
+        keys = list(place) if isinstance(place, dict) else list(range(len(place)))
+        key = keys[int(rng.integers(len(keys)))]
+        inner = place[key]
+        if not isinstance(inner, (dict, list)) or not inner or rng.random() < 0.3:
+            break
+        place = inner
+    if rng.random() < 0.4:
+        del place[key]
+    else:
+        place[key] = [None, -1, 1e300, "x", [], {}, True][int(rng.integers(7))]
+    return content
+
+
+@pytest.mark.parametrize("file", ["plan.json", "report.json"])
+def test_damaged_runs_are_refused_in_one_line_or_exported(run_folder, tmp_path, file):
+    rng, broken = np.random.default_rng(5), tmp_path / "broken"
+    shutil.copytree(run_folder, broken)
+    taken = 0
+    for _ in range(25):
+        content = damaged(json.loads((run_folder / file).read_text()), rng)
+        (broken / file).write_text(json.dumps(content))
+        try:
+            taken += main([str(broken), "--to", "contacts", "--fps", "2", "--out", str(tmp_path / "out")]) == 0
+        except InputError as error:
+            assert "\n" not in str(error)
+    assert 0 < taken < 25
+
+
 def test_parts_of_two_runs_are_refused(run_folder, tmp_path):
     mixed = tmp_path / "mixed"
     shutil.copytree(run_folder, mixed)
@@ -197,6 +240,20 @@ def test_parts_of_two_runs_are_refused(run_folder, tmp_path):
     np.savez(mixed / "execution.npz", **(arrays | {"torque": arrays["torque"][:, 1:]}))
     with pytest.raises(InputError, match="torque does not belong to scene.mjb"):
         main([str(mixed), "--to", "csv"])
+
+
+def test_meshes_of_the_robot_lie_beside_it(run_folder, robot, tmp_path):
+    folder, out = tmp_path / "capped", tmp_path / "out"
+    shutil.copytree(robot.folder, folder)
+    trimesh.creation.box((0.1, 0.1, 0.02)).export(folder / "cap.stl")
+    text = (folder / "robot.xml").read_text().replace("</mujoco>", '<asset><mesh file="cap.stl"/></asset></mujoco>')
+    cap = '><geom type="mesh" mesh="cap" mass="0" contype="0" conaffinity="0"/>'
+    before, head, after = text.partition('<body name="head"')
+    (folder / "robot.xml").write_text(before + head + after.replace(">", cap, 1))
+    for _ in range(2):
+        assert main([str(run_folder), "--to", "contacts", "--robot", str(folder), "--out", str(out)]) == 0
+    assert mujoco.MjModel.from_xml_path(str(out / "robot.xml")).nmesh == 1
+    assert {path.name for path in out.iterdir()} == {"cap.stl", *COMMON}
 
 
 def test_another_robot_is_refused(run_folder, robot, tmp_path):

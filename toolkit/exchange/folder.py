@@ -10,7 +10,7 @@ from typing import Any
 from toolkit.exchange.columns import csv_text, label_columns
 from toolkit.exchange.contact_file import contact_sequence
 from toolkit.exchange.formats import FORMATS, Format
-from toolkit.exchange.frames import MotionFrames
+from toolkit.exchange.frames import TOUCH, MotionFrames
 from toolkit.exchange.record import RunRecord, robot_bodies
 from toolkit.exchange.terrain import terrain_friction, terrain_mesh, terrain_mjcf
 from toolkit.report.files import REPORT, write_json
@@ -47,8 +47,8 @@ _EXPLAINED = {
     "Frames and units": "SI units and radians. The world frame has z up. Quaternions are scalar first unless said "
     "otherwise. A limb's patch has its frame at the site of the limb's name in robot.xml: z is the outward normal of "
     "the surface that it rests on. Frames between two samples of the run are interpolated, orientations by slerp.",
-    "Contacts": "LIMB_contact is 1 while the patch bears more than 20 N (planned states: while the plan holds it), "
-    "and LIMB_planned_contact while the plan holds it. contacts.json spells ContactSequence, ContactPhase, "
+    "Contacts": f"LIMB_contact is 1 while the patch bears more than {TOUCH:g} N (planned states: while the plan holds "
+    "it), and LIMB_planned_contact while the plan holds it. contacts.json spells ContactSequence, ContactPhase, "
     "ContactPatch and ContactModel of multicontact-api (loco-3d) as JSON, with its field names; `surface` and `swing` "
     "are added. The friction of each contact is in contacts.json, that of each geom of the terrain in metadata.json.",
     "Torques and targets": "torque_JOINT acts on the joint. target_JOINT is the joint position from which the "
@@ -75,7 +75,7 @@ def write_export(
         (folder / file).write_bytes(encode(frames, robot))
     (folder / LABELS).write_text(csv_text(label_columns(frames, robot)), encoding="utf-8")
     write_json(folder / CONTACTS, contact_sequence(record, robot))
-    (folder / TERRAIN).write_text(terrain_mjcf(record.scene, str(record.report["world"])), encoding="utf-8")
+    (folder / TERRAIN).write_text(terrain_mjcf(record.scene, record.report["world"]), encoding="utf-8")
     terrain_mesh(record.scene, frames.qpos[:, :3]).export(folder / TERRAIN_MESH, digits=9)
     (folder / ROBOT).write_text(robot.mjcf, encoding="utf-8")
     for file, content in robot.assets.items():
@@ -118,13 +118,13 @@ def _metadata(name: str, record: RunRecord, robot: RobotModel, frames: MotionFra
         "friction": terrain_friction(scene),
         "files": [*FORMATS[name].files, *COMMON, *robot.assets],
         "toolkit_version": importlib.metadata.version("humanoid-contact-toolkit"),
-        "run_versions": report.get("versions", {}),
+        "run_versions": report["versions"],
     }
 
 
 def _readme(form: Format, metadata: dict[str, Any]) -> str:
     """The text of README.txt."""
-    verdict = metadata["verdict"] + (f" ({metadata['reason']})" if metadata["reason"] else "")
+    verdict = f"{metadata['verdict']} ({metadata['reason']})" if metadata["reason"] else metadata["verdict"]
     files = dict.fromkeys(form.files, "the motion") | COMMON
     width = max(map(len, files))
     head = [

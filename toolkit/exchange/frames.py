@@ -9,11 +9,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from toolkit.exchange.record import RunRecord, robot_bodies
-from toolkit.execution.slip import BEARING_FORCE
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import quaternion_from_rotation, rotation_from_quaternion
 from toolkit.robot.model import RobotModel
 
+TOUCH = 1.0  # N; more than this along a patch's normal is a contact, so that palms that hardly press count too
 _NEAR = 1e-6  # in samples; a frame so near to a sample is the sample
 
 
@@ -36,8 +36,8 @@ class MotionFrames:
         com, linear_momentum, angular_momentum: Each (T, 3); the angular momentum is about the CoM.
         limb_pose: (T, 4, 7); position and quaternion wxyz of each limb's patch, NaN for a limb that the robot lacks.
         force, moment: Each (T, 4, 3); on each limb's patch, about its centre. NaN where the run knows none.
-        contact, planned_contact: Each (T, 4) bool. A measured contact bears more than 20 N; in frames of the plan the
-            two are the same.
+        contact, planned_contact: Each (T, 4) bool. A measured contact bears more than `TOUCH`; in frames of the plan
+            the two are the same.
     """
 
     fps: float
@@ -127,7 +127,7 @@ def frames_of(record: RunRecord, robot: RobotModel, fps: float, *, planned: bool
     derived = _derived(record.scene, robot, states, velocities)
     schedule = [record.schedule.phase_at(float(time)) for time in times]
     expected = np.array([[any(c.limb == limb for c in phase.contacts) for limb in Limb] for phase in schedule])
-    contact = expected if planned else _bearing(execution)[grid.first]
+    contact = expected if planned else _touching(execution)[grid.first]
     return MotionFrames(
         fps=fps,
         times=times,
@@ -143,12 +143,12 @@ def frames_of(record: RunRecord, robot: RobotModel, fps: float, *, planned: bool
     )
 
 
-def _bearing(execution: dict[str, np.ndarray]) -> np.ndarray:
-    """(C, 4) bool; whether the force on each patch has more than `BEARING_FORCE` along the patch's normal."""
+def _touching(execution: dict[str, np.ndarray]) -> np.ndarray:
+    """(C, 4) bool; whether the force on each patch has more than `TOUCH` along the patch's normal."""
     quaternions = execution["limb_pose"][..., 3:]
     there = np.isfinite(quaternions).all(axis=-1)
     normals = rotation_from_quaternion(np.where(np.expand_dims(there, -1), quaternions, [1.0, 0.0, 0.0, 0.0]))[..., 2]
-    return there & (np.einsum("clk,clk->cl", execution["wrench"][..., :3], normals) > BEARING_FORCE)
+    return there & (np.einsum("clk,clk->cl", execution["wrench"][..., :3], normals) > TOUCH)
 
 
 def _derived(scene: mujoco.MjModel, robot: RobotModel, qpos: np.ndarray, qvel: np.ndarray) -> dict[str, np.ndarray]:

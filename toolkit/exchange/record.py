@@ -51,7 +51,7 @@ class RunRecord:
     @property
     def robot_option(self) -> str:
         """The robot that the run was told to use, a name or a path; the name of the one that it used where not told."""
-        return str(self.report.get("options", {}).get("robot", self.report["robot"]))
+        return str(self.report["options"].get("robot", self.report["robot"]))
 
 
 def read_run(folder: Path) -> RunRecord:
@@ -65,16 +65,11 @@ def read_run(folder: Path) -> RunRecord:
     for name in (REPORT, PLAN, MOTION, EXECUTION, SCENE):
         if not (folder / name).is_file():
             raise InputError(f"{folder}: has no {name}; only a run that came to its execution can be exported")
-    report = read_json(folder / REPORT)
-    missing = {"world", "robot", "seed", "verdict", "reason", "checks"} - set(
-        report if isinstance(report, dict) else ()
-    )
-    if missing:
-        raise InputError(f"{folder / REPORT}: lacks {min(missing)}; it is not the report of a run")
+    report = _report(folder / REPORT)
     sequence, motion = read_plan(folder / PLAN), _arrays(folder / MOTION, _MOTION)
     execution, scene = _arrays(folder / EXECUTION, _EXECUTED), _scene(folder / SCENE)
     execution["qpos"] = execution["qpos"][: len(execution["tick_times"])]  # the last row is the state after the run
-    _check_shapes(folder, scene, execution, motion)
+    _check_arrays(folder, scene, execution, motion)
     return RunRecord(folder, report, sequence, _schedule(folder, sequence, motion), scene, execution, motion)
 
 
@@ -82,14 +77,17 @@ def check_robot(record: RunRecord, robot: RobotModel) -> None:
     """Raise unless the robot is the one that ran.
 
     Raises:
-        InputError: Its joints or bodies are others.
+        InputError: Its joints, bodies or limbs are others.
     """
     scene, alone = record.scene, robot.mujoco_model
     joints = tuple(scene.joint(j).name for j in range(1, scene.njnt))
     bodies = [scene.body(b).name for b in robot_bodies(scene)]
-    if joints != robot.joint_names or bodies != [alone.body(b).name for b in range(1, alone.nbody)]:
+    sites = {scene.site(s).name for s in range(scene.nsite)}
+    used = {contact.limb for stance in record.sequence.stances for contact in stance.contacts}
+    same = joints == robot.joint_names and bodies == [alone.body(b).name for b in range(1, alone.nbody)]
+    if not same or used - robot.limbs.keys() or {model.site for model in robot.limbs.values()} - sites:
         raise InputError(
-            f"{robot.folder}: is not the robot of {record.folder}, whose joints or bodies have other names; "
+            f"{robot.folder}: is not the robot of {record.folder}, whose joints, bodies or limbs are others; "
             "give the right one with --robot"
         )
 
@@ -97,6 +95,16 @@ def check_robot(record: RunRecord, robot: RobotModel) -> None:
 def robot_bodies(scene: mujoco.MjModel) -> np.ndarray:
     """(b,) int; bodies of the robot in MuJoCo's order, the base first."""
     return np.flatnonzero(scene.body_rootid == scene.jnt_bodyid[0])
+
+
+def _report(path: Path) -> dict[str, Any]:
+    """The report of a run, with what an export says of it."""
+    report = read_json(path)
+    kinds = {"world": str, "robot": str, "verdict": str, "reason": str, "seed": int, "options": dict, "versions": dict}
+    wrong = [name for name, kind in kinds.items() if not isinstance(report, dict) or type(report.get(name)) is not kind]
+    if wrong:
+        raise InputError(f"{path}: has no valid {wrong[0]}; it is not the report of a run")
+    return report
 
 
 def _arrays(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
@@ -123,25 +131,37 @@ def _scene(path: Path) -> mujoco.MjModel:
         ) from error
 
 
-def _check_shapes(
+def _check_arrays(
     folder: Path, scene: mujoco.MjModel, execution: dict[str, np.ndarray], motion: dict[str, np.ndarray]
 ) -> None:
-    """Raise where the arrays do not belong to the scene or to each other."""
-    widths = {"qpos": (scene.nq,), "qvel": (scene.nv,), "torque": (scene.nu,)}
+    """Raise where the arrays do not belong to the scene or to each other, or the states are no states."""
+    states = {"qpos": (scene.nq,), "qvel": (scene.nv,), "torque": (scene.nu,)}
     limbs = {"wrench": (4, 6), "wrench_planned": (4, 6), "limb_pose": (4, 7)}
-    for name, prefix, arrays, tails in (
-        (EXECUTION, "", execution, widths | limbs),
-        (MOTION, "wholebody_", motion, widths),
+    curves = dict.fromkeys(("com", "linear_momentum", "angular_momentum"), (3,))
+    for name, arrays, prefix, times, tails in (
+        (EXECUTION, execution, "", "tick_times", states | limbs),
+        (MOTION, motion, "wholebody_", "wholebody_times", states),
+        (MOTION, motion, "centroidal_", "centroidal_times", curves),
     ):
-        rows = len(arrays["tick_times" if not prefix else f"{prefix}times"])
+        grid = arrays[times]
+        if grid.ndim != 1 or len(grid) < 1 or not (np.isfinite(grid).all() and (np.diff(grid) > 0.0).all()):
+            raise InputError(f"{folder / name}: {times} are no increasing times")
         for key, tail in tails.items():
-            if arrays[prefix + key].shape != (rows, *tail) or not rows:
+            if arrays[prefix + key].shape != (len(grid), *tail):
                 raise InputError(f"{folder / name}: {prefix + key} does not belong to {SCENE}; take all from one run")
+            if key in ("qpos", "qvel", "torque", "com") and not np.isfinite(arrays[prefix + key]).all():
+                raise InputError(f"{folder / name}: {prefix + key} is not finite everywhere; such a run has no motion")
 
 
 def _schedule(folder: Path, sequence: ContactSequence, motion: dict[str, np.ndarray]) -> ContactSchedule:
     """When the contacts hold; the rests before and after the sequence are those of the planned motion."""
     end = float(motion["centroidal_times"][-1])
     entries = read_json(folder / PLAN)["transitions"]
-    initial = float(entries[0]["times"]["start"]) if entries else 0.0
-    return ContactSchedule.of(sequence, initial_rest=initial, final_rest=max(end - sequence.duration - initial, 0.0))
+    try:
+        initial = float(entries[0]["times"]["start"]) if entries else 0.0
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{folder / PLAN}: transitions[0] has no valid start ({error})") from error
+    final = end - sequence.duration - initial
+    if not (initial >= 0.0 and final > -1e-6):
+        raise InputError(f"{folder / PLAN}: its times do not belong to {MOTION}; take both from one run")
+    return ContactSchedule.of(sequence, initial_rest=initial, final_rest=max(final, 0.0))

@@ -45,7 +45,7 @@ def terrain_mjcf(scene: mujoco.MjModel, name: str) -> str:
     Meshes that are not convex are there as the convex parts that ran. Palms that start in contact have no sites.
     """
     data = _still(scene)
-    root = ElementTree.Element("mujoco", model=name)
+    root = ElementTree.Element("mujoco", model="".join(letter for letter in name if letter.isprintable()))
     ElementTree.SubElement(root, "compiler", angle="radian")
     assets, world = ElementTree.SubElement(root, "asset"), ElementTree.SubElement(root, "worldbody")
     ElementTree.SubElement(world, "light", pos="0 0 10", directional="true")
