@@ -8,6 +8,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS = [
     "errors",
+    "shipped",
     "interruption",
     "compiled",
     "mjcf",
@@ -27,6 +28,7 @@ LAYERS = [
     "execution",
     "pipeline",
     "report",
+    "exchange",
 ]
 WITHIN = {
     "toolkit.search": ["anytime", "states", "moves", "costs"]

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from toolkit.search.planner import PlannerConfig
 
 AUTO_TIMINGS = (Timing(1.0, 1.0), Timing(0.4, 0.6), Timing(0.05, 0.35))
+WORLD = "MJCF scene with sites named start and goal, or the name of a world that comes with the toolkit"
 EXIT_CODES = "exit codes: 0 success, 1 a plan or check failed (the reason is printed), 2 bad input"
 
 

@@ -18,6 +18,7 @@ import enum
 import hashlib
 import types
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,14 @@ def compiled(function: Callable | None = None, *, kept: bool = False, reordered:
         except RuntimeError:  # numba found no folder to write to
             pass
     return dispatcher
+
+
+def kept_folder() -> Path | None:
+    """The folder where compiled code is kept; None where none can be written and each process compiles anew."""
+    try:
+        return Path(_SourceCache(kept_folder).cache_path)
+    except RuntimeError:
+        return None
 
 
 def law(function: Callable) -> Callable:

@@ -28,7 +28,7 @@ written into the output folder: report.json, plan.json, motion.npz, recording.rr
 def arguments() -> argparse.ArgumentParser:
     """The options of this command."""
     parser = cli.parser("plan", DESCRIPTION, EPILOG)
-    parser.add_argument("world", type=Path, help="MJCF scene with sites named start and goal")
+    parser.add_argument("world", type=Path, help=cli.WORLD)
     cli.add_robot_options(parser)
     cli.add_planning_options(parser)
     parser.add_argument("--out", type=cli.path, help="output folder (default: runs/<world>-<robot>-<time>)")

@@ -23,7 +23,7 @@ RECORDING = "surfaces.rrd"
 def arguments() -> argparse.ArgumentParser:
     """The options of this command."""
     parser = cli.parser("surfaces", DESCRIPTION, EPILOG)
-    parser.add_argument("world", type=Path, help="MJCF scene with sites named start and goal")
+    parser.add_argument("world", type=Path, help=cli.WORLD)
     parser.add_argument("--out", type=cli.path, metavar="DIR", help=f"folder for {RECORDING} (default: table only)")
     return parser
 

@@ -47,7 +47,15 @@ class RunFolder:
     run left is cleared away by the next one that uses the folder, or that names its own.
     """
 
-    def __init__(self, out: Path | None, world: str, robot: str, also: Collection[str] = ()):
+    def __init__(
+        self,
+        out: Path | None,
+        world: str,
+        robot: str,
+        also: Collection[str] = (),
+        files: Collection[str] = FILES,
+        kind: str = "run",
+    ):
         """Choose and check the target.
 
         Args:
@@ -55,12 +63,15 @@ class RunFolder:
                 behind it where that exists already.
             world: name of the world.
             robot: name of the robot.
-            also: names of further files that the run writes, apart from `FILES`.
+            also: names of further files that the run writes, apart from `files`.
+            files: names of the files that it writes; those of a run where not given. The report is among them.
+            kind: what such a folder is called in messages.
 
         Raises:
             InputError: `out` cannot be written, or holds something other than an earlier run.
         """
-        self._files = FILES | set(also)
+        self._files = frozenset(files) | set(also)
+        self._kind = kind
         self._unnamed = out is None
         if out is None:
             name = f"{world}-{robot}-{time.strftime('%Y%m%d-%H%M%S')}".replace("/", "_")
@@ -153,11 +164,14 @@ class RunFolder:
             raise InputError(f"{shown}: {_IN_USE}")
         files = [entry for entry in entries if not is_draft(entry.name)]
         if files and not drafts and not _is_report(target / REPORT):
-            raise InputError(f"{shown}: exists, is not empty and is not an earlier run; give --out a new folder")
+            raise InputError(
+                f"{shown}: exists, is not empty and is not an earlier {self._kind}; give --out a new folder"
+            )
         for entry in files:
             if entry.name not in self._files or not entry.is_file(follow_symlinks=False):
                 raise InputError(
-                    f"{shown}: holds {entry.name}, which no run has written; give --out a new folder, or move it away"
+                    f"{shown}: holds {entry.name}, which no {self._kind} has written; give --out a new folder, "
+                    "or move it away"
                 )
 
     def _publish(self) -> None:

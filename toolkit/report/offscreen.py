@@ -7,7 +7,7 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,14 +42,21 @@ def working_backend(backends: Sequence[str] = BACKENDS) -> str:
     wanted = os.environ.get("MUJOCO_GL", "").lower()
     reasons = []
     for backend in sorted(backends, key=lambda name: name != wanted):
-        environment = os.environ | {"MUJOCO_GL": backend}
-        command = [sys.executable, "-c", _PROBE, backend]
-        outcome = subprocess.run(command, capture_output=True, text=True, env=environment)
-        if outcome.returncode == 0:
+        reason = why_not(backend)
+        if not reason:
             return backend
-        last = outcome.stderr.strip().splitlines()[-1:] or [f"exit code {outcome.returncode}"]
-        reasons.append(f"{backend}: {last[0][:100]}")
+        reasons.append(f"{backend}: {reason}")
     raise InputError(f"cannot render off screen ({'; '.join(reasons)}): {REMEDY}")
+
+
+def why_not(backend: str, environment: Mapping[str, str] = os.environ) -> str:
+    """Why one of MuJoCo's context modules does not render here; "" where it does. It is tried in its own process."""
+    command = [sys.executable, "-c", _PROBE, backend]
+    outcome = subprocess.run(command, capture_output=True, text=True, env={**environment, "MUJOCO_GL": backend})
+    if outcome.returncode == 0:
+        return ""
+    last = outcome.stderr.strip().splitlines()[-1:] or [f"exit code {outcome.returncode}"]
+    return last[0][:100]
 
 
 def open_context(width: int, height: int) -> Any:

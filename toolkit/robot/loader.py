@@ -20,15 +20,16 @@ from toolkit.robot.home import check_patches, home_posture, touching_neighbours
 from toolkit.robot.model import LimbModel, RobotModel
 from toolkit.robot.source import find_model_file, read_model
 from toolkit.robot.urdf import urdf_from_model
+from toolkit.shipped import shipped
 
 DEFAULT_GAINS = (200.0, 8.0)
 
 
 def robots_folder(robots_dir: Path | None = None) -> Path:
-    """The folder with one folder per robot: the given one, else `robots/` here, else the one beside the toolkit."""
+    """The folder with one folder per robot: the given one, else `robots/` here, else the toolkit's own."""
     if robots_dir is not None:
         return Path(robots_dir)
-    return Path.cwd() / "robots" if os.path.isdir("robots") else Path(__file__).resolve().parents[2] / "robots"
+    return Path.cwd() / "robots" if os.path.isdir("robots") else shipped("robots")
 
 
 def find_robots(robots_dir: Path | None = None) -> tuple[str, ...]:

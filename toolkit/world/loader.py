@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 from toolkit.errors import WorldError
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
+from toolkit.shipped import shipped
 from toolkit.world.extraction import SurfaceConfig, extract_surfaces
 from toolkit.world.solids import solids_of
 from toolkit.world.source import read_source
@@ -33,7 +35,8 @@ def load_world(
     """Load a world from its MJCF file.
 
     Args:
-        path: The file. Meshes are read from its folder; its name without ending is the name of the world.
+        path: The file, or the name of one (see `find_world`). Meshes are read from its folder; its name without ending
+            is the name of the world.
         mjcf: Text to use in place of the file's content, for a world made in memory.
         config: What counts as a contact surface.
         progress: Called now and then with the share that is done, in [0, 1].
@@ -44,7 +47,7 @@ def load_world(
     Raises:
         WorldError: The message is one line that names the file, the fault and the remedy.
     """
-    path = Path(path)
+    path = find_world(Path(path)) if mjcf is None else Path(path)
     source = read_source(path, mjcf, lambda share: progress(0.5 * share))
     model = source.model
     start, goal, timing = _start(path, model), _goal(path, model), _timing(path, model)
@@ -62,6 +65,24 @@ def load_world(
     _check_ground(path, start, surfaces, palms)
     _check_walls(path, palms, surfaces, config)
     return World(path.stem, path, model, surfaces, start, goal, timing, square, source.spec, palms)
+
+
+def find_world(path: Path) -> Path:
+    """The file that a path means: itself, or for a plain name without such a file, the world of that name.
+
+    Worlds are looked for in `worlds/` here, then among those that come with the toolkit.
+
+    Raises:
+        WorldError: It is a plain name, and neither a file nor a world.
+    """
+    if os.path.isfile(path) or len(path.parts) != 1 or path.suffix:
+        return path
+    folders = (Path("worlds"), shipped("worlds"))
+    for folder in folders:
+        if os.path.isfile(folder / f"{path}.xml"):
+            return folder / f"{path}.xml"
+    names = sorted({found.stem for folder in folders for found in folder.glob("*.xml")})
+    raise WorldError(f"{path}: no such world file; give the path of an MJCF file, or one of {', '.join(names)}")
 
 
 def _site(path: Path, model: mujoco.MjModel, name: str, example: str) -> int:
