@@ -108,11 +108,10 @@ def _kept(folder: Path) -> dict[str, Any]:
         found = {"seed": cli.seed(str(report.seed)), **cli.kept_options(report.options)}
     except (argparse.ArgumentTypeError, InputError) as error:
         raise InputError(f"{folder / REPORT}: {error}") from None
-    for name in ("world", "robots"):
+    for name, kind in (("world", Path), ("robots", Path), ("robot", str)):
         if isinstance(report.options.get(name), str):
-            found[name] = Path(report.options[name])
-    robot = report.options.get("robot")
-    return found | {"robot": robot if isinstance(robot, str) else report.robot}
+            found[name] = kind(report.options[name])
+    return found
 
 
 if __name__ == "__main__":

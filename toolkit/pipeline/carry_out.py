@@ -43,10 +43,10 @@ def carry_out(
 def _check_fits(sequence: ContactSequence, robot: RobotModel, world: World) -> None:
     """Raise InputError unless every contact lies on a surface of the world, with a limb that the robot has."""
     for contact in sequence.start.contacts:
-        _check_contact(contact, "the start", robot, world)
+        _check_contact(contact, "start", robot, world)
     for index, transition in enumerate(sequence.transitions):
         if transition.contact is not None:
-            _check_contact(transition.contact, f"transition {index}", robot, world)
+            _check_contact(transition.contact, f"transitions[{index}]", robot, world)
 
 
 def _check_contact(contact: Contact, where: str, robot: RobotModel, world: World) -> None:
