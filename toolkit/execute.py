@@ -69,12 +69,13 @@ def main(argv: list[str] | None = None) -> int:
         path = path / PLAN
         if not path.is_file():
             raise InputError(f"{args.plan}: lacks {PLAN}: the run found no plan, or it was removed")
+    execution = cli.execution_config(args)
     solution, (world_name, robot_name) = read_proposal(path), read_names(path)
     if args.world is None:
         raise InputError(f"{path}: name the world that it was made for with --world (it was called {world_name})")
     if args.plan.is_dir() and not args.world.is_file():
         raise InputError(f"{args.world}: the world of this run is not there; name it with --world")
-    execution, display = cli.execution_config(args), StageConsole()
+    display = StageConsole()
     display.started("surfaces")
     world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
     surface_seconds = time.perf_counter() - began

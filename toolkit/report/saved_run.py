@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 import zlib
@@ -87,7 +88,7 @@ def _read_execution(folder: Path, reason: str) -> Execution:
     """The execution in a folder; `reason` is the verdict's."""
     path = folder / EXECUTION
     try:
-        with np.load(path) as file:
+        with np.load(io.BytesIO(path.read_bytes())) as file:  # of a path it would leave a broken file open
             arrays = {name: file[name] for name in file.files}
     except _UNREADABLE as error:
         raise InputError(f"{path}: is cut off or broken ({_first_line(error)}); {_AGAIN}") from error
