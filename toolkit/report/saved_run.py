@@ -15,8 +15,9 @@ import mujoco
 import numpy as np
 
 from toolkit.contacts.failure import Failure
-from toolkit.errors import InputError
+from toolkit.errors import ExecutionError, InputError
 from toolkit.execution.result import Controls, Execution, Samples
+from toolkit.execution.scene_index import SceneIndex
 from toolkit.execution.standard import Standard
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.report.files import EXECUTION, REPORT, SCENE, digest, read_check
@@ -100,7 +101,7 @@ def _read_execution(folder: Path, reason: str) -> Execution:
         return _execution(arrays, scene, reason)
     except KeyError as error:
         raise InputError(f"{path}: has no valid {error}; {_AGAIN}") from error
-    except (TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
+    except (ExecutionError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise InputError(f"{path}: is broken: {_first_line(error)}; {_AGAIN}") from error
 
 
@@ -119,8 +120,9 @@ def _read_scene(path: Path, expected: str) -> mujoco.MjModel:
 
 
 def _execution(arrays: Mapping[str, np.ndarray], scene: mujoco.MjModel, reason: str) -> Execution:
-    """An execution from its arrays; raises KeyError, TypeError or ValueError where they are broken."""
+    """An execution from its arrays; raises as `_read_execution` expects it where they are broken."""
     standard = read_standard(json.loads(str(arrays["standard"])))
+    SceneIndex(scene, standard.robot)  # the robot is in this scene, or this raises
     ticks = len(arrays["tick_times"])
     sizes = {"nq": scene.nq, "nv": scene.nv, "nu": scene.nu}
     samples = {}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from toolkit.execution.standard import Move, Standard, Subject
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.report.files import plain
 from toolkit.robot.model import LimbModel
 from toolkit.world.world import Goal
@@ -46,39 +46,54 @@ def read_standard(entry: dict[str, Any]) -> Standard:
     limbs = {}
     for label, model in robot["limbs"].items():
         limb = Limb.from_label(label)
-        limbs[limb] = LimbModel(limb, str(model["site"]), str(model["body"]), _numbers(model["half_size"], 2))
+        limbs[limb] = LimbModel(limb, str(model["site"]), str(model["body"]), _finite(model["half_size"], 2))
+    if not set(FEET) <= set(limbs):
+        raise ValueError(f"robot {robot['name']} has not both feet")
     subject = Subject(
         str(robot["name"]),
         str(robot["base"]),
         tuple(str(name) for name in robot["joint_names"]),
         limbs,
-        float(robot["com_height"]),
-        *(_numbers(robot[name], count) for name in _JOINTS),
+        _number(robot["com_height"]),
+        *(_limits(robot[name], count) for name in _JOINTS),
     )
-    timestep, decimation, ticks = float(entry["timestep"]), int(entry["decimation"]), int(entry["ticks"])
+    timestep, decimation, ticks = _number(entry["timestep"]), int(entry["decimation"]), int(entry["ticks"])
     if not (0.0 < timestep < 1.0 and 0 < decimation < MOST_TICKS and 0 < ticks < MOST_TICKS):
         raise ValueError(f"{ticks} ticks of {decimation} steps of {timestep} s are no run")
     return Standard(
         subject,
-        Goal(_numbers(goal["position"], 3), float(goal["radius"])),
+        Goal(_finite(goal["position"], 3), _number(goal["radius"])),
         timestep,
         decimation,
         ticks,
-        float(entry["slip_limit"]),
-        float(entry["com_rms_limit"]),
+        _number(entry["slip_limit"]),
+        _number(entry["com_rms_limit"]),
         tuple(_read_move(move) for move in entry["moves"]),
     )
 
 
 def _read_move(entry: dict[str, Any]) -> Move:
     """One planned move."""
-    target = None if entry["target"] is None else _numbers(entry["target"], 3)
-    return Move(Limb.from_label(entry["limb"]), float(entry["start"]), float(entry["end"]), target)
+    target = None if entry["target"] is None else _finite(entry["target"], 3)
+    return Move(Limb.from_label(entry["limb"]), _number(entry["start"]), _number(entry["end"]), target)
 
 
-def _numbers(values: list[float | None], count: int) -> np.ndarray:
+def _number(value: Any) -> float:
+    """A finite number."""
+    return float(_finite([value], 1)[0])
+
+
+def _finite(values: list[float], count: int) -> np.ndarray:
+    """(count,) float, all finite."""
+    array = np.array(values, float)
+    if array.shape != (count,) or not np.isfinite(array).all():
+        raise ValueError(f"{values} are not {count} finite numbers")
+    return array
+
+
+def _limits(values: list[float | None], count: int) -> np.ndarray:
     """(count,) float; null stands for infinite."""
     array = np.array([np.inf if value is None else value for value in values], float)
-    if array.shape != (count,):
-        raise ValueError(f"{values} are not {count} numbers")
+    if array.shape != (count,) or np.isnan(array).any():
+        raise ValueError(f"{values} are not {count} limits")
     return array

@@ -11,8 +11,15 @@ import numpy as np
 
 from toolkit.errors import InputError
 from toolkit.execution.result import Execution
+from toolkit.report.pictures import follow
 
-_PROBE = "import glfw, sys; sys.exit(0 if glfw.init() else 1)"
+_PROBE = """
+import sys, glfw
+if not glfw.init():
+    sys.exit(1)
+glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
+sys.exit(0 if glfw.create_window(64, 64, "probe", None, None) else 1)
+"""
 PAUSE = 1.0  # s; between the end of the run and its next beginning
 
 
@@ -38,10 +45,13 @@ def show(execution: Execution) -> None:
     model, data, samples = execution.scene, mujoco.MjData(execution.scene), execution.samples
     times, decimation = samples.tick_times, execution.standard.decimation
     try:
-        window = viewer.launch_passive(model, data)
+        window = viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
     except (RuntimeError, mujoco.FatalError) as error:
         raise InputError(f"--viewer: the window cannot be opened ({error})") from error
     with window:
+        camera = follow(model, samples.qpos, times)[0]
+        window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, model.jnt_bodyid[0]
+        window.cam.distance, window.cam.azimuth, window.cam.elevation = 3.5, camera.azimuth, camera.elevation
         began = time.perf_counter()
         while window.is_running():
             elapsed = (time.perf_counter() - began) % (times[-1] + PAUSE)
