@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import subprocess
 import sys
+import threading
 import time
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -44,10 +47,13 @@ def show(execution: Execution) -> None:
 
     model, data, samples = execution.scene, mujoco.MjData(execution.scene), execution.samples
     times, decimation = samples.tick_times, execution.standard.decimation
+    threads = threading.enumerate()
     try:
         window = viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
     except (RuntimeError, mujoco.FatalError) as error:
         raise InputError(f"--viewer: the window cannot be opened ({error})") from error
+    # A signal ends the process: the thread that draws must have ended before the library is.
+    atexit.register(_close, window, [each for each in threading.enumerate() if each not in threads])
     with window:
         camera = follow(model, samples.qpos, times)[0]
         window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, model.jnt_bodyid[0]
@@ -62,3 +68,10 @@ def show(execution: Execution) -> None:
                 mujoco.mj_forward(model, data)
             window.sync()
             time.sleep(0.01)
+
+
+def _close(window: Any, threads: list[threading.Thread]) -> None:
+    """Close the window and wait for the threads that draw it."""
+    window.close()
+    for thread in threads:
+        thread.join(1.0)
