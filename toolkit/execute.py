@@ -32,10 +32,14 @@ def arguments() -> argparse.ArgumentParser:
     parser = cli.parser("execute", DESCRIPTION, EPILOG)
     parser.add_argument("plan", type=cli.path, metavar="RUN_OR_PLAN", help="folder of a run, or a plan.json")
     parser.add_argument("--world", type=cli.path, metavar="FILE", help="MJCF scene (default: that of the run)")
-    cli.add_robot_options(parser)
+    parser.add_argument("--robot", help="folder name under robots/, or a path (default: that of the plan)")
+    parser.add_argument("--robots", type=Path, metavar="DIR", help="folder with the robots (default: robots/)")
     parser.add_argument("--seed", type=cli.seed, default=0, help="seed of every random draw (default: the run's, or 0)")
     cli.add_disturbance_options(parser)
     cli.add_execution_options(parser)
+    parser.add_argument(
+        "--replanning", action="store_true", default=argparse.SUPPRESS, help="replan, though the run was without it"
+    )
     parser.add_argument("--out", type=cli.path, help="output folder (default: runs/<world>-<robot>-<time>)")
     parser.add_argument("--pictures", action="store_true", help="also render a strip of pictures and plots")
     parser.add_argument("--video", action="store_true", help="also render a video")

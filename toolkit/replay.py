@@ -27,7 +27,7 @@ MuJoCo, or another kind of processor, may differ; report.json names the versions
 def arguments() -> argparse.ArgumentParser:
     """The options of this command."""
     parser = cli.parser("replay", DESCRIPTION, EPILOG)
-    parser.add_argument("run", type=cli.path, help="folder that python -m toolkit.validate has written")
+    parser.add_argument("run", type=cli.path, metavar="RUN", help="folder that python -m toolkit.validate has written")
     parser.add_argument("--video", type=cli.path, metavar="FILE.mp4", help="also render a video of the replay")
     parser.add_argument("--rerun", type=cli.path, metavar="FILE.rrd", help="also write a recording of the replay")
     parser.add_argument("--viewer", action="store_true", help="then show the replay in MuJoCo's viewer")
@@ -58,7 +58,8 @@ def main(argv: list[str] | None = None) -> int:
         require_display()
     saved = read_run(args.run)
     if saved.execution is None:
-        raise InputError(f"{args.run}: this run was never executed ({saved.report.reason}); there is nothing to replay")
+        why = f" ({saved.report.reason})" if saved.report.reason else ""
+        raise InputError(f"{args.run}: this run was never executed{why}; there is nothing to replay")
     sequence = read_plan(args.run / PLAN) if args.video or args.rerun else None
     display = StageConsole()
     display.started("replay")
