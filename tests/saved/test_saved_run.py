@@ -35,7 +35,8 @@ def test_a_written_run_is_read_back(tmp_path, steps):
     assert again.failure is not None and again.failure.reason == made.report.reason
 
 
-def test_a_report_is_read_back(run, tmp_path):
+def test_a_report_is_read_back(tmp_path):
+    run = make_run()
     write_report(tmp_path / "report.json", run.report)
     again = read_report(tmp_path / "report.json")
     assert again.checks == run.report.checks  # the one without a finite value included
