@@ -7,6 +7,7 @@ optimiser, by inverse kinematics and by the simulation. The first that passes ev
 the search starts again without the transitions at which they failed.
 """
 
+from toolkit.pipeline.carry_out import carry_out
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.pipeline.loop import PipelineResult, run
 from toolkit.pipeline.observer import Observer
@@ -19,6 +20,7 @@ __all__ = [
     "PipelineResult",
     "Planner",
     "Trial",
+    "carry_out",
     "make_planner",
     "planner_kind",
     "run",
