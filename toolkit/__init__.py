@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from toolkit.execution.config import ExecutionConfig
     from toolkit.execution.disturbance import Disturbance
-    from toolkit.execution.replay import replay
-    from toolkit.execution.run import execute
-    from toolkit.pipeline import PipelineConfig, PipelineResult, make_planner, run
+    from toolkit.execution.replay import replay_run
+    from toolkit.pipeline import PipelineConfig, PipelineResult, carry_out, make_planner, run
     from toolkit.report.files import RunFolder
+    from toolkit.report.plan_file import read_plan
     from toolkit.report.run import RunOptions, write_run
+    from toolkit.report.saved_run import read_run
     from toolkit.robot.loader import find_robots, load_robot
     from toolkit.search.planner import PlannerConfig
     from toolkit.world.loader import load_world
@@ -29,12 +30,14 @@ __all__ = [
     "PlannerConfig",
     "RunFolder",
     "RunOptions",
-    "execute",
+    "carry_out",
     "find_robots",
     "load_robot",
     "load_world",
     "make_planner",
-    "replay",
+    "read_plan",
+    "read_run",
+    "replay_run",
     "run",
     "write_run",
 ]
@@ -46,12 +49,14 @@ _HOMES = {
     "PlannerConfig": "toolkit.search.planner",
     "RunFolder": "toolkit.report.files",
     "RunOptions": "toolkit.report.run",
-    "execute": "toolkit.execution.run",
+    "carry_out": "toolkit.pipeline",
     "find_robots": "toolkit.robot.loader",
     "load_robot": "toolkit.robot.loader",
     "load_world": "toolkit.world.loader",
     "make_planner": "toolkit.pipeline",
-    "replay": "toolkit.execution.replay",
+    "read_plan": "toolkit.report.plan_file",
+    "read_run": "toolkit.report.saved_run",
+    "replay_run": "toolkit.execution.replay",
     "run": "toolkit.pipeline",
     "write_run": "toolkit.report.run",
 }

@@ -235,7 +235,41 @@ def execution_config(args: argparse.Namespace) -> ExecutionConfig:
 def plain_options(args: argparse.Namespace) -> dict[str, Any]:
     """The options that a report keeps: numbers, words and paths, but for the seed and the folder, kept elsewhere."""
     values = vars(args).items()
-    return {k: v for k, v in values if isinstance(v, (bool, int, float, str, Path)) and k not in ("seed", "out")}
+    return {k: v for k, v in values if _is_plain(v) and k not in ("seed", "out")}
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether a report keeps this value of an option: a number, a word, a path, or some numbers."""
+    if isinstance(value, tuple) and value:
+        return all(isinstance(part, float) for part in value)
+    return isinstance(value, (bool, int, float, str, Path))
+
+
+def kept_options(options: dict[str, Any]) -> dict[str, Any]:
+    """Values for `add_disturbance_options` and `add_execution_options` from the options that a report keeps.
+
+    Raises:
+        InputError: a value is none that these options can have.
+    """
+    found: dict[str, Any] = {}
+    for name in ("push", "mass_error", "friction_error", "state_noise", "delay"):
+        if name in options:
+            found[name] = _kept_number(name, options[name])
+    if "terrain_error" in options:
+        parts = options["terrain_error"]
+        if not isinstance(parts, list) or len(parts) != 2:
+            raise InputError(f"options.terrain_error is {parts!r} in the report, must be two numbers")
+        found["terrain_error"] = tuple(_kept_number("terrain_error", part) for part in parts)
+    if "replanning" in options:
+        found["replanning"] = options["replanning"] is True
+    return found
+
+
+def _kept_number(name: str, value: Any) -> float:
+    """A finite number of a report."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise InputError(f"options.{name} is {value!r} in the report, must be a number")
+    return float(value)
 
 
 def _terrain_error(text: str) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.execution.check import Check
 from toolkit.execution.result import Controls, Execution, Samples
+from toolkit.execution.standard import Move, Standard, Subject
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_from_quaternion
 from toolkit.pipeline import Candidate, PipelineConfig, PipelineResult, Source, Trial
@@ -243,8 +244,13 @@ def make_run(steps: int = 4) -> MadeUpRun:
         Check("goal distance", 0.3, "m", float("inf")),
         Check("torque ratio", 1.0),
     )
+    moves = tuple(
+        Move(t.limb, end - t.timing.swing, end, None if t.contact is None else t.contact.pose.position)
+        for t, end in zip(sequence.transitions, ends, strict=True)
+    )
     execution = Execution(
         scene=scene,
+        standard=Standard(Subject.of(robot), world.goal, TIMESTEP, 2, len(ticks), 0.02, 0.02, moves),
         controls=Controls(
             timestep=TIMESTEP,
             qpos0=np.array(scene.qpos0),
@@ -259,8 +265,10 @@ def make_run(steps: int = 4) -> MadeUpRun:
             qvel=np.zeros((len(ticks), scene.nv)),
             com=centre + noise,
             com_planned=centre,
+            com_aim=centre,
             momentum=np.hstack([60 * noise, noise]),
             momentum_planned=np.zeros((len(ticks), 6)),
+            may_touch=wrench[..., 2] > 0,
             wrench=wrench + np.where(wrench != 0, rng.standard_normal(wrench.shape), 0.0),
             wrench_planned=wrench,
             cop_margin=np.where(wrench[..., 2] > 0, 0.05, np.nan),

@@ -2,53 +2,61 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 
 from toolkit.contacts.failure import Failure
-from toolkit.control.sampled_plan import Reference
-from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.execution.slip import SETTLE_TIME, ContactInterval, contact_intervals
+from toolkit.execution.standard import Move, Standard
 from toolkit.execution.verdict import execution_checks, failure_reason
 from toolkit.replanning.replanner import ReplanCounts
-from toolkit.wholebody.plan import WholeBodyPlan
+
+
+class Planned(NamedTuple):
+    """The plan at the control ticks of a run, at least as many as were run; see `Samples`."""
+
+    com: np.ndarray
+    momentum: np.ndarray
+    wrench: np.ndarray
 
 
 def measure(
     recorder: Recorder,
     controls: Controls,
-    reference: Reference,
-    plan: WholeBodyPlan,
-    config: ExecutionConfig,
+    standard: Standard,
+    planned: Planned,
     *,
     solver_failures: int,
     wall_seconds: float,
     replanning: ReplanCounts,
+    replayable: bool,
 ) -> Execution:
     """The execution with its checks, from a recorded run.
 
     Args:
         recorder: What was sampled.
         controls: What was applied.
-        reference: The plan at the ticks.
-        plan: What was executed.
-        config: Settings and limits.
+        standard: What the run is held against.
+        planned: The plan at the ticks, to be kept beside the measurements. It decides nothing.
         solver_failures: Number of ticks whose QP was not solved.
         wall_seconds: Duration of the loop in s.
         replanning: How the run was replanned.
+        replayable: Whether nothing but the controls acted.
     """
-    robot, goal, scene, count = plan.robot, plan.world.goal, recorder.scene, recorder.count
-    times = reference.times[:count]
+    robot, goal, scene, count = standard.robot, standard.goal, recorder.scene, recorder.count
+    times = standard.times[:count]
     intervals = []
     for limb, model in sorted(robot.limbs.items()):
         force, position = recorder.normal_force[:count, limb], recorder.limb_position[:count, limb]
         rotation = recorder.limb_rotation[:count, limb]
-        intervals += contact_intervals(limb, force, position, rotation, model.half_size, config.control_period)
-    slip = _slip_by_stance(intervals, times, reference, len(plan.sequence.stances))
-    touchdowns = _touchdowns(intervals, recorder, reference, config)
-    missing = sum(swing.contact is not None for swing in reference.swings) - len(touchdowns)
+        intervals += contact_intervals(limb, force, position, rotation, model.half_size, standard.period)
+    slip = _slip_by_stance(intervals, times, standard.moves)
+    touchdowns = _touchdowns(intervals, recorder, standard)
+    missing = sum(move.target is not None for move in standard.moves) - len(touchdowns)
     error = recorder.com[:count] - recorder.com_aim[:count]
     torque_ratio = (np.abs(recorder.torque[:count]) / robot.torque_limit).max(1)
     joints, speed = recorder.qpos[:count, 7:], np.abs(recorder.qvel[:count, 6:])
@@ -56,7 +64,7 @@ def measure(
     feet = _feet(recorder, controls.final_qpos).mean(0)[:2]
     distance = float(np.hypot(*(feet - goal.position[:2])))
     fell = bool(recorder.fall)
-    completed = count == len(reference.times) and not fell
+    completed = count == standard.ticks and not fell
     values = {
         "upright": float(fell),
         "completed": float(not completed),
@@ -70,14 +78,14 @@ def measure(
         "joint_range": float(max(excess, 0.0)),
         "velocity_ratio": float((speed / robot.velocity_limit).max()),
     }
-    checks = execution_checks(values, goal.radius, config)
-    when = _failure_time(fell, recorder, slip, times, reference, config)
+    checks = execution_checks(values, goal.radius, standard)
+    when = _failure_time(fell, recorder, slip, times, standard)
     reason = failure_reason(checks, recorder.fall)
-    transition = None if when is None else plan.schedule.phase_at(when).transition
-    simulated = len(controls.ctrl) * config.timestep
-    mass = float(scene.body_subtreemass[0])
+    transition = None if when is None else standard.transition_at(when)
+    simulated = len(controls.ctrl) * standard.timestep
     return Execution(
         scene=scene,
+        standard=standard,
         controls=controls,
         samples=Samples(
             tick_times=times,
@@ -85,11 +93,13 @@ def measure(
             qpos=recorder.qpos[:count],
             qvel=recorder.qvel[:count],
             com=recorder.com[:count],
-            com_planned=reference.com[:count],
+            com_planned=planned.com[:count],
+            com_aim=recorder.com_aim[:count],
             momentum=recorder.momentum[:count],
-            momentum_planned=np.hstack([mass * reference.com_velocity[:count], reference.angular_momentum[:count]]),
+            momentum_planned=planned.momentum[:count],
+            may_touch=recorder.may_touch[:count],
             wrench=recorder.wrench[:count],
-            wrench_planned=_world_wrench(reference, count),
+            wrench_planned=planned.wrench[:count],
             cop_margin=recorder.cop_margin[:count],
             limb_pose=recorder.limb_pose,
             torque=recorder.torque[:count],
@@ -111,7 +121,7 @@ def measure(
         simulated_seconds=simulated,
         real_time_factor=simulated / wall_seconds,
         checks=checks,
-        replayable=config.disturbance.replayable,
+        replayable=replayable,
         failure=Failure(reason, when, transition) if reason else None,
         replanning=replanning,
     )
@@ -122,32 +132,27 @@ def _failure_time(
     recorder: Recorder,
     slip: tuple[float, ...],
     times: np.ndarray,
-    reference: Reference,
-    config: ExecutionConfig,
+    standard: Standard,
 ) -> float | None:
     """Time in s at which the run went wrong: a fall, an unplanned contact, or the swing before the worst slip."""
     if fell:
         return float(times[-1])
     if recorder.meter.unplanned_time is not None:
         return recorder.meter.unplanned_time
-    if slip and max(slip) > config.slip_limit:
+    if slip and max(slip) > standard.slip_limit:
         worst = int(np.argmax(slip))
-        return next((swing.start for swing in reference.swings if swing.transition == worst), float(times[-1]))
+        return standard.moves[worst].start if worst < len(standard.moves) else float(times[-1])
     return None
 
 
-def _slip_by_stance(
-    intervals: list[ContactInterval], times: np.ndarray, reference: Reference, stances: int
-) -> tuple[float, ...]:
+def _slip_by_stance(intervals: list[ContactInterval], times: np.ndarray, moves: tuple[Move, ...]) -> tuple[float, ...]:
     """Largest slip of the contacts that overlap each stance; stance k ends with transition k's swing.
 
     A contact that lasts over several stances counts with its whole slip in each of them.
     """
-    ends = np.full(stances, np.inf)
-    for swing in reference.swings:
-        ends[swing.transition] = swing.end
+    ends = np.array([*(move.end for move in moves), np.inf])
     begins = np.r_[-np.inf, ends[:-1]]
-    reached = [k for k in range(stances) if k == 0 or begins[k] <= times[-1]]
+    reached = [k for k in range(len(ends)) if k == 0 or begins[k] <= times[-1]]
     slip = np.zeros(len(reached))
     for interval in intervals:
         first, last = times[interval.first], times[interval.last]
@@ -157,39 +162,29 @@ def _slip_by_stance(
     return tuple(float(each) for each in slip)
 
 
-def _touchdowns(
-    intervals: list[ContactInterval], recorder: Recorder, reference: Reference, config: ExecutionConfig
-) -> tuple[dict, ...]:
+def _touchdowns(intervals: list[ContactInterval], recorder: Recorder, standard: Standard) -> tuple[dict, ...]:
     """The contact that each transition made: the first that begins after the middle of its swing."""
-    settle = round(SETTLE_TIME / config.control_period)
+    settle, times = round(SETTLE_TIME / standard.period), standard.times
     made = []
-    for swing in reference.swings:
-        if swing.contact is None:
+    for transition, move in enumerate(standard.moves):
+        if move.target is None:
             continue
-        middle = 0.5 * (swing.start + swing.end)
-        later = [each for each in intervals if each.limb == swing.limb and reference.times[each.first] >= middle]
+        middle = 0.5 * (move.start + move.end)
+        later = [each for each in intervals if each.limb == move.limb and times[each.first] >= middle]
         if not later:
             continue
         sample = min(later[0].first + settle, recorder.count - 1)
-        error = recorder.limb_position[sample, swing.limb] - swing.contact.pose.position
+        error = recorder.limb_position[sample, move.limb] - move.target
         made.append(
             {
-                "transition": swing.transition,
-                "limb": swing.limb.label,
-                "time": float(reference.times[later[0].first]),
-                "planned_time": swing.end,
+                "transition": transition,
+                "limb": move.limb.label,
+                "time": float(times[later[0].first]),
+                "planned_time": move.end,
                 "position_error": float(np.linalg.norm(error)),
             }
         )
     return tuple(made)
-
-
-def _world_wrench(reference: Reference, count: int) -> np.ndarray:
-    """Planned wrenches (count, 4, 6) about the patches' centres in the world frame."""
-    rotation, wrench = reference.limb_rotation[:count], reference.wrench[:count]
-    return np.concatenate(
-        [np.einsum("klij,klj->kli", rotation, wrench[..., part]) for part in (slice(0, 3), slice(3, 6))], axis=-1
-    )
 
 
 def _feet(recorder: Recorder, qpos: np.ndarray) -> np.ndarray:

@@ -8,8 +8,8 @@ import numpy as np
 from toolkit.execution.contact_meter import ContactMeter
 from toolkit.execution.scene_index import SceneIndex
 from toolkit.execution.slip import BEARING_FORCE
+from toolkit.execution.standard import Subject
 from toolkit.geometry.pose import quaternion_from_rotation
-from toolkit.robot.model import RobotModel
 
 MAX_TILT = np.radians(60.0)  # rad; tilt of the base beyond which the robot has fallen
 MIN_HEIGHT = 0.5  # part of the home CoM height above the lowest foot below which the robot has fallen
@@ -26,15 +26,16 @@ class Recorder:
         count: Number of rows that are filled.
         fall: One line once the robot has fallen; "" before.
         tick_seconds, qpos, qvel, com, momentum, wrench, cop_margin, torque: See `Samples`.
-        com_aim: (C, 3) m; the CoM that the controller tracked.
+        com_aim, may_touch: See `Samples`; the loop of the run fills them.
         normal_force, limb_position, limb_rotation: (C, 4) N, (C, 4, 3) m and (C, 4, 3, 3) world_from_limb.
     """
 
-    def __init__(self, ticks: int, scene: mujoco.MjModel, robot: RobotModel, index: SceneIndex):
+    def __init__(self, ticks: int, scene: mujoco.MjModel, robot: Subject, index: SceneIndex):
         self.scene, self.index, self._robot = scene, index, robot
         self.meter = ContactMeter(index)
         self.count, self.fall = 0, ""
         self.tick_seconds, self.com_aim = np.zeros(ticks), np.zeros((ticks, 3))
+        self.may_touch = np.zeros((ticks, 4), bool)
         self.qpos, self.qvel = np.zeros((ticks, scene.nq)), np.zeros((ticks, scene.nv))
         self.com, self.momentum = np.zeros((ticks, 3)), np.zeros((ticks, 6))
         self.wrench, self.normal_force = np.zeros((ticks, 4, 6)), np.zeros((ticks, 4))

@@ -1,55 +1,114 @@
-"""Replay a saved run in plain MuJoCo."""
+"""Replay a run in plain MuJoCo."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from time import perf_counter
 
 import mujoco
 import numpy as np
 
-from toolkit.errors import InputError
-from toolkit.execution.result import Controls
-
-_NAMES = ("timestep", "qpos0", "qvel0", "ctrl", "qpos")
-
-
-def replay(scene_path: Path | str, execution_path: Path | str) -> float:
-    """Largest absolute difference of the final qpos to the recorded one when only the controls of a run act.
-
-    It is 0 unless something else acted on the robot.
-
-    Args:
-        scene_path: The run's scene.mjb.
-        execution_path: Its execution.npz with `timestep`, `qpos0`, `qvel0`, `ctrl` and `qpos` (its last row counts).
-
-    Raises:
-        InputError: A file is missing or is not what its name says.
-    """
-    for path in (scene_path, execution_path):
-        if not Path(path).is_file():
-            raise InputError(f"{path}: no such file; name the scene.mjb and execution.npz of a run")
-    try:
-        scene = mujoco.MjModel.from_binary_path(str(scene_path))
-    except (ValueError, mujoco.FatalError) as error:
-        raise InputError(f"{scene_path}: not a compiled MuJoCo model of this version ({error})") from error
-    with np.load(execution_path) as run:
-        missing = [name for name in _NAMES if name not in run]
-        if missing:
-            raise InputError(f"{execution_path}: lacks {', '.join(missing)}; it is not the record of a run")
-        timestep, qpos0, qvel0, ctrl, qpos = (run[name] for name in _NAMES)
-    if ctrl.ndim != 2 or ctrl.shape[1] != scene.nu or qpos0.shape != (scene.nq,):
-        raise InputError(f"{execution_path}: does not belong to {scene_path}; take both from the same run")
-    if scene.opt.timestep != float(timestep):
-        raise InputError(f"{scene_path}: steps of {scene.opt.timestep} s where the run made {float(timestep)} s")
-    final = replay_controls(scene, Controls(float(timestep), qpos0, qvel0, ctrl, qpos[-1]))
-    return float(np.abs(final - qpos[-1]).max())
+from toolkit.errors import ExecutionError
+from toolkit.execution.check import Check
+from toolkit.execution.measure import Planned, measure
+from toolkit.execution.recorder import Recorder
+from toolkit.execution.result import Controls, Execution
+from toolkit.execution.scene_index import SceneIndex
+from toolkit.replanning.replanner import ReplanCounts
 
 
 def replay_controls(scene: mujoco.MjModel, controls: Controls) -> np.ndarray:
-    """Final qpos (nq,) after one mj_step per row of controls from the initial state."""
+    """Final qpos (nq,) after one mj_step per row of controls from the initial state; what pushed is left out."""
     data = mujoco.MjData(scene)
     data.qpos[:], data.qvel[:] = controls.qpos0, controls.qvel0
     for row in controls.ctrl:
         data.ctrl[:] = row
         mujoco.mj_step(scene, data)
     return data.qpos.copy()
+
+
+def replay_run(execution: Execution, *, observer: Callable[[float], None] = lambda share: None) -> Execution:
+    """Simulate a run again from its controls and pushes, without any controller, and measure it anew.
+
+    Every check is computed from this simulation. Of the recorded run only the plan is taken over: where the CoM was to
+    be, and which limbs were allowed to touch. `difference` compares the two.
+
+    Args:
+        execution: The recorded run.
+        observer: Receives the share of the run that is done, every 0.1 s of it.
+
+    Raises:
+        ExecutionError: The scene is not the one in which the robot ran.
+    """
+    scene, standard, controls, samples = execution.scene, execution.standard, execution.controls, execution.samples
+    index = SceneIndex(scene, standard.robot)
+    ticks = len(samples.tick_times)
+    if len(controls.ctrl) != ticks * standard.decimation:
+        raise ExecutionError(
+            f"the run has {len(controls.ctrl)} steps in {ticks} control ticks of {standard.decimation}"
+        )
+    recorder = Recorder(ticks, scene, standard.robot, index)
+    data = mujoco.MjData(scene)
+    data.qpos[:], data.qvel[:] = controls.qpos0, controls.qvel0
+    qpos, qvel = controls.qpos0.copy(), controls.qvel0.copy()
+    report_every = max(round(0.1 / standard.period), 1)
+    began, step = perf_counter(), 0
+    for tick in range(ticks):
+        recorder.com_aim[tick] = samples.com_aim[tick]
+        recorder.may_touch[tick] = recorder.meter.expected[:] = samples.may_touch[tick]
+        for part in range(standard.decimation):
+            data.ctrl[:] = controls.ctrl[step]
+            if controls.push is not None:
+                data.xfrc_applied[index.base, :3] = controls.push[step]
+            step += 1
+            mujoco.mj_step(scene, data)
+            recorder.meter.read(data)
+            if part == 0:
+                recorder.record(data, qpos, qvel)
+            qpos[:], qvel[:] = data.qpos, data.qvel
+        if recorder.fall:
+            break
+        if tick % report_every == 0:
+            observer(tick / ticks)
+    push = None if controls.push is None else controls.push[:step]
+    return measure(
+        recorder,
+        Controls(controls.timestep, controls.qpos0, controls.qvel0, controls.ctrl[:step], qpos, push),
+        standard,
+        Planned(samples.com_planned, samples.momentum_planned, samples.wrench_planned),
+        solver_failures=execution.solver_failures,
+        wall_seconds=perf_counter() - began,
+        replanning=ReplanCounts(),
+        replayable=execution.replayable,
+    )
+
+
+def difference(recorded: Execution, again: Execution) -> str:
+    """One line on where a replay left the states or the checks of the recorded run; "" where both are the same.
+
+    States are compared bit for bit, at every control tick and after the last step.
+    """
+    states, found = ([*run.samples.qpos, run.controls.final_qpos] for run in (recorded, again))
+    apart = (k for k, (one, other) in enumerate(zip(states, found, strict=False)) if not np.array_equal(one, other))
+    first = next(apart, None)
+    if first is not None:
+        off = float(np.abs(states[-1] - found[-1]).max())
+        return f"the states are others from {first * recorded.standard.period:.3f} s on, the last by up to {off:.3g}"
+    if len(states) != len(found):
+        return f"it ends after {len(found) - 1} control ticks, the recorded run after {len(states) - 1}"
+    return checks_difference(recorded.checks, again.checks)
+
+
+def checks_difference(recorded: Sequence[Check], again: Sequence[Check]) -> str:
+    """One line on the first check of which a replay says something else; "" where there is none."""
+    known = {check.name: check for check in recorded}
+    for check in again:
+        other = known.get(check.name)
+        if other is None:
+            return f"the record has no check {check.name}"
+        if other != check:
+            return (
+                f"{check.name} is {check.value} of at most {check.limit} {check.unit}".rstrip()
+                + f", in the record {other.value} of at most {other.limit}"
+            )
+    return ""

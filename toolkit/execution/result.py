@@ -10,6 +10,7 @@ import numpy as np
 
 from toolkit.contacts.failure import Failure
 from toolkit.execution.check import Check
+from toolkit.execution.standard import Standard
 from toolkit.replanning.replanner import ReplanCounts
 
 
@@ -22,6 +23,7 @@ class Controls:
         qpos0, qvel0: Initial state (nq,), (nv,).
         ctrl: (S, nu) applied controls, one row per physics step.
         final_qpos: (nq,) after the last step.
+        push: (S, 3) N at the base, in the world, beside the controls; None where the run was not pushed.
     """
 
     timestep: float
@@ -29,6 +31,7 @@ class Controls:
     qvel0: np.ndarray
     ctrl: np.ndarray
     final_qpos: np.ndarray
+    push: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -38,8 +41,9 @@ class Samples:
     Attributes:
         tick_times, tick_seconds: Each (C,) s; when the samples were taken, and the wall-clock time of each tick.
         qpos, qvel: (C, nq) and (C, nv).
-        com, com_planned: Each (C, 3) m.
+        com, com_planned, com_aim: Each (C, 3) m; the last is what the controller tracked, the plan as replanned.
         momentum, momentum_planned: Each (C, 6); linear, and angular about the CoM.
+        may_touch: (C, 4) bool; limbs whose patch may touch the world.
         wrench, wrench_planned: Each (C, 4, 6); contact force and moment about the patch centre, world frame.
         cop_margin: (C, 4) m; distance of the measured CoP to the patch's edge, NaN without contact.
         limb_pose: (C, 4, 7) measured patch poses, positions and quaternions wxyz.
@@ -52,8 +56,10 @@ class Samples:
     qvel: np.ndarray
     com: np.ndarray
     com_planned: np.ndarray
+    com_aim: np.ndarray
     momentum: np.ndarray
     momentum_planned: np.ndarray
+    may_touch: np.ndarray
     wrench: np.ndarray
     wrench_planned: np.ndarray
     cop_margin: np.ndarray
@@ -68,6 +74,7 @@ class Execution:
 
     Attributes:
         scene: The compiled scene that ran (robot and world), as saved in scene.mjb.
+        standard: What the run is held against.
         touchdowns: One dict per transition: `transition`, `limb`, `time`, `planned_time`, `position_error` in m.
         slip: For each stance, the largest tangential displacement of any patch while it was in contact, in m.
         completed: Whether the plan was run to its end.
@@ -83,6 +90,7 @@ class Execution:
     """
 
     scene: mujoco.MjModel = field(repr=False)
+    standard: Standard = field(repr=False)
     controls: Controls
     samples: Samples
     touchdowns: tuple[dict, ...]
@@ -106,7 +114,7 @@ class Execution:
     replanning: ReplanCounts = ReplanCounts()
 
     def named(self) -> dict[str, Any]:
-        """Everything but the scene by its name, as report.json and execution.npz have it; groups are unpacked."""
+        """By name, as report.json and execution.npz have it; groups are unpacked, scene and standard left out."""
         fall = "" if self.fall is None else self.fall.reason
         when = None if self.failure is None else self.failure.time
         values: dict[str, Any] = {"fell": self.fell, "fall_reason": fall, "failure_time": when}
@@ -114,7 +122,7 @@ class Execution:
             value = getattr(self, item.name)
             if isinstance(value, (Controls, Samples, ReplanCounts)):
                 values |= {part.name: getattr(value, part.name) for part in fields(value)}
-            elif item.name not in ("scene", "fall", "failure"):
+            elif item.name not in ("scene", "standard", "fall", "failure"):
                 values[item.name] = value
         return values
 

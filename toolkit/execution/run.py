@@ -10,14 +10,15 @@ import mujoco
 import numpy as np
 
 from toolkit.control.controller import Controller
-from toolkit.control.sampled_plan import sample_reference
+from toolkit.control.sampled_plan import Reference, sample_reference
 from toolkit.errors import ExecutionError
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import StateFilter
-from toolkit.execution.measure import measure
+from toolkit.execution.measure import Planned, measure
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution
 from toolkit.execution.scene_index import SceneIndex
+from toolkit.execution.standard import Standard
 from toolkit.replanning.replanner import MAX_FRICTION, ReplanCounts, Replanner
 from toolkit.wholebody.plan import WholeBodyPlan
 
@@ -67,12 +68,14 @@ def execute(
     if config.replanning and margins.friction <= MAX_FRICTION:
         replanner = Replanner(reference, plan)
     controller = Controller(robot, reference, margins, period, replanner)
-    recorder = Recorder(ticks, scene, robot, index)
+    standard = Standard.of(plan, config, reference.swings, ticks)
+    recorder = Recorder(ticks, scene, standard.robot, index)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(plan.schedule.duration, rng)
     data = mujoco.MjData(scene)
     data.qpos[:], data.qvel[:] = qpos0, qvel0
     ctrl = np.zeros((ticks * config.control_decimation, scene.nu))
+    pushes = np.zeros((len(ctrl), 3)) if push.any() else None
     step = 0
     report_every = max(round(0.1 / period), 1)
     qpos, qvel = qpos0.copy(), qvel0.copy()
@@ -82,11 +85,12 @@ def execute(
         torque = controller.tick(tick, *told(qpos, qvel), recorder.meter.normal_force)
         recorder.tick_seconds[tick] = perf_counter() - tick_started
         recorder.com_aim[tick] = controller.aim.com
-        recorder.meter.expected[:] = reference.authority[tick] > 0.0
+        recorder.may_touch[tick] = recorder.meter.expected[:] = reference.authority[tick] > 0.0
         data.ctrl[:] = torque
-        if push.any():
+        if pushes is not None:
             pushed = push_time <= reference.times[tick] < push_time + config.disturbance.push_duration
-            data.xfrc_applied[index.base, :3] = push if pushed else 0.0
+            pushes[step : step + config.control_decimation] = push if pushed else 0.0
+            data.xfrc_applied[index.base, :3] = pushes[step]
         for part in range(config.control_decimation):
             ctrl[step] = torque
             step += 1
@@ -101,14 +105,22 @@ def execute(
             observer(tick / ticks, f"{reference.times[tick]:.1f} s")
     return measure(
         recorder,
-        Controls(config.timestep, qpos0, qvel0, ctrl[:step], qpos),
-        reference,
-        plan,
-        config,
+        Controls(config.timestep, qpos0, qvel0, ctrl[:step], qpos, None if pushes is None else pushes[:step]),
+        standard,
+        _planned(reference, float(scene.body_subtreemass[0])),
         solver_failures=controller.failures,
         wall_seconds=perf_counter() - started,
         replanning=replanner.counts if replanner else ReplanCounts(),
+        replayable=config.disturbance.replayable,
     )
+
+
+def _planned(reference: Reference, mass: float) -> Planned:
+    """The plan at the ticks as it is kept: momenta of a robot of `mass` in kg, wrenches in the world frame."""
+    rotation, wrench = reference.limb_rotation, reference.wrench
+    parts = [np.einsum("klij,klj->kli", rotation, wrench[..., part]) for part in (slice(0, 3), slice(3, 6))]
+    momentum = np.hstack([mass * reference.com_velocity, reference.angular_momentum])
+    return Planned(reference.com, momentum, np.concatenate(parts, axis=-1))
 
 
 def _check_plan(plan: WholeBodyPlan) -> None:

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from toolkit.errors import ExecutionError
+from toolkit.execution.standard import Subject
 from toolkit.robot.model import RobotModel
 
 PATCH_TOLERANCE = 5e-3  # m; a geom belongs to the patch if its lowest point is that near to the patch's plane
@@ -22,7 +23,7 @@ class SceneIndex:
         trunk_geom: (ngeom,) bool; geoms on no arm or leg of the robot. To touch the world with one is a fall.
     """
 
-    def __init__(self, scene: mujoco.MjModel, robot: RobotModel):
+    def __init__(self, scene: mujoco.MjModel, robot: RobotModel | Subject):
         """Find the robot.
 
         Raises:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from toolkit.execution.check import Check, Result
 from toolkit.execution.config import ExecutionConfig
+from toolkit.execution.standard import Standard
 
 RANGE_TOLERANCE = 1e-3  # rad; excess over joint ranges, because limits of the simulation are soft
 
 
-def execution_checks(values: dict[str, float], goal_radius: float, config: ExecutionConfig) -> tuple[Check, ...]:
+def execution_checks(
+    values: dict[str, float], goal_radius: float, config: ExecutionConfig | Standard
+) -> tuple[Check, ...]:
     """Hold what was measured against its limits, the gravest check first.
 
     Args:

@@ -8,6 +8,7 @@ everything is the plan. Where all fail, the search starts again without the tran
 """
 
 from toolkit.pipeline.candidate import Candidate, Source
+from toolkit.pipeline.carry_out import carry_out
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.pipeline.loop import PipelineResult, run
 from toolkit.pipeline.observer import Observer
@@ -22,6 +23,7 @@ __all__ = [
     "Planner",
     "Source",
     "Trial",
+    "carry_out",
     "make_planner",
     "planner_kind",
     "run",

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
+from toolkit.centroidal.plan import plan_motion
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.pipeline.config import PipelineConfig
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.prediction.networks import NetworkEvaluator, load_networks
+from toolkit.prediction.optimiser import OptimiserEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import Progress
 from toolkit.search.moves.exclusion import Exclusion

@@ -14,13 +14,14 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.failure import Failure
 from toolkit.execution.result import Execution
-from toolkit.report.files import check_entries, plain
+from toolkit.report.files import check_entries, digest, plain, scene_bytes
+from toolkit.report.standard_entry import standard_entry
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 _TIMES = ("centroidal_seconds", "wholebody_seconds", "tick_seconds", "replan_seconds", "real_time_factor")
 """What a clock measured. It is in the report: these files are the same whenever the run is the same."""
 
-_REPLAY = ("timestep", "qpos0", "qvel0", "ctrl", "qpos", "tick_times")  # kept in double precision
+_REPLAY = ("timestep", "qpos0", "qvel0", "ctrl", "push", "qpos", "tick_times", "com_aim")  # kept in double precision
 
 
 def flatten(value: Any, prefix: str) -> dict[str, np.ndarray]:
@@ -69,10 +70,14 @@ def write_execution(path: Path, execution: Execution) -> None:
     """Write execution.npz: the replay in double precision, the measurements in single.
 
     The replay: set `qpos0` and `qvel0` on the model of scene.mjb, apply `ctrl` row by row, one `mj_step` each, and
-    `qpos[-1]` comes out. `qpos` has a row per control tick (`tick_times`) and the one after the last step. Touchdowns,
-    unplanned contacts and checks are JSON text.
+    `qpos[-1]` comes out. `qpos` has a row per control tick (`tick_times`) and the one after the last step. Where there
+    is a `push`, its rows are forces at the base beside the controls. Touchdowns, unplanned contacts, checks and the
+    standard that the run is held against are JSON text. `scene_digest` is that of scene.mjb.
     """
-    arrays: dict[str, np.ndarray] = {}
+    arrays = {
+        "standard": np.asarray(json.dumps(standard_entry(execution.standard))),
+        "scene_digest": np.asarray(digest(scene_bytes(execution.scene))),
+    }
     for name, value in execution.named().items():
         if name == "final_qpos" or value is None:
             continue

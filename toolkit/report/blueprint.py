@@ -10,7 +10,9 @@ from toolkit.report.motion_scene import TIMELINE
 from toolkit.report.views import best_direction
 
 
-def blueprint(model: mujoco.MjModel, way: np.ndarray, *, executed: bool, momenta: bool) -> rrb.Blueprint:
+def blueprint(
+    model: mujoco.MjModel, way: np.ndarray, *, executed: bool, momenta: bool, searched: bool = True
+) -> rrb.Blueprint:
     """A large 3D view with the contact lanes below it on the left; curves in tabs and the text on the right.
 
     Args:
@@ -18,6 +20,7 @@ def blueprint(model: mujoco.MjModel, way: np.ndarray, *, executed: bool, momenta
         way: (k, 3) m, k >= 2; points on the ground from start to goal.
         executed: Whether there are measured curves.
         momenta: Whether there are planned or measured momenta.
+        searched: Whether there is a search to show.
     """
     scene = rrb.Spatial3DView(
         origin="world",
@@ -38,9 +41,10 @@ def blueprint(model: mujoco.MjModel, way: np.ndarray, *, executed: bool, momenta
         contacts = _curves("cop_margin", "CoP to the edge [mm]"), _curves("force", "Contact force [N]")
         tabs.append(rrb.Vertical(*contacts, name="Contacts"))
         tabs.append(rrb.Vertical(_curves("torque_ratio", "Largest torque / limit"), name="Torques"))
-    bars = rrb.BarChartView(origin="search/best_cost", name="Cost of the best solution over the search's seconds")
-    solutions = rrb.TextDocumentView(origin="search/solutions", name="Solutions")
-    tabs.append(rrb.Vertical(bars, solutions, name="Search"))
+    if searched:
+        bars = rrb.BarChartView(origin="search/best_cost", name="Cost of the best solution over the search's seconds")
+        solutions = rrb.TextDocumentView(origin="search/solutions", name="Solutions")
+        tabs.append(rrb.Vertical(bars, solutions, name="Search"))
     text = rrb.TextDocumentView(origin="summary", name="Verdict")
     right = rrb.Vertical(rrb.Tabs(*tabs, active_tab=0), text, row_shares=[3, 2])
     return rrb.Blueprint(

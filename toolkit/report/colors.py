@@ -22,6 +22,11 @@ OPTIMISED: Color = (48, 122, 246)
 EXECUTED: Color = (255, 136, 0)
 LIMIT: Color = (228, 62, 62)
 AXES: tuple[Color, Color, Color] = ((228, 80, 80), (90, 190, 90), (90, 140, 240))
+RUNS: tuple[Color, ...] = (
+    *((255, 136, 0), (48, 122, 246), (72, 184, 72), (214, 74, 206), (40, 196, 208), (228, 62, 62), (250, 204, 60)),
+    *((164, 92, 232), (150, 110, 70), (150, 150, 150)),
+)
+"""Colours of runs that are compared, in turn."""
 
 
 def unit(color: Color) -> tuple[float, float, float]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import mujoco
 from rich import box
 from rich.console import Console
 from rich.progress import (
@@ -25,8 +26,10 @@ from rich.text import Text
 
 from toolkit.errors import InputError
 from toolkit.execution.check import Check, Result
+from toolkit.execution.result import Execution
 from toolkit.pipeline.loop import PipelineResult
 from toolkit.pipeline.observer import Observer
+from toolkit.report.run_report import RunReport
 from toolkit.report.summary import sequence_rows
 
 STYLES = {Result.PASS: "bold green", Result.FAIL: "bold red", Result.NOT_CHECKED: "yellow"}
@@ -123,12 +126,18 @@ class StageConsole(Observer):
 
         The table is left out without checks. `seconds` is the time from the command to the verdict.
         """
+        text = "PASS" if passed else f"FAIL: {reason}"
+        table = _check_table(checks) if checks else None
+        self.conclude(table, text, passed, [f"written to {folder}, {seconds:.1f} s in all"])
+
+    def conclude(self, table: Table | None, verdict: str, passed: bool, lines: Sequence[str]) -> None:
+        """Print a table, a verdict on its own line, and what else there is to say."""
         self._clear()
-        if checks:
-            self.console.print(_check_table(checks))
-        text = "PASS" if passed else f"FAIL: {' '.join(reason.split())}"
-        self._line(Text(text, style=STYLES[Result.PASS if passed else Result.FAIL]))
-        self._line(Text(f"written to {folder}, {seconds:.1f} s in all"))
+        if table is not None:
+            self.console.print(table)
+        self._line(Text(" ".join(verdict.split()), style=STYLES[Result.PASS if passed else Result.FAIL]))
+        for line in lines:
+            self._line(Text(line))
 
     def _line(self, text: Text) -> None:
         """Print one line, never wrapped."""
@@ -142,19 +151,40 @@ class StageConsole(Observer):
             self._task = None
 
 
-def _check_table(checks: Sequence[Check]) -> Table:
-    """A row per check, with its value, limit, unit and result."""
+def _check_table(checks: Sequence[Check], recorded: Sequence[Check] | None = None) -> Table:
+    """A row per check, with its value, limit, unit and result; where given, with the `recorded` value before it."""
     table = Table(box=box.SIMPLE, pad_edge=False)
     table.add_column("check")
-    for name in ("value", "limit"):
+    for name in ("value", "limit") if recorded is None else ("recorded", "replayed", "limit"):
         table.add_column(name, justify="right")
     table.add_column("unit")
     table.add_column("result")
+    before = {check.name: check.value for check in recorded or ()}
     for check in checks:
-        value = "-" if check.value is None else f"{check.value:.4g}"
+        values = [check.value] if recorded is None else [before.get(check.name), check.value]
+        words = ["-" if value is None else f"{value:.4g}" for value in values]
         result = Text(check.result.value, style=STYLES[check.result])
-        table.add_row(Text(check.name), value, f"{check.limit:.4g}", check.unit, result)
+        table.add_row(Text(check.name), *words, f"{check.limit:.4g}", check.unit, result)
     return table
+
+
+def show_replay(
+    display: StageConsole, report: RunReport, again: Execution, differs: str, written: Sequence[Path]
+) -> None:
+    """Print the checks of a replay beside the recorded ones, its verdict, and the files that were written.
+
+    `differs` is one line on how the replay is not the recorded run, or "".
+    """
+    text, lines = "PASS" if again.failure is None else f"FAIL: {again.failure.reason}", []
+    if differs:
+        text = f"DIFFERS: {differs}"
+        made, here = report.versions.get("mujoco", "unknown"), mujoco.__version__
+        if made != here:
+            lines.append(f"it was recorded with MuJoCo {made}, this is {here}")
+    else:
+        lines.append(f"the same states, bit for bit, at {len(again.samples.tick_times)} control ticks and at the end")
+    lines += [f"written to {path}" for path in written]
+    display.conclude(_check_table(again.checks, report.checks), text, not differs and again.failure is None, lines)
 
 
 def sequence_table(result: PipelineResult) -> Table:

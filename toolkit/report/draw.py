@@ -47,8 +47,13 @@ def recording(
         stream.disconnect()
 
 
-def draw_scene(stream: rr.RecordingStream, model: mujoco.MjModel) -> None:
-    """Draw every geom that cannot move, one entity each, where the compiled `model` has it."""
+def draw_scene(
+    stream: rr.RecordingStream, model: mujoco.MjModel, root: str = "world", floor: np.ndarray | None = None
+) -> None:
+    """Draw every geom that cannot move, one entity each below `root`, where the compiled `model` has it.
+
+    Where given, infinite planes are cut to the convex polygon `floor` (k, 2) m, counterclockwise from above.
+    """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     geoms = np.flatnonzero(static_bodies(model)[model.geom_bodyid])
@@ -61,13 +66,16 @@ def draw_scene(stream: rr.RecordingStream, model: mujoco.MjModel) -> None:
     for geom in shown_geoms(model, geoms):
         mesh = mesh_of_geom(model, geom, plane_extent=extent)
         pose = Pose(data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom])
-        entity = rr.new_entity_path(["world", "scene", name_of(model, mujoco.mjtObj.mjOBJ_GEOM, geom)])
+        if floor is not None and model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE and pose.normal[2] > 0.1:
+            if not model.geom_size[geom, :2].any():
+                mesh, pose = _fill([_over(pose, floor)]), Pose.identity()
+        entity = rr.new_entity_path([*root.split("/"), "scene", name_of(model, mujoco.mjtObj.mjOBJ_GEOM, geom)])
         shade = geom_rgba(model, geom) * [SCENE_SHADE, SCENE_SHADE, SCENE_SHADE, 1.0]
         stream.log(entity, _mesh_archetype(_moved(mesh, pose), (shade * 255).astype(np.uint8)), static=True)
 
 
-def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel) -> dict[int, str]:
-    """Draw the shape of every body that can move, one mesh each, in the body's frame.
+def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel, root: str = "world") -> dict[int, str]:
+    """Draw the shape of every body that can move, one mesh each below `root`, in the body's frame.
 
     Returns the entity path of each body index; the caller logs `world_from_body` transforms to it.
     """
@@ -86,7 +94,9 @@ def draw_bodies(stream: rr.RecordingStream, model: mujoco.MjModel) -> dict[int, 
             [np.tile(geom_rgba(model, g), (len(m.vertices), 1)) for g, m in zip(parts, meshes, strict=True)]
         )
         offsets = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
-        entities[int(body)] = rr.new_entity_path(["world", "robot", name_of(model, mujoco.mjtObj.mjOBJ_BODY, body)])
+        entities[int(body)] = rr.new_entity_path(
+            [*root.split("/"), "robot", name_of(model, mujoco.mjtObj.mjOBJ_BODY, body)]
+        )
         whole = TriangleMesh(
             np.concatenate([mesh.vertices for mesh in meshes]),
             np.concatenate([m.triangles + o for m, o in zip(meshes, offsets, strict=True)]),
@@ -117,12 +127,12 @@ def draw_surfaces(stream: rr.RecordingStream, surfaces: Iterable[Surface], alpha
             stream.log(f"world/surfaces/{name}/fill", _mesh_archetype(fill, [*color, alpha]), static=True)
 
 
-def draw_goal(stream: rr.RecordingStream, goal: Goal) -> None:
-    """Draw the goal as a circle with its label."""
+def draw_goal(stream: rr.RecordingStream, goal: Goal, root: str = "world") -> None:
+    """Draw the goal below `root` as a circle with its label."""
     angle = np.linspace(0, 2 * np.pi, 65)
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], -1)
     ring = circle * goal.radius + goal.position + [0, 0, 0.01]
-    stream.log("world/goal", rr.LineStrips3D([ring], radii=0.008, colors=GOAL, labels=["goal"]), static=True)
+    stream.log(f"{root}/goal", rr.LineStrips3D([ring], radii=0.008, colors=GOAL, labels=["goal"]), static=True)
 
 
 def draw_patches(
@@ -175,6 +185,12 @@ def _moved(mesh: TriangleMesh, pose: Pose) -> TriangleMesh:
 def _on_surface(surface: Surface, points: np.ndarray) -> np.ndarray:
     """(k, 3) world points of (k, 2) points in the surface frame, lifted off the surface a little."""
     return surface.pose @ np.concatenate([points, np.full((len(points), 1), SURFACE_OFFSET)], axis=1)
+
+
+def _over(plane: Pose, polygon: np.ndarray) -> np.ndarray:
+    """(k, 3) points of a plane, whose normal is z, at (k, 2) points of the world's xy."""
+    off = (polygon - plane.position[:2]) @ plane.normal[:2]
+    return np.column_stack([polygon, plane.position[2] - off / plane.normal[2]])
 
 
 def _fill(polygons: list[np.ndarray]) -> TriangleMesh:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import math
 import os
@@ -17,7 +18,7 @@ import mujoco
 import numpy as np
 
 from toolkit.errors import InputError
-from toolkit.execution.check import Check
+from toolkit.execution.check import Check, Result
 from toolkit.interruption import undisturbed
 from toolkit.report.drafts import clear_drafts, draft_in, is_draft, is_left, make_folders, remove, remove_folders
 
@@ -240,6 +241,17 @@ def check_entries(checks: Sequence[Check]) -> list[dict[str, Any]]:
     ]
 
 
+def read_check(entry: dict[str, Any]) -> Check:
+    """A check from its entry; raises KeyError, TypeError or ValueError where the entry is broken.
+
+    A value that is not finite is null in JSON; its result tells it from one that was not measured.
+    """
+    value = entry["value"]
+    if value is None and Result(entry["result"]) is Result.FAIL:
+        value = math.inf
+    return Check(str(entry["name"]), float(entry["limit"]), str(entry["unit"]), None if value is None else float(value))
+
+
 def write_json(path: Path, value: Any) -> None:
     """Write strict JSON (see `plain`), indented, lists of numbers on one line, ending in a line break."""
     path.write_text(_json_text(plain(value), "") + "\n", encoding="utf-8")
@@ -273,8 +285,18 @@ def read_json(path: Path) -> Any:
         raise InputError(f"{path}: is not a JSON file ({error})") from error
 
 
-def write_scene(path: Path, scene: mujoco.MjModel) -> None:
-    """Save a compiled model; `mujoco.MjModel.from_binary_path` reads it."""
+def scene_bytes(scene: mujoco.MjModel) -> bytes:
+    """A compiled model as scene.mjb holds it."""
     content = np.zeros(mujoco.mj_sizeModel(scene), np.uint8)
     mujoco.mj_saveModel(scene, None, content)
-    path.write_bytes(content.tobytes())
+    return content.tobytes()
+
+
+def write_scene(path: Path, scene: mujoco.MjModel) -> None:
+    """Save a compiled model; `mujoco.MjModel.from_binary_path` reads it."""
+    path.write_bytes(scene_bytes(scene))
+
+
+def digest(content: bytes) -> str:
+    """SHA-256 of a file's content, in hexadecimal."""
+    return hashlib.sha256(content).hexdigest()

@@ -39,9 +39,11 @@ def frames(times: np.ndarray, rate: float) -> np.ndarray:
     return np.unique([*np.searchsorted(times, wanted - 1e-9), len(times) - 1])
 
 
-def draw_motion(stream: rr.RecordingStream, model: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray) -> None:
-    """Draw the moving bodies of `model` with their world poses at (n,) s for (n, nq) configurations."""
-    entities, data = draw_bodies(stream, model), mujoco.MjData(model)
+def draw_motion(
+    stream: rr.RecordingStream, model: mujoco.MjModel, times: np.ndarray, qpos: np.ndarray, root: str = "world"
+) -> None:
+    """Draw the moving bodies of `model` below `root` with their poses in it at (n,) s for (n, nq) configurations."""
+    entities, data = draw_bodies(stream, model, root), mujoco.MjData(model)
     position, quaternion_wxyz = np.empty((len(times), model.nbody, 3)), np.empty((len(times), model.nbody, 4))
     for row, configuration in enumerate(qpos):
         data.qpos[:] = configuration
@@ -70,17 +72,18 @@ def draw_com(
     path: np.ndarray,
     times: np.ndarray | None,
     moving: np.ndarray | None = None,
+    root: str = "world",
 ) -> None:
     """Draw a CoM as a line along `path` (k, 3) m and, with times (n,) s, as a point that moves along (n, 3) m.
 
-    Where `moving` is None the point moves along `path`.
+    Where `moving` is None the point moves along `path`. The entities are below `root`.
     """
     line = rr.LineStrips3D([path], radii=0.006, colors=color)
-    stream.log(f"world/com/{name}/path", line, static=True)
+    stream.log(f"{root}/com/{name}/path", line, static=True)
     if times is None:
         return
     points = path if moving is None else moving
-    entity = f"world/com/{name}/now"
+    entity = f"{root}/com/{name}/now"
     stream.log(entity, rr.Points3D.from_fields(radii=0.03, colors=color), static=True)
     stream.send_columns(entity, at(times), rr.Points3D.columns(positions=points))
 

@@ -19,12 +19,18 @@ from toolkit.search.result import Solution
 from toolkit.world.timing import LONGEST, Timing
 
 SCHEMA = 1
+_PATCH = ("position", "quaternion_wxyz", "rotation", "surface", "friction")
 LARGEST = 1e4
 """Greatest number that a contact may have: no world is so large in m."""
+ROUNDING = 1e-9
+"""Largest difference between a contact's rotation and its quaternion."""
 
 
 def write_plan(path: Path, plan: MotionPlan, solution: Solution) -> None:
-    """Write plan.json: the plan's contacts and times, with the cost and the predicted CoM of the search's solution."""
+    """Write plan.json: the plan's contacts and times, with the cost and the predicted CoM of the search's solution.
+
+    Where the optimiser moved a landing point, `moved_from` (3,) m is where the search had put it.
+    """
     entries: list[dict[str, Any]] = []
     stances, transitions = plan.sequence.stances, plan.sequence.transitions
     # The first phase is the first transition's shift, with the rest before it.
@@ -37,7 +43,8 @@ def write_plan(path: Path, plan: MotionPlan, solution: Solution) -> None:
             {
                 "limb": transition.limb.label,
                 "action": "break" if transition.contact is None else "make",
-                **{key: contact.get(key) for key in ("position", "quaternion_wxyz", "surface", "friction")},
+                **{key: contact.get(key) for key in _PATCH},
+                **_moved_from(transition, solution.sequence.transitions[index]),
                 "times": {
                     "shift": transition.timing.shift,
                     "swing": transition.timing.swing,
@@ -63,11 +70,50 @@ def write_plan(path: Path, plan: MotionPlan, solution: Solution) -> None:
 
 
 def read_plan(path: Path) -> ContactSequence:
-    """Read plan.json.
+    """Read the contacts of plan.json.
 
     Raises:
         InputError: The file cannot be read, or an entry is missing or wrong; the message names it.
     """
+    return _read(path, "position")[0]
+
+
+def read_proposal(path: Path) -> Solution:
+    """Read plan.json as what a search proposed: landing points are where they were before the optimiser moved them.
+
+    Optimised with the same settings, it gives the plan again, to the last digit. Of the predictions only the CoM is in
+    the file; the others are NaN.
+
+    Raises:
+        InputError: As of `read_plan`.
+    """
+    sequence, plan = _read(path, "moved_from")
+    count = len(sequence.transitions)
+    try:
+        cost, bound = (float("nan" if plan.get(key) is None else plan[key]) for key in ("cost", "bound"))
+        com = np.array(plan.get("predicted_com") or np.zeros((0, 3)), float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{path}: cost, bound or predicted_com is broken: {error}") from error
+    if com.shape not in ((count + 1, 3), (0, 3)):
+        raise InputError(f"{path}: predicted_com needs a point of 3 numbers at the start and after each transition")
+    unknown = np.full((count + 1, 3), np.nan)
+    return Solution(sequence, cost, bound, 0.0, com, unknown, unknown[1:, 0])
+
+
+def read_names(path: Path) -> tuple[str, str]:
+    """Names of the world and of the robot that plan.json is for.
+
+    Raises:
+        InputError: The file cannot be read, or has none.
+    """
+    plan = read_json(path)
+    if not isinstance(plan, dict) or not all(isinstance(plan.get(key), str) for key in ("world", "robot")):
+        raise InputError(f"{path}: is no plan, it does not name a world and a robot")
+    return plan["world"], plan["robot"]
+
+
+def _read(path: Path, position: str) -> tuple[ContactSequence, dict[str, Any]]:
+    """The contacts of a plan, and the whole content; new contacts are at `position`, where they have that entry."""
     plan = read_json(path)
     where = "the file"
     try:
@@ -80,22 +126,31 @@ def read_plan(path: Path) -> ContactSequence:
         where = "transitions"
         for index, entry in enumerate(plan["transitions"]):
             where = f"transitions[{index}]"
-            transitions.append(_read_transition(entry))
+            transitions.append(_read_transition(entry, position))
             category_of(stance, transitions[-1])
             stance = transitions[-1].apply(stance)
     except KeyError as error:
         raise InputError(f"{path}: {where} has no valid {error}") from error
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
         raise InputError(f"{path}: {where} is broken: {error}") from error
-    return ContactSequence(start, tuple(transitions))
+    return ContactSequence(start, tuple(transitions)), plan
+
+
+def _moved_from(transition: ContactTransition, proposed: ContactTransition) -> dict[str, Any]:
+    """Where the search had put a contact that the optimiser moved; nothing where it did not."""
+    if transition.contact is None or proposed.contact is None:
+        return {}
+    position = proposed.contact.pose.position
+    return {} if np.array_equal(position, transition.contact.pose.position) else {"moved_from": position}
 
 
 def _contact_entry(contact: Contact) -> dict[str, Any]:
-    """One contact as JSON."""
+    """One contact as JSON; `rotation`, row by row, is the same as the quaternion, to the last digit."""
     return {
         "limb": contact.limb.label,
         "position": contact.pose.position,
         "quaternion_wxyz": contact.pose.quaternion_wxyz,
+        "rotation": contact.pose.rotation.ravel(),
         "surface": contact.surface,
         "friction": contact.friction,
     }
@@ -113,11 +168,20 @@ def _read_contact(entry: dict[str, Any]) -> Contact:
         raise ValueError(f"position, quaternion_wxyz and friction are numbers within {LARGEST:g}, friction above zero")
     if not abs(surface) < 2**31:
         raise ValueError("surface is no index of a surface")
-    return Contact(Limb.from_label(entry["limb"]), Pose.from_quaternion(position, quaternion_wxyz), friction, surface)
+    pose = Pose.from_quaternion(position, quaternion_wxyz)
+    if entry.get("rotation") is not None:
+        rotation = np.array(entry["rotation"], float)
+        if rotation.shape != (9,) or not np.abs(rotation - pose.rotation.ravel()).max() <= ROUNDING:
+            raise ValueError("rotation is not that of quaternion_wxyz; leave it out where you turn a contact")
+        pose = Pose(rotation.reshape(3, 3), position)
+    return Contact(Limb.from_label(entry["limb"]), pose, friction, surface)
 
 
-def _read_transition(entry: dict[str, Any]) -> ContactTransition:
-    """One transition; raises KeyError, TypeError or ValueError where the entry is broken."""
+def _read_transition(entry: dict[str, Any], position: str) -> ContactTransition:
+    """One transition; its contact is at the entry's `position`, where there is such a key.
+
+    Raises KeyError, TypeError or ValueError where the entry is broken.
+    """
     timing = Timing(float(entry["times"]["shift"]), float(entry["times"]["swing"]))
     if not (0 <= timing.shift <= LONGEST and 0 < timing.swing <= LONGEST):
         raise ValueError(
@@ -125,5 +189,6 @@ def _read_transition(entry: dict[str, Any]) -> ContactTransition:
         )
     if entry["action"] not in ("make", "break"):
         raise ValueError(f'action is "{entry["action"]}", must be "make" or "break"')
-    contact = _read_contact(entry) if entry["action"] == "make" else None
+    place = {"position": entry[position]} if entry.get(position) is not None else {}
+    contact = _read_contact({**entry, **place}) if entry["action"] == "make" else None
     return ContactTransition(Limb.from_label(entry["limb"]), contact, timing)

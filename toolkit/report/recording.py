@@ -71,19 +71,7 @@ def write_recording(path: Path, result: PipelineResult, report: RunReport, rate:
         predicted = solution.com if solution is not None else None
         draw_centres(stream, schedule, predicted, motion, execution if executed else None, rate)
         if execution is not None and executed:
-            samples, rows = execution.samples, frames(execution.samples.tick_times, rate)
-            times, pose = samples.tick_times[rows], samples.limb_pose[rows]
-            draw_made_contacts(stream, execution, robot.half_sizes)
-            draw_forces(stream, "planned", times, samples.wrench_planned[rows], pose, 0.008)
-            draw_forces(stream, "measured", times, samples.wrench[rows], pose, 0.018)
-            plot_execution(stream, execution, trajectory, schedule)
-            for time, text in touchdown_entries(execution):
-                stream.set_time(TIMELINE, duration=time)
-                stream.log("events", rr.TextLog(text))
-            if execution.fall is not None:
-                stream.set_time(TIMELINE, duration=float(execution.samples.tick_times[-1]))
-                stream.log("events", rr.TextLog(execution.fall.reason, level=rr.TextLogLevel.ERROR))
-            stream.reset_time()
+            draw_execution(stream, execution, trajectory, schedule, robot.half_sizes, rate)
         elif motion is not None and motion.feasible:
             plot_motion(stream, motion)
         send_contact_states(stream, schedule, execution)
@@ -91,6 +79,30 @@ def write_recording(path: Path, result: PipelineResult, report: RunReport, rate:
             text = rr.TextDocument(search_summary(result), media_type=rr.MediaType.MARKDOWN)
             stream.log("search/solutions", text, static=True)
             draw_search(stream, search, _heights(_way(world, sequence)))
+
+
+def draw_execution(
+    stream: rr.RecordingStream,
+    execution: Execution,
+    trajectory: WholeBodyTrajectory | None,
+    schedule: ContactSchedule | None,
+    half_sizes: np.ndarray,
+    rate: float,
+) -> None:
+    """Draw made contacts, forces, curves and events of a simulated run; half sizes are (4, 2) m, by limb."""
+    samples, rows = execution.samples, frames(execution.samples.tick_times, rate)
+    times, pose = samples.tick_times[rows], samples.limb_pose[rows]
+    draw_made_contacts(stream, execution, half_sizes)
+    draw_forces(stream, "planned", times, samples.wrench_planned[rows], pose, 0.008)
+    draw_forces(stream, "measured", times, samples.wrench[rows], pose, 0.018)
+    plot_execution(stream, execution, trajectory, schedule)
+    for time, text in touchdown_entries(execution):
+        stream.set_time(TIMELINE, duration=time)
+        stream.log("events", rr.TextLog(text))
+    if execution.fall is not None:
+        stream.set_time(TIMELINE, duration=float(execution.samples.tick_times[-1]))
+        stream.log("events", rr.TextLog(execution.fall.reason, level=rr.TextLogLevel.ERROR))
+    stream.reset_time()
 
 
 def _draw_robot(

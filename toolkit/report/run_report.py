@@ -12,11 +12,12 @@ import numpy as np
 
 from toolkit.centroidal.problem import Weights
 from toolkit.centroidal.residual import check, cop_margin, friction_margin, objective
+from toolkit.errors import InputError
 from toolkit.execution.check import Check
 from toolkit.execution.result import Execution
 from toolkit.pipeline.candidate import Candidate
 from toolkit.pipeline.loop import PipelineResult
-from toolkit.report.files import check_entries, write_json
+from toolkit.report.files import check_entries, read_check, read_json, write_json
 from toolkit.world.world import World
 
 SCHEMA = 3
@@ -155,6 +156,43 @@ class RunReport:
 def write_report(path: Path, report: RunReport) -> None:
     """Write report.json; a number that is not finite, such as a failed check's value, becomes null."""
     write_json(path, report.as_dict())
+
+
+def read_report(path: Path) -> RunReport:
+    """Read report.json.
+
+    Raises:
+        InputError: The file cannot be read, is of another version, or an entry is missing or wrong.
+    """
+    content = read_json(path)
+    if not isinstance(content, dict) or "schema" not in content:
+        raise InputError(f"{path}: is not the report of a run")
+    if content["schema"] != SCHEMA:
+        raise InputError(f"{path}: has schema {content['schema']}, this version reads {SCHEMA}; run it again")
+    where = "the file"
+    try:
+        stages = {}
+        for stage, names in STAGES.items():
+            where = f"stages.{stage}"
+            stages[stage] = {name: None for name in names} | dict(content["stages"][stage])
+        where = "checks"
+        checks = tuple(read_check(entry) for entry in content["checks"])
+        where = "the file"
+        words = {name: str(content[name]) for name in ("world", "robot", "verdict", "reason")}
+        if words["verdict"] not in ("PASS", "FAIL"):
+            raise ValueError(f"verdict is {words['verdict']}, must be PASS or FAIL")
+        return RunReport(
+            seed=int(content["seed"]),
+            stages=stages,
+            checks=checks,
+            options=dict(content["options"]),
+            versions={str(name): str(version) for name, version in dict(content["versions"]).items()},
+            **words,
+        )
+    except KeyError as error:
+        raise InputError(f"{path}: {where} has no valid {error}") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{path}: {where} is broken: {error}") from error
 
 
 def _figures(names: tuple[str, ...], stage: Any) -> dict[str, Any]:
