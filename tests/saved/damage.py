@@ -80,7 +80,7 @@ DAMAGES = {
     "no report": (without("report.json"), "holds no report.json"),
     "a cut report": (cut("report.json"), "report.json: is not a JSON file"),
     "a report of text": (filled("report.json", b'"text"'), "is not the report of a run"),
-    "an older report": (edited("report.json", schema=1), "has schema 1, this version reads 2"),
+    "an older report": (edited("report.json", schema=1), "has schema 1, this version reads 3"),
     "a newer report": (edited("report.json", schema=99), "has schema 99"),
     "a report without stages": (edited("report.json", stages={}), "stages.surfaces has no valid"),
     "a report with odd checks": (edited("report.json", checks=[{"name": "slip"}]), "checks has no valid 'value'"),

@@ -79,7 +79,7 @@ def test_a_fall_is_a_failed_check(walk_folder, tmp_path, capsys):
         (damage.edited("plan.json", cost="dear"), "cost, bound or predicted_com is broken"),
         (damage.edited("plan.json", robot=None), "does not name a world and a robot"),
         (damage.without("report.json"), "holds no report.json"),
-        (damage.edited("report.json", schema=1), "has schema 1, this version reads 2"),
+        (damage.edited("report.json", schema=1), "has schema 1, this version reads 3"),
         (damage.edited("report.json", options={"push": "hard"}), "options.push is 'hard' in the report"),
         (damage.edited("report.json", options={"terrain_error": 1}), "options.terrain_error is 1 in the report"),
         (damage.edited("report.json", seed=-1), "-1: give a whole number from 0"),

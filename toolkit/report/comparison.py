@@ -205,7 +205,7 @@ FIGURES = (
     Figure("transitions", "", ("planning", "contacts", 1)),
     Figure("with a palm", "", ("planning", "palm_contacts", 1)),
     Figure("sequences tested", "", ("planning", "sequences_tested", 1)),
-    Figure("first sequence after", "s", ("planning", "first_solution_seconds", 1.0)),
+    Figure("first feasible sequence after", "s", ("planning", "first_feasible_seconds", 1.0)),
     Figure("search", "s", ("planning", "seconds", 1.0)),
     Figure("planning in all", "s", _planning_seconds),
     Figure("objective J", "", ("dynamics", "objective", 1.0)),
