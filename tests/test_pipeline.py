@@ -9,6 +9,7 @@ from toolkit import pipeline
 from toolkit.contacts.failure import Failure
 from toolkit.geometry.limb import Limb
 from toolkit.pipeline import Source, loop
+from toolkit.refine import RefineConfig
 
 
 def solution(name, *limbs, start=(), seconds=0.0):
@@ -44,24 +45,33 @@ class Planner:
             expansions=1,
             hasty=self.hasty,
             slides=False,
+            screen=SimpleNamespace(),
         )
 
 
 class Run:
-    """A run with made-up costs; a sequence without a cost has no motion, and only those in `passing` pass."""
+    """A run with made-up costs; infinite ones have no motion, and only sequences in `passing` pass.
 
-    def __init__(self, planner, passing, monkeypatch, cost=None, **settings):
-        self.optimised, self.tested = [], []
-        optimised, tested, cost = self.optimised, self.tested, cost or {}
+    The local search turns a sequence into what `better` has for its name.
+    """
+
+    def __init__(self, planner, passing, monkeypatch, cost=None, better=None, **settings):
+        self.optimised, self.tested, self.improved = [], [], []
+        optimised, tested, asked, cost, better = self.optimised, self.tested, self.improved, cost or {}, better or {}
 
         class Tester:
+            slide = None
+
             def __init__(self, *parts):
                 pass
 
             def optimise(self, sequence):
                 optimised.append(sequence.name)
                 failure = Failure("no motion", transition=0) if cost.get(sequence.name, 0.0) == np.inf else None
-                return SimpleNamespace(name=sequence.name), failure
+                return SimpleNamespace(name=sequence.name, sequence=sequence), failure
+
+            def settled(self, plan):
+                return plan
 
             def test(self, candidate):
                 if candidate.failure is None:
@@ -73,6 +83,23 @@ class Run:
         def plan_cost(plan, config):
             return SimpleNamespace(total=cost.get(plan.name, 0.0))
 
+        class LocalSearch:
+            spent = 0
+
+            def __init__(self, *parts):
+                pass
+
+            def improved(self, plan, origin, screen, allowed):
+                asked.append(plan.name)
+                if plan.name not in better:
+                    return plan
+                made = solution(better[plan.name], FOOT).sequence
+                return SimpleNamespace(name=made.name, sequence=made)
+
+        monkeypatch.setattr(loop, "LocalSearch", LocalSearch)
+        monkeypatch.setattr(
+            loop, "refined_solution", lambda plan, cost, seconds: solution(plan.name, FOOT, seconds=seconds)
+        )
         monkeypatch.setattr(loop, "Tester", Tester)
         monkeypatch.setattr(loop, "plan_cost", plan_cost)
         config = pipeline.PipelineConfig(**{"candidates": 6} | settings)
@@ -169,3 +196,26 @@ def test_a_search_gets_half_of_the_optimisations_that_are_left(monkeypatch):
     run = Run(planner, set(), monkeypatch, dict.fromkeys([f"palms {n}" for n in range(9)], np.inf), optimisations=7)
     assert run.optimised == ["palms 8", "palms 7", "palms 6", "palms 5", "feet 8", "feet 7", "feet 6"]
     assert planner.calls == [True, False, False] and not run.result.passed
+
+
+def test_the_cheapest_are_improved_before_anything_is_tested(monkeypatch):
+    planner = Planner([solution(name, FOOT, seconds=0.5) for name in "abcd"], [])
+    cost = {"a": 4.0, "b": 3.0, "c": 2.0, "d": 1.0, "c+": 0.5}
+    run = Run(planner, {"c+"}, monkeypatch, cost, {"c": "c+"}, refine=RefineConfig(starts=2))
+    assert run.improved == ["d", "c"] and run.tested == ["c+"] and run.result.passed
+    last = run.result.candidates[-1]
+    assert (last.source, last.number, last.search) == (Source.LOCAL, 4, 0) and run.result.is_chosen(last)
+    first = run.result.first_feasible
+    assert first is not None and first.source == Source.SEARCH  # the search found it, not the local search
+
+
+def test_where_an_improved_sequence_fails_the_next_ones_are_improved_and_tested(monkeypatch):
+    planner = Planner([solution(name, FOOT) for name in "abc"], [])
+    cost = {"a": 3.0, "b": 2.0, "c": 1.0, "c+": 0.5, "b+": 0.7}
+    run = Run(planner, {"b+"}, monkeypatch, cost, {"c": "c+", "b": "b+"}, refine=RefineConfig(starts=1))
+    assert run.improved == ["c", "b"] and run.tested == ["c+", "c", "b+"] and run.result.passed
+
+
+def test_without_a_local_search_nothing_is_improved(monkeypatch):
+    run = Run(Planner([solution("a", FOOT)], []), {"a"}, monkeypatch, better={"a": "a+"}, refine=None)
+    assert not run.improved and run.tested == ["a"]

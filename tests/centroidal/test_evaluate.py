@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from toolkit.centroidal.fast import solve
 
 from toolkit.centroidal import residual
 from toolkit.centroidal.arrays import MotionArrays, ProblemArrays
 from toolkit.centroidal.build import initial_com, transition_problem
-from toolkit.centroidal.fast import solve
 from toolkit.centroidal.problem import STANDARD_GRAVITY, Margins
 from toolkit.contacts.category import Category
 from toolkit.contacts.sequence import ContactTransition

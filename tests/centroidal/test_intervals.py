@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from toolkit.centroidal.fast import solve
 
 from tests.centroidal.walks import walk
 from toolkit.centroidal.build import initial_com, sequence_problem
-from toolkit.centroidal.fast import solve
 from toolkit.centroidal.intervals import intervals
 from toolkit.centroidal.residual import step_costs
 from toolkit.contacts.schedule import ContactSchedule

@@ -216,7 +216,7 @@ def test_the_search_s_summary_has_a_row_per_solution(run):
     assert "| 0.100 s | 9.000 | unknown | 6 |" in text and "| 0.600 s | 7.000 | 40 % | 6 |" in text
     total = f"{run.result.cost.total:.1f}"
     assert "| 0 | search | 6 | 1 | 9.0 | – | no feasible centroidal motion: it stretches |" in text
-    assert f"| 1 | search | 6 | 1 | 7.0 | {total} | chosen |" in text
+    assert f"| 1 | search | 6 | 1 | 7.0 | {total} | chosen; slip is 0.03 m, the limit is 0.02 |" in text
     nothing = replace(run.result.search, solutions=(), reason="no way")
     assert "**no way**" in search_summary(replace(run.result, search=nothing, trial=None, candidates=()))
 

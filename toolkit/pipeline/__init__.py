@@ -2,9 +2,10 @@
 
     world -> surfaces -> contact sequence -> centroidal motion -> whole-body trajectory -> execution -> verdict
 
-The search proposes contact sequences, and the centroidal optimiser makes a motion for each. From the truly cheapest on
-(`toolkit.search.costs.plan_cost`) they are tested by inverse kinematics and by the simulation. The first that passes
-everything is the plan. Where all fail, the search starts again without the transitions at which they failed.
+The search proposes contact sequences, and the centroidal optimiser makes a motion for each. A local search
+(`toolkit.refine`) improves the truly cheapest ones (`toolkit.search.costs.plan_cost`). From the cheapest on they are
+tested by inverse kinematics and by the simulation, and the first that passes everything is the plan. Where all fail,
+the search starts again without the transitions at which they failed.
 """
 
 from toolkit.pipeline.candidate import Candidate, Source

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.plan import MotionPlan, keeps_margins
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.execution.check import Check
@@ -249,19 +249,15 @@ class _Run:
         self._observer.started("refinement")
         origin = candidate.solution.sequence
         plan = self._local.improved(candidate.plan, origin, screen, lambda each: not _meets(each, exclusions))
-        plan = self._settled(plan)
+        changed = plan is not candidate.plan
+        plan = self._tester.settled(plan) if changed else plan
         cost = plan_cost(plan, self._weights)
         detail = f"true cost {candidate.cost.total:.0f} to {cost.total:.0f} with {self._local.spent - before} motions"
         self._observer.finished("refinement", True, time.perf_counter() - began, detail)
-        if plan.sequence.identity == candidate.plan.sequence.identity or not self._new(plan.sequence):
+        if not changed or not self._new(plan.sequence):
             return []
         solution = refined_solution(plan, cost, self._searches[-1].seconds)
         return [self._entered(Source.LOCAL, solution, plan, cost, None)]
-
-    def _settled(self, plan: MotionPlan) -> MotionPlan:
-        """A plan whose motion is that of its contacts where they are, so that they alone give the plan again."""
-        settled = self._tester.motion_of(plan.sequence)
-        return settled if settled.motion.feasible and keeps_margins(settled, plan) else plan
 
     def _optimise(self, sequence: ContactSequence) -> MotionPlan:
         """The motion of a variant."""

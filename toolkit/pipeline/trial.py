@@ -9,7 +9,7 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from toolkit.centroidal.plan import MotionPlan, plan_motion, slid
+from toolkit.centroidal.plan import MotionPlan, keeps_margins, plan_motion, slid
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.room import RoomConfig
 from toolkit.contacts.sequence import ContactSequence
@@ -90,6 +90,11 @@ class Tester:
     def motion_of(self, sequence: ContactSequence) -> MotionPlan:
         """Optimise the motion of a sequence with its contacts where they are."""
         return self._motion(sequence, None)
+
+    def settled(self, plan: MotionPlan) -> MotionPlan:
+        """A plan whose motion is that of its contacts where they are, so that they alone give the plan again."""
+        settled = self.motion_of(plan.sequence)
+        return settled if settled.motion.feasible and keeps_margins(settled, plan) else plan
 
     def _motion(self, sequence: ContactSequence, landing: RoomConfig | None) -> MotionPlan:
         config = self._config

@@ -81,7 +81,7 @@ def sequence_rows(result: PipelineResult) -> list[tuple[str, ...]]:
             str(candidate.palm_contacts),
             f"{candidate.solution.cost:.1f}",
             f"{candidate.cost.total:.1f}" if candidate.feasible else "–",
-            "chosen" if result.is_chosen(candidate) else result.reason_against(candidate),
+            "; ".join(filter(None, ("chosen" * result.is_chosen(candidate), result.reason_against(candidate)))),
         )
         for candidate in result.candidates
     ]

@@ -1,0 +1,147 @@
+"""The local search finds truly cheaper plans within its budget and limits, and leaves nothing to leave out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from toolkit.centroidal.plan import keeps_margins, plan_motion, slid
+from toolkit.centroidal.problem import Margins
+from toolkit.centroidal.sequence import SequenceConfig
+from toolkit.refine.foresight import Foresight, travel
+from toolkit.refine.local_search import LocalSearch, RefineConfig
+from toolkit.refine.variants import left_out
+from toolkit.search.costs.edge_cost import CostConfig
+from toolkit.search.costs.plan_cost import plan_cost
+
+COST = CostConfig()
+
+
+class Workshop:
+    """What a local search asks for, counted."""
+
+    def __init__(self, walk):
+        self._walk, self.sequences, self.slides = walk, [], []
+
+    def optimise(self, sequence):
+        self.sequences.append(sequence)
+        rests = {"initial_rest": 0.4, "final_rest": 0.6}
+        return plan_motion(self._walk.robot, self._walk.world, sequence, **rests, landing=None, config=SequenceConfig())
+
+    def slide(self, plan, landing, share):
+        self.slides.append(share.copy())
+        return slid(plan, landing, SequenceConfig(), share)
+
+    def search(self, **settings):
+        return LocalSearch(RefineConfig(**settings), COST, self.optimise, self.slide)
+
+
+@pytest.fixture(scope="module")
+def plan(walk):
+    """The walk with its motion."""
+    made = Workshop(walk).optimise(walk.sequence)
+    assert made.motion.feasible
+    return made
+
+
+def improved(walk, plan, allowed=lambda sequence: True, **settings):
+    workshop = Workshop(walk)
+    return workshop.search(**settings).improved(plan, walk.sequence, walk.screen, allowed), workshop
+
+
+@pytest.fixture(scope="module")
+def better(walk, plan):
+    """What the local search makes of the walk."""
+    return improved(walk, plan, optimisations=40)
+
+
+def total(plan):
+    return plan_cost(plan, COST).total
+
+
+def test_steps_that_are_not_needed_are_found(walk, plan, better):
+    found, workshop = better
+    assert total(found) < 0.85 * total(plan)
+    assert len(found.sequence.transitions) <= len(plan.sequence.transitions) - 3
+    assert found.motion.feasible and keeps_margins(found, plan)
+    assert walk.screen.passes(found.sequence) and not walk.screen.reach_codes(found).any()
+    end, goal = found.sequence.stances[-1].mean_feet.position, walk.world.goal
+    assert np.hypot(*(end - goal.position)[:2]) <= goal.radius
+    assert len(workshop.sequences) + len(workshop.slides) <= 40
+    assert len({sequence.identity for sequence in workshop.sequences}) == len(workshop.sequences)
+
+
+def test_no_one_and_no_two_contacts_can_be_left_out_for_less(walk, better):
+    found, _ = better
+    workshop = Workshop(walk)
+    for variant in left_out(found.sequence, walk.screen):
+        other = workshop.optimise(variant)
+        arrives = np.hypot(*(variant.stances[-1].mean_feet.position - walk.world.goal.position)[:2]) <= 0.14
+        assert not arrives or total(other) > 0.98 * total(found)
+
+
+def test_the_same_plan_gives_the_same_improvement(walk, plan, better):
+    again, _ = improved(walk, plan, optimisations=40)
+    assert again.sequence.identity == better[0].sequence.identity
+
+
+def test_a_small_budget_is_kept_and_never_makes_a_plan_worse(walk, plan):
+    found, workshop = improved(walk, plan, optimisations=5)
+    assert 0 < len(workshop.sequences) + len(workshop.slides) <= 5
+    assert total(found) <= total(plan)
+    nothing, idle = improved(walk, plan, optimisations=0)
+    assert nothing is plan and not idle.sequences and not idle.slides
+
+
+def test_what_is_not_allowed_is_not_tried(walk, plan):
+    found, workshop = improved(walk, plan, allowed=lambda sequence: False, optimisations=20)
+    assert found is plan and not workshop.sequences
+
+
+def test_a_plan_off_its_screens_starts_from_the_sequence_of_the_search(walk, plan):
+    first = plan.sequence.transitions[0]
+    still = replace(plan.sequence, transitions=(first, *plan.sequence.transitions))
+    off = replace(plan, sequence=still)
+    assert not walk.screen.passes(off.sequence)
+    found, _ = improved(walk, off, optimisations=12)
+    assert found is off or (walk.screen.passes(found.sequence) and total(found) < total(off))
+
+
+def test_the_guess_of_a_sequence_itself_is_its_cost_and_detours_cost_more(walk, plan):
+    cost = plan_cost(plan, COST)
+    guess = Foresight(plan.sequence, cost, COST, walk.world.goal)
+    assert guess(plan.sequence) == pytest.approx(cost.total, rel=1e-9)
+    wide = list(plan.sequence.transitions)
+    contact = wide[3].contact
+    assert contact is not None
+    aside = replace(contact.pose, position=contact.pose.position + [0.0, -0.2, 0.0])
+    wide[3] = replace(wide[3], contact=replace(contact, pose=aside))
+    detour = replace(plan.sequence, transitions=tuple(wide))
+    assert travel(detour) > travel(plan.sequence) and guess(detour) > cost.total
+
+
+def test_a_plan_slides_within_its_share_of_the_room(walk, plan):
+    share = np.ones(len(plan.sequence.transitions))
+    share[2:] = 0.0
+    moved = slid(plan, RefineConfig().landing, SequenceConfig(), share)
+    assert moved is not None and moved.motion.feasible and total(moved) < total(plan)
+    ways = [
+        np.linalg.norm(new.contact.pose.position - old.contact.pose.position)
+        for new, old in zip(moved.sequence.transitions, plan.sequence.transitions, strict=True)
+    ]
+    assert max(ways[:2]) > 0.01 and max(ways[2:]) == 0.0
+    assert [phase.end for phase in moved.schedule.phases] == [phase.end for phase in plan.schedule.phases]
+    for phase in moved.schedule.phases:
+        stance = moved.sequence.stances[phase.transition]
+        assert all(contact in stance.contacts for contact in phase.contacts)
+    assert slid(plan, RefineConfig().landing, SequenceConfig(), 0.0 * share) is None
+
+
+def test_margins_are_kept_but_for_rounding(plan):
+    def with_friction(factor):
+        margins = Margins(factor, (0.0, 0.0), 1.0)
+        return replace(plan, motion=replace(plan.motion, kept=margins))
+
+    assert keeps_margins(with_friction(0.705), with_friction(0.7))
+    assert not keeps_margins(with_friction(0.75), with_friction(0.7))
+    assert keeps_margins(with_friction(0.7), with_friction(0.9))

@@ -1,0 +1,106 @@
+"""Variants of a sequence: all of them pass the screens, none is missed, and they lead where the sequence leads."""
+
+from dataclasses import replace
+from itertools import combinations
+from types import SimpleNamespace
+
+import pytest
+
+from toolkit.contacts.sequence import ContactSequence, ContactTransition
+from toolkit.contacts.stance import Contact
+from toolkit.geometry.limb import Limb
+from toolkit.geometry.pose import Pose
+from toolkit.refine.variants import left_out, relinked, swapped, without_palms
+
+PALM = Limb.LEFT_PALM
+
+
+class Anything:
+    """Screens that let everything pass in which a palm breaks only what it made."""
+
+    def passes(self, sequence, moved_last=None):
+        held = False
+        for item in sequence.transitions:
+            if item.limb == PALM:
+                if item.contact is None and not held:
+                    return False
+                held = item.contact is not None
+        return True
+
+
+@pytest.fixture
+def leaning(walk):
+    """The walk with two touches of a palm, of which the first moves once."""
+    pose = walk.sequence.start[Limb.LEFT_FOOT].pose
+
+    def touch(height):
+        place = Pose(pose.rotation, pose.position + [0.0, 0.5, height])
+        return ContactTransition(PALM, Contact(PALM, place, 0.7, 0), walk.world.timing)
+
+    release = ContactTransition(PALM, None, walk.world.timing)
+    a, b, c, d, *_ = walk.sequence.transitions
+    return replace(walk.sequence, transitions=(touch(1.0), a, touch(1.1), b, release, c, touch(1.2), d))
+
+
+def limbs(sequence):
+    return [(item.limb, item.contact is not None) for item in sequence.transitions]
+
+
+def test_every_one_and_two_that_can_be_left_out_are(walk):
+    n = len(walk.sequence.transitions)
+    expected = set()
+    for size in (1, 2):
+        for dropped in combinations(range(n), size):
+            kept = tuple(item for index, item in enumerate(walk.sequence.transitions) if index not in dropped)
+            variant = replace(walk.sequence, transitions=kept)
+            if walk.screen.passes(variant):
+                expected.add(variant.identity)
+    found = [variant.identity for variant in left_out(walk.sequence, walk.screen)]
+    assert set(found) == expected and len(found) == len(expected) > 3
+
+
+def test_a_palm_is_left_out_from_its_first_contact_to_its_break(leaning):
+    found = [limbs(variant) for variant in without_palms(leaning, Anything())]  # pyright: ignore[reportArgumentType]
+    left, right, palm = (Limb.LEFT_FOOT, True), (Limb.RIGHT_FOOT, True), (PALM, True)
+    assert found == [
+        [left, right, left, palm, right],
+        [palm, left, palm, right, (PALM, False), left, right],
+        [left, right, left, right],
+    ]
+
+
+def test_without_palms_there_is_nothing_to_leave_out(walk):
+    assert not list(without_palms(walk.sequence, walk.screen))
+
+
+def test_neighbours_change_places(leaning, walk):
+    found = list(swapped(leaning, Anything()))  # pyright: ignore[reportArgumentType]
+    assert len(found) == len(leaning.transitions) - 1
+    for index, variant in enumerate(found):
+        expected = list(leaning.transitions)
+        expected[index], expected[index + 1] = expected[index + 1], expected[index]
+        assert list(variant.transitions) == expected
+    assert all(walk.screen.passes(variant) for variant in swapped(walk.sequence, walk.screen))
+
+
+def test_other_steps_lead_to_the_same_stance(walk):
+    groups = list(relinked(walk.sequence, walk.screen))
+    variants = [variant for group in groups for variant in group]
+    counts = {len(variant.transitions) - len(walk.sequence.transitions) for variant in variants}
+    assert {-2, 0, 2} <= counts and min(counts) >= -3 and max(counts) <= 2
+    for variant in variants:
+        assert walk.screen.passes(variant)
+        assert isinstance(variant, ContactSequence) and variant.start is walk.sequence.start
+        for foot in (Limb.LEFT_FOOT, Limb.RIGHT_FOOT):
+            ends = [sequence.stances[-1][foot].pose.position for sequence in (variant, walk.sequence)]
+            assert (ends[0] == ends[1]).all()
+    for group in groups:
+        assert len({len(variant.transitions) for variant in group}) <= 1
+
+
+def test_palms_are_never_in_what_is_replaced(leaning, walk):
+    screen = SimpleNamespace(passes=lambda sequence, last=None: True, steps=walk.screen.steps)
+    for group in relinked(leaning, screen):  # pyright: ignore[reportArgumentType]
+        for variant in group:
+            palms = [[item for item in each.transitions if item.limb == PALM] for each in (variant, leaning)]
+            assert palms[0] == palms[1]
