@@ -53,11 +53,11 @@ class CollectConfig:
     friction: tuple[float, float] = (0.3, 0.9)
     tilt: tuple[float, float] = (5.0, 25.0)
     rise: tuple[float, float] = (0.02, 0.1)
-    walled: float = 0.7
-    searches: int = 2
+    walled: float = 0.75
+    searches: int = 1
     expansions: tuple[int, int] = (60, 400)
-    kept: int = 3
-    variants: int = 3
+    kept: int = 4
+    variants: int = 4
     infeasible: float = 0.33
 
     @property

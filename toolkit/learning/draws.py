@@ -91,7 +91,7 @@ def _judge(place: Place, rng: np.random.Generator) -> TransitionEvaluator:
     robot = place.robot
     if place.steep:
         return NetworkEvaluator(dict(place.networks)) if place.networks else OptimiserEvaluator(robot)
-    kinds = ["kinematic", "quasi-static"] + 2 * ["learned"] * bool(place.networks)
+    kinds = ["kinematic", "kinematic", "quasi-static"] + 3 * ["learned"] * bool(place.networks)
     match kinds[int(rng.integers(len(kinds)))]:
         case "kinematic":
             weights = {name: 30.0 * _spread(rng, 5.0) for name in ("stride", "rise", "tilt", "spread")}

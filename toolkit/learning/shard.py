@@ -21,7 +21,7 @@ from toolkit.learning.label import LabelledSequence, label, sample_of
 from toolkit.learning.quota import Quota
 from toolkit.learning.samples import PAPER, PLANNED, Samples
 from toolkit.learning.scout import Scout
-from toolkit.learning.terrain import OPEN, STEEP, WALLED, random_world, steep_slope
+from toolkit.learning.terrain import OPEN, STEEP, WALLED, random_world, steep_descent
 from toolkit.prediction.network import TransitionNetwork
 from toolkit.prediction.networks import load_networks
 from toolkit.robot.loader import load_robot
@@ -76,7 +76,7 @@ def _place(robot: RobotModel, quota: Quota, config: CollectConfig, rng: np.rando
     kind, friction = kinds[int(rng.integers(len(kinds)))], rng.uniform(*config.friction)
     if kind == STEEP:
         timings = (_random_timing(config.quick_shift, config.quick_swing, rng),)
-        return Place(robot, steep_slope(rng, friction), timings, True, networks)
+        return Place(robot, steep_descent(rng, friction), timings, True, networks)
     which = rng.random()
     if which < config.paper_share:
         timings, friction = (PAPER,), _PAPER_FRICTION

@@ -126,7 +126,7 @@ STEEP = "steep slope"
 """The kind of world in which no foot can rest; it is crossed fast."""
 
 
-def steep_slope(rng: np.random.Generator, friction: float) -> World:
+def steep_descent(rng: np.random.Generator, friction: float) -> World:
     """A slope downwards that is about as steep as friction allows, or steeper."""
     angle = np.degrees(np.arctan(friction)) * rng.uniform(0.8, 1.25)
     text = regular.slope(rng, length=rng.uniform(0.6, 3.0), angle=min(angle, 35.0), width=1.2, friction=friction)

@@ -17,8 +17,8 @@ from toolkit.learning.scout import Scout
 from toolkit.robot.model import RobotModel
 from toolkit.world.timing import Timing
 
-_EVENTS = 2  # most palm transitions between two steps
-_EVENT = 0.6  # probability of each
+_EVENTS = 3  # most palm transitions between two steps
+_EVENT = 0.7  # probability of each
 _WANTED = 20.0  # weight of a transition whose category is lacking; that of another is 1
 _ARM_MARGIN = 0.03  # m; palms in between are this far within the arm's reach above the middle of the feet
 
