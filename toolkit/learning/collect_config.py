@@ -39,7 +39,7 @@ class CollectConfig:
     robots: str | None = None
     seed: int = 0
     samples_per_category: int = 5000
-    per_shard: int = 50
+    per_shard: int = 20
     most_worlds: int = 200
     networks: str | None = None
     networks_digest: str = ""
