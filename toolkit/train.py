@@ -23,7 +23,6 @@ from toolkit.report.scores import score_table
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 
-QUICK_EPOCHS = 30  # of a training for a first look
 DESCRIPTION = """\
 Make the networks with which the contact search judges transitions.
 
@@ -93,7 +92,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
     wanted = [Category(index) for index in args.categories] if args.categories else list(data)
     check_device(args.device)
     config = FitConfig(
-        epochs=args.epochs or (QUICK_EPOCHS if args.quick else FitConfig.epochs),
+        epochs=args.epochs,
         batch=args.batch,
         learning_rate=args.learning_rate,
         device=args.device,
@@ -186,8 +185,7 @@ def main(argv: list[str] | None = None) -> int:
     sub = add("fit", "train a classifier and a regressor per category")
     sub.add_argument("--data", type=Path, required=True, nargs="+", help="data set folder, or several")
     sub.add_argument("--out", type=Path, help="folder for the networks (default: the robot's networks/)")
-    sub.add_argument("--epochs", type=cli.positive(int), help="epochs at most (default: 120)")
-    sub.add_argument("--quick", action="store_true", help=f"train for {QUICK_EPOCHS} epochs, for a first look")
+    sub.add_argument("--epochs", type=cli.positive(int), default=120, help="epochs at most (default: %(default)s)")
     sub.add_argument("--batch", type=cli.positive(int), default=512, help="samples per step (default: %(default)s)")
     sub.add_argument("--limit", type=cli.positive(int), help="transitions per category at most")
     sub.add_argument("--resume", action="store_true", help="keep what was trained with the same settings before a stop")

@@ -1,6 +1,7 @@
 """Network files and data sets: what is written comes back, and every broken file is refused in one clear line."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -186,7 +187,8 @@ def test_a_shard_of_other_types_is_refused(tmp_path, name, value):
         goal=np.zeros((2, 3), np.float32),
         world=np.zeros(2, np.int32),
     )
-    np.savez(path, **{f"{key}_{int(CATEGORY)}": item for key, item in (arrays | {name: value}).items()})
+    named: dict[str, Any] = {f"{key}_{int(CATEGORY)}": item for key, item in (arrays | {name: value}).items()}
+    np.savez(path, **named)
     with pytest.raises(DatasetError, match="arrays of other types"):
         read_shard(path)
 

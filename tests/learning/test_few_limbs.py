@@ -51,12 +51,12 @@ def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
 
     # Few samples, made in this process; the commands themselves are as they are.
     monkeypatch.setattr(train, "executor", lambda workers, cluster: ThreadPoolExecutor(1))
-    monkeypatch.setattr(train, "CollectConfig", partial(CollectConfig, per_shard=20, paper_share=0.8, most_worlds=30))
+    monkeypatch.setattr(train, "CollectConfig", partial(CollectConfig, per_shard=8, paper_share=0.8, most_worlds=30))
     monkeypatch.setattr(fit, "MINIMUM", 3)
     data = str(tmp_path / "data")
-    assert trained("collect", "--out", data, "--samples", "20") == 0
+    assert trained("collect", "--out", data, "--samples", "8") == 0
     samples = read_dataset(tmp_path / "data", robot.fingerprint)
-    assert list(samples) == categories and min(group.known.sum() for group in samples.values()) >= 20
+    assert list(samples) == categories and min(group.known.sum() for group in samples.values()) >= 8
     assert trained("fit", "--data", data, "--epochs", "2") == 0
     assert list(load_networks(robot)) == categories
     assert trained("evaluate", "--data", data, "--count", "20", "--split", "all") == 0

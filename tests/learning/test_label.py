@@ -19,7 +19,7 @@ from toolkit.learning.feasible import transition_feasible
 from toolkit.learning.label import FINAL_REST, INITIAL_REST, label, sample_of
 from toolkit.learning.quota import Quota
 from toolkit.learning.scout import Scout
-from toolkit.learning.variants import part_of, timed, with_palms
+from toolkit.learning.variants import part_of, stepping_aside, timed, with_palms
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.prediction.features import encode
 from toolkit.prediction.kinematic import KinematicEvaluator
@@ -147,6 +147,25 @@ def test_parts_and_timings_of_a_sequence(walk):
         other = timed(walk, timings, rng)
         assert all(a.contact is b.contact for a, b in zip(other.transitions, walk.transitions, strict=True))
         assert {item.timing for item in other.transitions} <= set(timings)
+
+
+def test_some_steps_are_others_that_the_search_asked_about(robot, walk):
+    scout = Scout(KinematicEvaluator(robot), np.ones(len(Category)), 0.0, np.random.default_rng(0))
+    assert stepping_aside(walk, scout, np.random.default_rng(0)).transitions == walk.transitions
+    for stance, step in zip(walk.stances, walk.transitions, strict=False):
+        others = [moved(step, [0.0, 0.01 * number, 0.0]) for number in (1, 2)]
+        wrong = ContactTransition(step.limb.mirrored, foot(robot, step.limb.mirrored, 0.1), TIMING)
+        scout.evaluate(stance, np.zeros(3), np.zeros(3), [*others, wrong])
+    rng, changed = np.random.default_rng(0), []
+    for _ in range(50):
+        other = stepping_aside(walk, scout, rng)
+        assert [item.limb for item in other.transitions] == [item.limb for item in walk.transitions]
+        for one, item in zip(walk.transitions, other.transitions, strict=True):
+            assert item.contact is not None and one.contact is not None
+            aside = float(item.contact.pose.position[1] - one.contact.pose.position[1])
+            changed.append(aside)
+            assert round(aside, 6) in (0.0, 0.01, 0.02)
+    assert 0.05 < np.mean(np.abs(changed) > 0.005) < 0.3
 
 
 def test_palms_touch_and_let_go_between_steps(robot, walk):

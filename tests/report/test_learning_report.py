@@ -13,7 +13,7 @@ from toolkit.report.scores import score_table
 
 
 def test_the_table_has_a_row_per_category():
-    score = Score(1000, 0.4, 0.953, 200.0, 9.0, 0.0042, 0.0039)
+    score = Score(1000, 0.4, 0.953, 200.0, 9.0, 0.0042, 0.0039, 60.0)
     console = Console(width=200, record=True, file=io.StringIO())
     console.print(score_table({Category.MOVE_FOOT: score, Category.ADD_PALM: score}))
     lines = console.export_text().splitlines()

@@ -39,7 +39,7 @@ class CollectConfig:
     robots: str | None = None
     seed: int = 0
     samples_per_category: int = 5000
-    per_shard: int = 50
+    per_shard: int = 20
     most_worlds: int = 200
     networks: str | None = None
     networks_digest: str = ""
@@ -53,10 +53,10 @@ class CollectConfig:
     friction: tuple[float, float] = (0.3, 0.9)
     tilt: tuple[float, float] = (5.0, 25.0)
     rise: tuple[float, float] = (0.02, 0.1)
-    walled: float = 0.7
-    searches: int = 2
+    walled: float = 0.75
+    searches: int = 1
     expansions: tuple[int, int] = (60, 400)
-    kept: int = 3
+    kept: int = 4
     variants: int = 10
     infeasible: float = 0.33
 

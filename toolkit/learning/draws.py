@@ -14,7 +14,7 @@ from toolkit.errors import PlanningError
 from toolkit.learning.collect_config import CollectConfig
 from toolkit.learning.quota import Quota
 from toolkit.learning.scout import Scout
-from toolkit.learning.variants import part_of, timed, with_palms
+from toolkit.learning.variants import part_of, stepping_aside, timed, with_palms
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
 from toolkit.prediction.network import TransitionNetwork
@@ -31,8 +31,9 @@ from toolkit.world.world import World
 
 _NOISE = 0.5  # greatest deviation of the logarithm of the noise on objectives
 _COSTLY = 4  # part of the expansions where the optimiser judges
+_ASIDE = 0.7  # share of the variants without palms that have some other steps
 _CUT = 0.2  # share of variants that are cut
-_WITH_PALMS = 0.8, 0.3  # share of variants with palms, while labels of such transitions are lacking and otherwise
+_WITH_PALMS = 0.6  # share of variants with palms, while labels of such transitions are lacking; half of it otherwise
 _CHEAP = 0.05  # factor on objectives of categories of which labels are lacking, in every other search
 
 
@@ -79,8 +80,10 @@ def _variant(
     """One of the sequences, changed in a random way."""
     sequence = sequences[int(rng.integers(len(sequences)))]
     lacking = any(category.palms_before or not category.moving.is_foot for category in quota.lacking)
-    if not place.steep and rng.random() < (_WITH_PALMS[0] if lacking else _WITH_PALMS[1]):
+    if not place.steep and rng.random() < (_WITH_PALMS if lacking else _WITH_PALMS / 2):
         sequence = with_palms(place.robot, sequence, scout, quota, rng)
+    elif rng.random() < _ASIDE:
+        sequence = stepping_aside(sequence, scout, rng)
     if rng.random() < _CUT:
         sequence = part_of(sequence, rng)
     return timed(sequence, list(place.timings), rng) if len(place.timings) > 1 else sequence
@@ -91,7 +94,7 @@ def _judge(place: Place, rng: np.random.Generator) -> TransitionEvaluator:
     robot = place.robot
     if place.steep:
         return NetworkEvaluator(dict(place.networks)) if place.networks else OptimiserEvaluator(robot)
-    kinds = ["kinematic", "quasi-static"] + 2 * ["learned"] * bool(place.networks)
+    kinds = ["kinematic", "kinematic", "quasi-static"] + 3 * ["learned"] * bool(place.networks)
     match kinds[int(rng.integers(len(kinds)))]:
         case "kinematic":
             weights = {name: 30.0 * _spread(rng, 5.0) for name in ("stride", "rise", "tilt", "spread")}

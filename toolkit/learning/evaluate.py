@@ -24,6 +24,7 @@ class Score:
         objective_error: Mean absolute error of the objective.
         com_error: Mean distance between the predicted and the optimised final CoM, in m.
         velocity_error: The same for the final CoM velocity, in m/s.
+        objective_tail: Error of the objective that one in a hundred exceeds.
     """
 
     samples: int
@@ -33,6 +34,7 @@ class Score:
     objective_error: float
     com_error: float
     velocity_error: float
+    objective_tail: float
 
     @property
     def relative_objective_error(self) -> float:
@@ -51,14 +53,16 @@ def score(network: TransitionNetwork, samples: Samples) -> Score:
         raise DatasetError(f"category {int(network.category)}: no outcome to test on; collect more")
     targets = samples.targets[known]
     outputs = network.predict(samples.features[known])
+    error = np.abs(outputs[:, 0] - targets[:, 0])
     return Score(
         samples=len(samples),
         feasible_share=float(samples.feasible.mean()),
         accuracy=float((network.feasible(samples.features) == samples.feasible).mean()),
         mean_objective=float(targets[:, 0].mean()),
-        objective_error=float(np.abs(outputs[:, 0] - targets[:, 0]).mean()),
+        objective_error=float(error.mean()),
         com_error=float(np.linalg.norm(outputs[:, 1:4] - targets[:, 1:4], axis=1).mean()),
         velocity_error=float(np.linalg.norm(outputs[:, 4:7] - targets[:, 4:7], axis=1).mean()),
+        objective_tail=float(np.percentile(error, 99.0)),
     )
 
 

@@ -21,7 +21,7 @@ from toolkit.learning.label import LabelledSequence, label, sample_of
 from toolkit.learning.quota import Quota
 from toolkit.learning.samples import PAPER, PLANNED, Samples
 from toolkit.learning.scout import Scout
-from toolkit.learning.terrain import OPEN, STEEP, WALLED, steep_descent, random_world
+from toolkit.learning.terrain import OPEN, STEEP, WALLED, random_world, steep_descent
 from toolkit.prediction.network import TransitionNetwork
 from toolkit.prediction.networks import load_networks
 from toolkit.robot.loader import load_robot

@@ -1,4 +1,4 @@
-"""Contact sequences made of those of a search: cut, with palms in between, with other timings."""
+"""Contact sequences made of those of a search: cut, with other steps, with palms in between, with other timings."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from toolkit.centroidal.build import initial_com
 from toolkit.contacts.category import category_of
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
+from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.learning.quota import Quota
@@ -17,8 +18,9 @@ from toolkit.learning.scout import Scout
 from toolkit.robot.model import RobotModel
 from toolkit.world.timing import Timing
 
-_EVENTS = 2  # most palm transitions between two steps
-_EVENT = 0.6  # probability of each
+_ASIDE = 0.15  # share of steps that are replaced
+_EVENTS = 3  # most palm transitions between two steps
+_EVENT = 0.7  # probability of each
 _WANTED = 20.0  # weight of a transition whose category is lacking; that of another is 1
 _ARM_MARGIN = 0.03  # m; palms in between are this far within the arm's reach above the middle of the feet
 
@@ -31,6 +33,21 @@ def part_of(sequence: ContactSequence, rng: np.random.Generator) -> ContactSeque
     first = int(rng.integers(0, count - 1))
     last = int(rng.integers(first + 2, count + 1))
     return ContactSequence(sequence.stances[first], sequence.transitions[first:last])
+
+
+def stepping_aside(sequence: ContactSequence, scout: Scout, rng: np.random.Generator) -> ContactSequence:
+    """The sequence with some of its steps replaced by others out of the same stance that the search asked about.
+
+    So steps that a search would not choose have labels too.
+    """
+    transitions = list(sequence.transitions)
+    for index, (stance, step) in enumerate(zip(sequence.stances, sequence.transitions, strict=False)):
+        if step.limb.is_foot and rng.random() < _ASIDE:
+            asked = scout.asked(stance)
+            rows = np.flatnonzero(TransitionRows.of(asked).limb == step.limb)
+            if len(rows):
+                transitions[index] = replace(asked[int(rng.choice(rows))], timing=step.timing)
+    return ContactSequence(sequence.start, tuple(transitions))
 
 
 def timed(sequence: ContactSequence, timings: list[Timing], rng: np.random.Generator) -> ContactSequence:
