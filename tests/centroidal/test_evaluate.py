@@ -21,11 +21,11 @@ from validation.random_contacts import SamplingConfig, sample_transition
 
 
 def agree(motion):
-    """Largest residual of a motion; compiled and interpreted, residuals and objective are the same."""
+    """Largest residual of a motion; compiled and interpreted, residuals and costs are the same."""
     arguments = ProblemArrays.of(motion.problem), MotionArrays.of(motion)
-    (quick, value), (slow, expected) = residual.evaluate(*arguments), residual.evaluate.py_func(*arguments)
+    (quick, costs), (slow, expected) = residual.evaluate(*arguments), residual.evaluate.py_func(*arguments)
     np.testing.assert_allclose(quick, slow, rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(value, expected, rtol=1e-12, atol=0)
+    np.testing.assert_allclose(costs, expected, rtol=1e-12, atol=0)
     assert isinstance(quick, residual.Residuals)
     return quick.largest
 

@@ -75,11 +75,17 @@ def check(motion: CentroidalMotion) -> Residuals:
     return _evaluated(motion)[0]
 
 
+def step_costs(motion: CentroidalMotion) -> np.ndarray:
+    """(N,) what each step adds to the objective of a motion, never negative; all inf where that is undefined."""
+    residuals, costs = _evaluated(motion)
+    return costs if residuals.largest < np.inf else np.full(len(costs), np.inf)
+
+
 def confirmed(motion: CentroidalMotion) -> CentroidalMotion:
     """The motion with `feasible` and `objective` set from this module: the only place where `feasible` becomes True."""
-    residuals, value = _evaluated(motion)
+    residuals, costs = _evaluated(motion)
     status = motion.status if residuals.within() else f"{motion.status}; residual: {residuals.worst}"
-    value = value if residuals.largest < np.inf else np.inf
+    value = float(costs.sum()) if residuals.largest < np.inf else np.inf
     return replace(motion, feasible=residuals.within(), objective=value, status=status)
 
 
@@ -100,28 +106,29 @@ def cop_margin(motion: CentroidalMotion) -> float:
     return float(np.min((p.half_size - np.abs(motion.cop))[loaded], initial=np.inf))
 
 
-def _evaluated(motion: CentroidalMotion) -> tuple[Residuals, float]:
-    """Residuals and objective of a motion, infinite where its arrays have a wrong shape."""
+def _evaluated(motion: CentroidalMotion) -> tuple[Residuals, np.ndarray]:
+    """Residuals and costs of the steps of a motion, infinite where its arrays have a wrong shape."""
     n, arrays = motion.problem.steps, MotionArrays.of(motion)
     knots = (n + 1, 3)
     shapes = (knots, knots, knots, (n, 4, 3), (n, 4, 2), (n, 4))
     if any(array.shape != shape for array, shape in zip(arrays, shapes, strict=True)):
-        return UNDEFINED, np.inf
+        return UNDEFINED, np.full(n, np.inf)
     return evaluate(ProblemArrays.of(motion.solved), arrays)
 
 
 @compiled(kept=True)
 def evaluate(p, motion):
-    """`Residuals` and objective of a problem (`ProblemArrays`) and its motion (`MotionArrays`).
+    """`Residuals` of a problem (`ProblemArrays`) and its motion (`MotionArrays`), and the costs (N,) of its steps.
 
-    All of them are infinite where a number of the motion is not finite.
+    The costs add up to the objective. All are infinite where a number of the motion is not finite.
     """
     com, linear, angular, force, cop, torque = motion
     n, weight = p.dt.shape[0], p.mass * STANDARD_GRAVITY
+    costs = np.full(n, np.inf)
     for array in (com, linear, angular, force.reshape(-1, 3), cop.reshape(-1, 2), torque):
         for value in array.flat:
             if not math.isfinite(value):
-                return UNDEFINED, np.inf
+                return UNDEFINED, costs
     initial = dynamics = inactive = friction = normal_force = outside = yaw = reach = height = box = rest = 0.0
     for a in range(3):
         initial = _worse(initial, abs(com[0, a] - p.com[a]))
@@ -129,7 +136,6 @@ def evaluate(p, motion):
         initial = _worse(initial, abs(angular[0, a] - p.angular_momentum[a]) / p.mass)
         if p.final_at_rest:
             rest = _worse(rest, abs(linear[n, a]) / p.mass)
-    objective = 0.0
     total, moment, acceleration = np.empty(3), np.empty(3), np.empty(3)
     mean, arm, local = np.empty(3), np.empty(3), np.empty(3)
     floor = np.full(n + 1, np.inf)  # height of the lowest foot at each knot
@@ -178,7 +184,8 @@ def evaluate(p, motion):
             dynamics = _worse(dynamics, abs(gained - h * rate) / p.mass)
             cost += p.weights[0] * linear[t + 1, a] ** 2 + p.weights[1] * (p.mass * acceleration[a]) ** 2
             cost += p.weights[2] * angular[t + 1, a] ** 2 + p.weights[3] * (gained / h) ** 2
-        objective += h / 0.2 * cost
+        cost *= h / 0.2
+        costs[t] = cost if math.isfinite(cost) else np.inf
     i = p.landing_limb
     if i >= 0:
         reach = _worse(reach, _stretch(p, com[n], n, i, p.landing_position, p.landing_rotation))
@@ -192,7 +199,7 @@ def evaluate(p, motion):
     box = _worse(box, abs(cos * off[1] - sin * off[0]) - p.final_half_size[1])
     box = _worse(box, abs(off[2]) - p.final_half_size[2])
     found = Residuals(initial, dynamics, inactive, friction, normal_force, outside, yaw, reach, height, box, rest)
-    return found, objective if math.isfinite(objective) else np.inf
+    return found, costs
 
 
 @compiled

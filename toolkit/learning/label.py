@@ -59,9 +59,9 @@ def label(
         if found is None:
             continue
         motion, derivatives = found
-        residuals, value = evaluate(ProblemArrays.of(problem), motion)
+        residuals, costs = evaluate(ProblemArrays.of(problem), motion)
         if residuals.within():
-            feasible[row], objective[row] = True, value
+            feasible[row], objective[row] = True, costs.sum()
             final_com[row], velocity[row] = motion.com[-1], motion.linear_momentum[-1] / problem.mass
             if (start[row] == com[row]).all():
                 sensitivity[row] = derivatives
