@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import ToolkitError
 from toolkit.pipeline import PipelineConfig, run
 from toolkit.pipeline import make_planner as make_pipeline_planner
@@ -24,6 +23,7 @@ from validation.machine import memory
 from validation.motion_figures import motion_figures
 from validation.options import TrialSettings
 from validation.run_trial import StageLog, make_planner, robot_of
+from validation.truth import identity
 
 
 @dataclass
@@ -221,17 +221,4 @@ def growth_trial(settings: TrialSettings, case: Case, length: float, whole: bool
 
 def signature(search: SearchResult) -> list[tuple]:
     """Every sequence of a search as something that compares exactly."""
-    return [_steps(solution.sequence) for solution in search.solutions]
-
-
-def _steps(sequence: ContactSequence) -> tuple:
-    """Limbs and places of a sequence, bit by bit."""
-    return tuple(
-        (
-            int(transition.limb),
-            b""
-            if transition.contact is None
-            else transition.contact.pose.position.tobytes() + transition.contact.pose.rotation.tobytes(),
-        )
-        for transition in sequence.transitions
-    )
+    return [identity(solution.sequence) for solution in search.solutions]

@@ -1,0 +1,132 @@
+"""What sequences truly cost: each is optimised as the pipeline does it, and priced by the true cost."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from toolkit.centroidal.plan import MotionPlan, plan_motion
+from toolkit.centroidal.problem import Weights
+from toolkit.centroidal.residual import objective
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.errors import PlanningError
+from toolkit.pipeline.config import PipelineConfig
+from toolkit.robot.model import RobotModel
+from toolkit.search.costs.plan_cost import PlanCost, plan_cost
+from toolkit.search.ground import Ground
+from toolkit.search.planner_config import PlannerConfig
+from toolkit.world.world import World
+from validation.motion_figures import motion_figures
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """An optimised sequence.
+
+    Attributes:
+        plan: The plan.
+        cost: Its true cost, inf where it is infeasible.
+        paper_objective: J with the paper's weights; inf where it is infeasible.
+        seconds: s; wall-clock time of the optimisation.
+        processor_seconds: s; processor time of it.
+    """
+
+    plan: MotionPlan
+    cost: PlanCost
+    paper_objective: float
+    seconds: float
+    processor_seconds: float
+
+    @property
+    def feasible(self) -> bool:
+        """Whether there is a motion."""
+        return self.plan.motion.feasible
+
+    def record(self) -> dict[str, Any]:
+        """The figures, as JSON can hold them; those of the motion are None where there is none."""
+        transitions = self.plan.sequence.transitions
+        found: dict[str, Any] = {
+            "feasible": self.feasible,
+            "reason": "" if self.feasible else self.plan.motion.outcome,
+            "optimiser_seconds": self.seconds,
+            "optimiser_processor_seconds": self.processor_seconds,
+            "transitions": len(transitions),
+            "palm_contacts": sum(not t.limb.is_foot and t.contact is not None for t in transitions),
+            "walking_seconds": self.plan.schedule.duration,
+        }
+        if not self.feasible:
+            return found
+        return found | {
+            "true_cost": self.cost.total,
+            "terms": self.cost.terms,
+            "objective": self.cost.objective,
+            "paper_objective": self.paper_objective,
+            "figures": asdict(motion_figures(self.plan.motion)),
+        }
+
+
+class Truth:
+    """Optimises the sequences of one world, each of them once.
+
+    Args:
+        robot: The robot.
+        world: The world.
+        config: Settings of the pipeline.
+
+    Attributes:
+        cost: Weights of the true cost on this ground, the same for all planners.
+    """
+
+    def __init__(self, robot: RobotModel, world: World, config: PipelineConfig = PipelineConfig()):
+        self._robot, self._world, self._config = robot, world, config
+        self.cost = config.cost.on_ground(slides=slides(robot, world))
+        self._known: dict[tuple, Outcome] = {}
+
+    def __call__(self, sequence: ContactSequence) -> Outcome:
+        """The outcome of a sequence."""
+        key = identity(sequence)
+        if key not in self._known:
+            self._known[key] = self._optimised(sequence)
+        return self._known[key]
+
+    def _optimised(self, sequence: ContactSequence) -> Outcome:
+        config = self._config
+        began, worked = time.perf_counter(), time.process_time()
+        plan = plan_motion(
+            self._robot,
+            self._world,
+            sequence,
+            initial_rest=config.initial_rest,
+            final_rest=config.final_rest,
+            landing=config.landing,
+            config=config.sequence,
+        )
+        seconds, processor = time.perf_counter() - began, time.process_time() - worked
+        paper = objective(plan.motion, Weights()) if plan.motion.feasible else np.inf
+        return Outcome(plan, plan_cost(plan, self.cost), paper, seconds, processor)
+
+
+def slides(robot: RobotModel, world: World) -> bool:
+    """Whether no way leads over resting ground alone; where none leads to the goal at all, nothing slides."""
+    ground = Ground(robot, world, PlannerConfig())
+    try:
+        return ground.way(ground.start_stance()).slides
+    except PlanningError:
+        return False
+
+
+def identity(sequence: ContactSequence) -> tuple:
+    """Limbs, places and times of a sequence, bit by bit: something that compares exactly."""
+    return tuple(
+        (
+            int(transition.limb),
+            transition.timing,
+            b""
+            if transition.contact is None
+            else transition.contact.pose.position.tobytes() + transition.contact.pose.rotation.tobytes(),
+        )
+        for transition in sequence.transitions
+    )
