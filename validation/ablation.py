@@ -14,7 +14,7 @@ from validation.cases import kind_of, make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
 from validation.jobs import Job, Record, run_jobs
-from validation.searched import PLANNERS
+from validation.searched import PLANNERS, completed
 from validation.tables import failure_section, markdown_table, median, number, values, write_results
 from validation.trial_file import TrialFile
 
@@ -195,10 +195,10 @@ def main(argv: list[str] | None = None) -> int:
         Job(f"{planner}-{case.name}", ablation_trial, (settings, case, planner, effort, args.execute))
         for case, planner in cases
     ]
-    records = run_jobs(jobs, store, options.pool_of(args), console, "plans")
+    records = completed(run_jobs(jobs, store, options.pool_of(args), console, "plans"), cases, {"variants": {}})
     rows, compared = [], []
     for kind in args.kinds:
-        same = [record for record in records if record.get("kind") == kind]
+        same = [record for record in records if record["kind"] == kind]
         for planner in args.planners:
             own = [record for record in same if record["planner"] == planner]
             rows += [summarise(kind, planner, variant, own) for variant in VARIANTS]

@@ -18,7 +18,7 @@ from validation.judged_again import CHAIN, Judge
 from validation.options import TrialSettings
 from validation.path_bounds import BoundCheck
 from validation.run_trial import robot_of
-from validation.searched import search
+from validation.searched import completed, search
 from validation.tables import failure_section, largest, markdown_table, median, number, write_results
 from validation.trial_file import TrialFile
 from validation.truth import Truth
@@ -157,7 +157,9 @@ def goals_of(rows: Sequence[dict[str, Any]]) -> list[Goal]:
             goals.at_least(f"{name}: rank correlation within a world, median", row["ranks_predicted"], RANKS),
             goals.at_least(f"{name}: J over the prediction", row["line"], LINE[0]),
             goals.at_most(f"{name}: J over the prediction", row["line"], LINE[1]),
-            goals.at_most(f"{name}: favourite above the truly best, median", _percent(row["regret"]), 100 * REGRET, "%"),
+            goals.at_most(
+                f"{name}: favourite above the truly best, median", _percent(row["regret"]), 100 * REGRET, "%"
+            ),
         ]
     for name, part, whole, limit in (
         ("transitions of feasible sequences that are rejected", "rejected", "judged", REJECTED),
@@ -197,11 +199,10 @@ def main(argv: list[str] | None = None) -> int:
     cases = [(case, planner) for case in make_cases(args.kinds, args.trials, first) for planner in PLANNERS]
     store = TrialFile(args.out / "trials.jsonl", settings.deciding())
     jobs = [Job(f"{planner}-{case.name}", calibration_trial, (settings, case, planner)) for case, planner in cases]
-    records = run_jobs(jobs, store, options.pool_of(args), console, "searches")
+    records = completed(run_jobs(jobs, store, options.pool_of(args), console, "searches"), cases, {"entries": []})
     rows = []
     for kind in args.kinds:
-        same = [record for record, (case, _) in zip(records, cases, strict=True) if case.kind == kind]
-        rows.append(summarise(kind, [record for record in same if record["stage"] != "error"], args.fewest))
+        rows.append(summarise(kind, [record for record in records if record["kind"] == kind], args.fewest))
     found = goals_of(rows)
     path = write_results(
         args.results,

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from toolkit.centroidal.problem import Weights
+from toolkit.centroidal.residual import objective
 from toolkit.errors import ToolkitError
 from toolkit.pipeline import PipelineConfig, run
 from toolkit.pipeline import make_planner as make_pipeline_planner
@@ -186,7 +188,11 @@ def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: b
     transitions, motion = trial.plan.sequence.transitions, trial.plan.motion
     return record | {
         "stage": "done",
+        "true_cost": None if result.cost is None else result.cost.total,
+        "cost_terms": None if result.cost is None else result.cost.terms,
+        "walking_seconds": trial.plan.sequence.duration,
         "objective": motion.objective,
+        "paper_objective": objective(motion, Weights()),
         "optimiser_seconds": motion.seconds,
         "transitions": len(transitions),
         "palm_contacts": sum(not t.limb.is_foot and t.contact is not None for t in transitions),

@@ -13,6 +13,8 @@ import numpy as np
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.result import SearchResult, Solution
 from toolkit.world.world import World
+from validation.cases import Case
+from validation.jobs import Record
 from validation.options import TrialSettings
 from validation.plan_trial import WarmUp, warm_up
 from validation.random_contacts import sample_walk
@@ -131,6 +133,24 @@ def search(settings: TrialSettings, world: World, kind: str, seed: Sequence[int]
         spent += outcome.seconds
         tested.append(Tested(solution, outcome, solution.seconds + spent))
     return Searched(planner, result, tuple(tested))
+
+
+def completed(
+    records: Sequence[Record], cases: Sequence[tuple[Case, str]], nothing: dict[str, Any]
+) -> list[dict[str, Any]]:
+    """Records of trials (case, planner) with what those lack that ended in an error: every trial counts."""
+    return [
+        {
+            "kind": case.kind,
+            "seed": case.seed,
+            "planner": planner,
+            "found": False,
+            "feasible": False,
+            **nothing,
+            **record,
+        }
+        for record, (case, planner) in zip(records, cases, strict=True)
+    ]
 
 
 def with_expansions(settings: TrialSettings, expansions: int) -> TrialSettings:

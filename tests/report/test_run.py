@@ -25,6 +25,10 @@ def test_a_whole_run_is_written(run, tmp_path):
     assert names(tmp_path) == ALL
     again = read_json(tmp_path / "report.json")
     assert again["checks"][0] == report.as_dict()["checks"][0] and again["options"] == {"time_limit": 5.0}
+    dynamics, cost = again["stages"]["dynamics"], run.result.cost
+    assert again["schema"] == 3 and dynamics["true_cost"] == pytest.approx(sum(dynamics["cost_terms"].values()))
+    assert dynamics["true_cost"] == pytest.approx(cost.total) and dynamics["plan_seconds"] == cost.seconds
+    assert dynamics["walking_seconds"] == run.plan.sequence.duration and dynamics["paper_objective"] > 0.0
     assert again["seed"] == 3 and again["stages"]["surfaces"]["seconds"] == 0.1
     assert read_plan(tmp_path / "plan.json").duration == run.plan.sequence.duration
     assert read_json(tmp_path / "plan.json")["transitions"][0]["times"]["start"] == pytest.approx(0.2)  # initial rest
@@ -40,6 +44,7 @@ def test_a_rejected_plan_is_written_as_far_as_it_came(run, tmp_path):
 
 
 def test_a_run_without_a_plan_has_a_report_and_a_recording(run, tmp_path):
+    assert replace(run.result, trial=None).cost is None
     write_run(tmp_path, replace(run.result, trial=None, tested=0, reason="no way"), RunOptions(pictures=True))
     assert names(tmp_path) == {"report.json", "recording.rrd"}
     assert read_json(tmp_path / "report.json")["reason"] == "no way"

@@ -9,6 +9,7 @@ from toolkit.contacts.projection import Projected
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.moves.candidates import Candidates, mean_feet
 from toolkit.search.moves.drift import Drift
 from toolkit.search.planner import ContactPlanner, PlannerConfig
@@ -76,7 +77,7 @@ def test_fewer_judgements_until_the_first_plan_of_the_same_graph(robot):
             sequence = solution.sequence
             stances = sequence.stances
             assert len(solution.objective) == len(sequence.transitions) == len(solution.com) - 1
-            cost = 0.0
+            cost = CostConfig().time * sequence.duration
             for index, (before, transition) in enumerate(zip(stances, sequence.transitions, strict=False)):
                 batch = evaluator.evaluate(before, solution.com[index], np.zeros(3), [transition])
                 np.testing.assert_allclose(batch.com[0], solution.com[index + 1], atol=6e-4)  # rounded to 1 mm

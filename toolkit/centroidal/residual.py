@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toolkit.centroidal.arrays import MotionArrays, ProblemArrays
-from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalMotion
+from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalMotion, Weights
 from toolkit.compiled import compiled
 
 TOLERANCE = 1e-6
@@ -87,6 +87,11 @@ def confirmed(motion: CentroidalMotion) -> CentroidalMotion:
     status = motion.status if residuals.within() else f"{motion.status}; residual: {residuals.worst}"
     value = float(costs.sum()) if residuals.largest < np.inf else np.inf
     return replace(motion, feasible=residuals.within(), objective=value, status=status)
+
+
+def objective(motion: CentroidalMotion, weights: Weights) -> float:
+    """Objective of a motion with other weights than those with which it was optimised; inf where it is undefined."""
+    return float(step_costs(replace(motion, problem=replace(motion.problem, weights=weights))).sum())
 
 
 def friction_margin(motion: CentroidalMotion) -> float:

@@ -14,6 +14,7 @@ from toolkit.pipeline.observer import Observer
 from toolkit.pipeline.planner import Planner
 from toolkit.pipeline.trial import Tester, Trial
 from toolkit.robot.model import RobotModel
+from toolkit.search.costs.plan_cost import PlanCost, plan_cost
 from toolkit.search.moves.exclusion import Exclusion, excluded
 from toolkit.search.result import SearchResult, Solution
 from toolkit.world.world import World
@@ -43,6 +44,13 @@ class PipelineResult:
     def passed(self) -> bool:
         """Whether the verdict is PASS."""
         return self.trial is not None and self.trial.passed
+
+    @property
+    def cost(self) -> PlanCost | None:
+        """The true cost of the trial's plan; None without a plan."""
+        if self.trial is None:
+            return None
+        return plan_cost(self.trial.plan, self.config.cost.on_ground(slides=self.search.slides))
 
     @property
     def checks(self) -> tuple[Check, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -56,6 +57,8 @@ def make_planner(
 
         return quasi_static_planner(robot, world, config)
     if kind == "kinematic":
+        if len(config.timings) < 2:  # this planner counts steps; each of them takes as long as any other
+            config = replace(config, cost=replace(config.cost, time=0.0))
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
     # Imported here: without a cache the fast solver takes seconds to compile, and only these kinds need it.
     from toolkit.prediction.optimiser import OptimiserEvaluator

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.centroidal.problem import CentroidalMotion
-from toolkit.centroidal.residual import check, cop_margin, friction_margin
+from toolkit.centroidal.problem import Weights
+from toolkit.centroidal.residual import check, cop_margin, friction_margin, objective
 from toolkit.execution.check import Check
 from toolkit.execution.result import Execution
 from toolkit.pipeline.loop import PipelineResult
 from toolkit.report.files import check_entries, write_json
 from toolkit.world.world import World
 
-SCHEMA = 2
+SCHEMA = 3
 PACKAGES = ("mujoco", "placo", "pin", "casadi", "daqp", "numpy", "scipy", "numba", "rerun-sdk")
 
 SURFACES = ("count", "foot", "palm", "seconds")
@@ -33,7 +33,20 @@ PLANNING = (
     "palm_contacts",
     "sequences_tested",
 )
-DYNAMICS = ("feasible", "seconds", "objective", "max_residual", "min_friction_margin", "min_cop_margin", "status")
+DYNAMICS = (
+    "feasible",
+    "seconds",
+    "true_cost",
+    "cost_terms",
+    "objective",
+    "paper_objective",
+    "plan_seconds",
+    "walking_seconds",
+    "max_residual",
+    "min_friction_margin",
+    "min_cop_margin",
+    "status",
+)
 WHOLEBODY = ("feasible", "seconds", "max_position_error", "max_orientation_error", "limits_respected", "reason")
 EXECUTION = (
     "completed",
@@ -105,7 +118,7 @@ class RunReport:
         stages = {
             "surfaces": _surfaces(result.world, surface_seconds),
             "planning": _planning(result),
-            "dynamics": _dynamics(None if trial is None else trial.plan.motion),
+            "dynamics": _dynamics(result),
             "wholebody": _figures(WHOLEBODY, None if trial is None else trial.trajectory),
             "execution": _execution(None if trial is None else trial.execution),
         }
@@ -177,14 +190,21 @@ def _planning(result: PipelineResult) -> dict[str, Any]:
     }
 
 
-def _dynamics(motion: CentroidalMotion | None) -> dict[str, Any]:
-    """Figures of the centroidal motion; its residual and margins are recomputed without the solver."""
-    if motion is None:
+def _dynamics(result: PipelineResult) -> dict[str, Any]:
+    """Figures of the centroidal motion and what it costs; residual and margins are recomputed without the solver."""
+    trial, cost = result.trial, result.cost
+    if trial is None or cost is None:
         return _figures(DYNAMICS, None)
+    motion = trial.plan.motion
     return {
         "feasible": motion.feasible,
         "seconds": motion.seconds,
+        "true_cost": cost.total if motion.feasible else None,
+        "cost_terms": cost.terms if motion.feasible else None,
         "objective": motion.objective if motion.feasible else None,
+        "paper_objective": objective(motion, Weights()) if motion.feasible else None,
+        "plan_seconds": cost.seconds,
+        "walking_seconds": trial.plan.sequence.duration,
         "max_residual": check(motion).largest,
         "min_friction_margin": friction_margin(motion) if motion.feasible else None,
         "min_cop_margin": cop_margin(motion) if motion.feasible else None,

@@ -114,6 +114,7 @@ class ContactPlanner:
             expanded=_places(parts.table, result.expanded),
             reason="" if result.paths else self._reason(result, tally),
             warning=_UNTRAINED if tally.untrained else "",
+            slides=way.slides,
         )
 
     def _suited(self, start: Stance, com: np.ndarray, tally: Tally) -> TransitionEvaluator:

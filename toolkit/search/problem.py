@@ -158,7 +158,5 @@ class ContactProblem:
 
     def _pending(self, row: np.ndarray) -> Candidates:
         """The one candidate of a pending state."""
-        limb, after = row[LAST : LAST + 1], row[None, CONTACTS]
-        centre, yaw = mean_feet(self._parts.table, after)
-        way = np.hypot(*(centre - mean_feet(self._parts.table, origin_of(row)[None, CONTACTS])[0])[:, :2].T)
-        return Candidates(limb, after[:, limb[0]], after, centre, yaw, way, row[TIMING : TIMING + 1])
+        before, after = origin_of(row)[None, CONTACTS], row[None, CONTACTS]
+        return Candidates.of(self._parts.table, before, row[LAST : LAST + 1], after, row[TIMING : TIMING + 1])

@@ -67,6 +67,7 @@ class SearchResult:
         reason: One line where there is no solution, else "".
         warning: One line where the judgements are less reliable, else "".
         hasty: Number of first solutions that only had to come soon; better ones follow.
+        slides: Whether no way leads over resting ground alone; see `CostConfig.on_ground`.
     """
 
     solutions: tuple[Solution, ...]
@@ -78,6 +79,7 @@ class SearchResult:
     reason: str
     warning: str = ""
     hasty: int = 0
+    slides: bool = False
 
 
 def reason_of(stopped_by: str, seconds: float, expansions: int, rejected: np.ndarray, dynamics: str) -> str:

@@ -38,11 +38,12 @@ def strategy_of(config: PlannerConfig, evaluator: TransitionEvaluator, length: f
 
     `slides` says whether no way leads over resting ground alone.
     """
+    config = replace(config, cost=config.cost.on_ground(slides=slides))
     if slides:
         # Steep ground need not be avoided. Ways across it are rare and lie deep in the graph. Finding them takes less
         # width than leaving a cul-de-sac does, and so more patience.
         search = replace(config.search, patience=10 * config.search.patience)
-        config = replace(config, cost=replace(config.cost, steep=0.0), search=search)
+        config = replace(config, search=search)
     if evaluator.costly:
         return lazy(config, evaluator, length)
     return sliding(config, evaluator) if slides else ordinary(config, evaluator, length)

@@ -40,6 +40,15 @@ class Candidates:
     way: np.ndarray
     timing: np.ndarray
 
+    @classmethod
+    def of(
+        cls, table: ContactTable, before: np.ndarray, limb: np.ndarray, after: np.ndarray, timing: np.ndarray
+    ) -> Candidates:
+        """Transitions of limbs (n,) from contact numbers (n, 4) to (n, 4), with timings (n,) by index."""
+        centre, yaw = mean_feet(table, after)
+        way = np.hypot(*(centre - mean_feet(table, before)[0])[:, :2].T)
+        return cls(limb, after[np.arange(len(limb)), limb], after, centre, yaw, way, timing)
+
     def __len__(self) -> int:
         return len(self.limb)
 
@@ -121,10 +130,7 @@ class CandidateGenerator:
             limb, number, after, n = limb[allowed], number[allowed], after[allowed], int(allowed.sum())
             if n == 0:
                 return None
-        centre, yaw = mean_feet(self._table, after)
-        before = mean_feet(self._table, contacts[None])[0][0]
-        way = np.hypot(*(centre[:, :2] - before[:2]).T)
-        return Candidates(limb, number, after, centre, yaw, way, np.zeros(n, int))
+        return Candidates.of(self._table, contacts[None], limb, after, np.zeros(n, int))
 
     def timed(self, contacts: np.ndarray, candidates: Candidates) -> Candidates:
         """Each candidate out of contact numbers (4,) once for every timing that its swing allows."""

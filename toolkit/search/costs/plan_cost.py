@@ -1,0 +1,111 @@
+"""The true cost of a plan: the search's own terms over its transitions, and the objective of its optimised motion.
+
+Choice of the plan, local search, report and benchmarks judge all planners by it. Whatever a planner's own search counts
+or leaves out, the plan costs the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.centroidal.plan import MotionPlan
+from toolkit.contacts.projection import Projected
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.stance import Contact
+from toolkit.search.costs.edge_cost import CostConfig, TransitionCost
+from toolkit.search.moves.candidates import Candidates
+from toolkit.search.states.contact_table import ContactTable
+from toolkit.world.timing import Timing
+from toolkit.world.world import Goal
+
+
+@dataclass(frozen=True)
+class PlanCost:
+    """The true cost of a plan and its terms, in the units of the search's cost; see `CostConfig`.
+
+    Attributes:
+        way: Of the way of the mean of the feet.
+        step: Of the number of transitions.
+        time: Of the seconds, rests included.
+        steep: Of contacts that leave little friction.
+        stagger: Of one foot ahead of the other in the end.
+        dynamics: Of the objective of the motion.
+        seconds: s; length of the plan, rests included.
+        objective: J of the motion with the weights of its problem; inf where the motion is infeasible.
+    """
+
+    way: float
+    step: float
+    time: float
+    steep: float
+    stagger: float
+    dynamics: float
+    seconds: float
+    objective: float
+
+    @property
+    def total(self) -> float:
+        """The true cost; inf where the motion is infeasible."""
+        return sum(self.terms.values())
+
+    @property
+    def terms(self) -> dict[str, float]:
+        """The terms by name, which add up to the true cost."""
+        return {name: getattr(self, name) for name in ("way", "step", "time", "steep", "stagger", "dynamics")}
+
+
+def plan_cost(plan: MotionPlan, config: CostConfig) -> PlanCost:
+    """The true cost of a plan.
+
+    Args:
+        plan: Contacts, times and motion; its contacts count where the optimiser has put them.
+        config: Weights, on the ground that the plan crosses (`CostConfig.on_ground`).
+    """
+    cost, candidates = _transitions(plan.sequence, plan.world.goal, config)
+    way, step, time, steep, stagger = (float(term.sum()) for term in cost.terms(candidates))
+    rest = plan.schedule.duration - plan.sequence.duration
+    feasible = plan.motion.feasible
+    return PlanCost(
+        way=way,
+        step=step,
+        time=time + cost.time * rest,
+        steep=steep,
+        stagger=stagger,
+        dynamics=cost.dynamics * plan.motion.objective if feasible else np.inf,
+        seconds=plan.schedule.duration,
+        objective=plan.motion.objective if feasible else np.inf,
+    )
+
+
+def known_cost(sequence: ContactSequence, goal: Goal, config: CostConfig) -> float:
+    """Sum over the transitions of a sequence of the terms that are known without the motion; no rests."""
+    cost, candidates = _transitions(sequence, goal, config)
+    return float(cost.known(candidates).sum())
+
+
+def _transitions(sequence: ContactSequence, goal: Goal, config: CostConfig) -> tuple[TransitionCost, Candidates]:
+    """The transitions of a sequence as the search has them, and their cost."""
+    made = [transition.contact for transition in sequence.transitions if transition.contact is not None]
+    contacts = [*sequence.start.contacts, *made]
+    # Each contact stands for a surface of its own, so that none is rounded to another and each keeps its friction.
+    table = ContactTable(np.array([contact.friction for contact in contacts]))
+    numbers = [_entered(table, contact, index) for index, contact in enumerate(contacts)]
+    stances = np.full((len(sequence.transitions) + 1, 4), -1)
+    for contact, number in zip(sequence.start.contacts, numbers, strict=False):
+        stances[:, contact.limb] = number
+    following = iter(numbers[len(sequence.start.contacts) :])
+    for index, transition in enumerate(sequence.transitions):
+        stances[index + 1 :, transition.limb] = -1 if transition.contact is None else next(following)
+    timings: dict[Timing, int] = {}
+    timing = [timings.setdefault(transition.timing, len(timings)) for transition in sequence.transitions]
+    limb = np.array([transition.limb for transition in sequence.transitions], int)
+    candidates = Candidates.of(table, stances[:-1], limb, stances[1:], np.array(timing, int))
+    return TransitionCost(config, table, tuple(timings), goal), candidates
+
+
+def _entered(table: ContactTable, contact: Contact, surface: int) -> int:
+    """Number of a contact, entered as one on a surface of this index."""
+    pose = contact.pose
+    return int(table.add(contact.limb, Projected(np.array([surface]), pose.position[None], pose.rotation[None]))[0])
