@@ -107,8 +107,7 @@ def ablation_trial(settings: TrialSettings, case: Case, planner: str, effort: Ef
     except PlanningError as error:
         return record | {"found": False, "feasible": False, "passed": False, "reason": str(error)}
     first = searches[0]
-    chosen = dict(zip((BY_COUNT, BY_TIME), spend(effort, searches), strict=True))
-    chosen[RAW] = favourite(first.tested)
+    chosen = dict(zip(VARIANTS, (favourite(first.tested), *spend(effort, searches)), strict=True))
     summary = first.summary()
     variants = {name: _described(item) for name, item in chosen.items() if item is not None}
     if execution:

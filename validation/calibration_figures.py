@@ -38,12 +38,13 @@ def world_figures(records: Sequence[Record], ours: str) -> WorldFigures:
 
     Args:
         records: Of the planners' searches in this world, with their `entries`.
-        ours: The planner whose choice is judged.
+        ours: The planner whose first search's choice is judged.
     """
     entries = [entry for record in records for entry in record["entries"]]
     compared = list({_identity(entry): entry for entry in entries if entry.get("judged")}.values())
     truth = [entry["objective"] for entry in compared]
-    returned = [entry for record in records if record["planner"] == ours for entry in record["entries"]]
+    first = (record for record in records if record["planner"] == ours and record["search"] == 0)
+    returned = [entry for record in first for entry in record["entries"]]
     feasible = [entry for entry in returned if entry["feasible"]]
     return WorldFigures(
         sequences=len(compared),

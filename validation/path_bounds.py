@@ -26,7 +26,7 @@ class PathBounds:
         h: (n,) the search's lower bound.
         predicted: (n,) cost to go as the search counts it.
         h_of_plan: (n,) the lower bound where the optimiser put the contacts.
-        true: (n,) true cost to go of the plan, infinite where it is infeasible.
+        true: (n,) true cost to go of the plan with the search's weights, infinite where it is infeasible.
     """
 
     h: np.ndarray
@@ -71,7 +71,7 @@ class BoundCheck:
         self._cost = EdgeCost(self._weights, table, timings, self._goal, way.distance, way.longest)
 
     def __call__(self, tested: Tested) -> PathBounds:
-        """h and cost to go along a sequence of the planner."""
+        """The h and the cost to go along a sequence of the planner."""
         solution, plan = tested.solution, tested.outcome.plan
         predicted = self._known(solution.sequence) + self._weights.dynamics * _from_here(solution.objective)
         true = np.full(len(predicted), np.inf)

@@ -74,15 +74,14 @@ class Truth:
     Args:
         robot: The robot.
         world: The world.
-        config: Settings of the pipeline.
 
     Attributes:
         cost: Weights of the true cost on this ground, the same for all planners.
     """
 
-    def __init__(self, robot: RobotModel, world: World, config: PipelineConfig = PipelineConfig()):
-        self._robot, self._world, self._config = robot, world, config
-        self.cost = config.cost.on_ground(slides=slides(robot, world))
+    def __init__(self, robot: RobotModel, world: World):
+        self._robot, self._world, self._config = robot, world, PipelineConfig()
+        self.cost = self._config.cost.on_ground(slides=slides(robot, world))
         self._known: dict[tuple, Outcome] = {}
 
     def __call__(self, sequence: ContactSequence) -> Outcome:
