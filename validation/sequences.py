@@ -12,7 +12,6 @@ from toolkit import cli
 from toolkit.contacts.room import landing_room
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import PlanningError
-from toolkit.pipeline.config import PipelineConfig
 from toolkit.report.console import make_console
 from toolkit.world.timing import Timing
 from validation import goals, options
@@ -60,7 +59,7 @@ def search_trial(settings: TrialSettings, case: Case) -> Record:
     if not found.solutions:
         return record | {"reason": found.reason}
     sequence = found.solutions[int(rng.integers(len(found.solutions)))].sequence
-    room = landing_room(robot, world.surfaces, sequence, PipelineConfig().landing, world.goal)
+    room = landing_room(robot, world.surfaces, sequence, goal=world.goal)
     _ready(settings)
     compared = {"fixed": _compared(settings, sequence, None), "free": _compared(settings, sequence, room)}
     return _finished(record, sequence, compared)
@@ -309,9 +308,10 @@ def main(argv: list[str] | None = None) -> int:
 
 
 NOTE = (
-    "Times are processor times of everything from the contacts to the checked motion. Missed: feasible to the reference "
-    "alone; gained: to the solver alone. Objectives within 1 % are the same. Margins are as tight where the part of the "
-    "friction that the solver's motion needs is at most 0.01 above the reference's. Reference / solver: of the times."
+    "Times are processor times of everything from the contacts to the checked motion. Missed: feasible to the "
+    "reference alone; gained: to the solver alone. Objectives within 1 % are the same. Margins are as tight where the "
+    "part of the friction that the solver's motion needs is at most 0.01 above the reference's. Reference / solver: of "
+    "the times."
 )
 SAME_NOTE = f"{NOTE} Solver and reference are one and the same program here."
 
