@@ -1,25 +1,27 @@
-"""The pipeline's order of things: which sequences are tested, and what is searched again."""
+"""The pipeline's order of things: what is optimised, which sequence is chosen, and what is searched again."""
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from toolkit import pipeline
 from toolkit.contacts.failure import Failure
 from toolkit.geometry.limb import Limb
-from toolkit.pipeline import loop
+from toolkit.pipeline import Source, loop
 
 
-def solution(name, *limbs, start=()):
+def solution(name, *limbs, start=(), seconds=0.0):
     """A solution whose transitions make contacts with limbs, or break them where a palm is in contact."""
     palms = [set(start)]
     for limb in limbs:
         palms.append(palms[-1] if limb.is_foot else palms[-1] ^ {limb})
     stances = [SimpleNamespace(palms=tuple(each), contacts=()) for each in palms]
     transitions = [SimpleNamespace(limb=limb, contact=None) for limb in limbs]
-    return SimpleNamespace(
-        name=name, sequence=SimpleNamespace(transitions=transitions, stances=stances, start=stances[0])
+    sequence = SimpleNamespace(
+        name=name, identity=name.encode(), transitions=transitions, stances=stances, start=stances[0]
     )
+    return SimpleNamespace(name=name, sequence=sequence, seconds=seconds)
 
 
 class Planner:
@@ -28,73 +30,142 @@ class Planner:
     hasty = 0
 
     def __init__(self, with_palms, without):
-        self.found, self.calls = {True: with_palms, False: without}, []
+        self.found, self.calls, self.exclusions = {True: with_palms, False: without}, [], []
 
     def search(self, rng, time_limit, observer=None, exclusions=(), palms=True):
         self.calls.append(palms)
+        self.exclusions.append(len(exclusions))
         return SimpleNamespace(
             solutions=self.found[palms],
             reason="",
             warning="",
-            seconds=0.0,
+            seconds=1.0,
             heuristic_seconds=0.0,
             expansions=1,
             hasty=self.hasty,
+            slides=False,
         )
 
 
-def run(planner, passing, monkeypatch, candidates=6):
-    tested = []
+class Run:
+    """A run with made-up costs; a sequence without a cost has no motion, and only those in `passing` pass."""
 
-    class Tester:
-        def __init__(self, *parts):
-            pass
+    def __init__(self, planner, passing, monkeypatch, cost=None, **settings):
+        self.optimised, self.tested = [], []
+        optimised, tested, cost = self.optimised, self.tested, cost or {}
 
-        def test(self, item):
-            tested.append(item.name)
-            failure = None if item.name in passing else Failure("it fell")
-            return SimpleNamespace(passed=failure is None, merit=(len(tested),), failure=failure)
+        class Tester:
+            def __init__(self, *parts):
+                pass
 
-    monkeypatch.setattr(loop, "Tester", Tester)
-    config = pipeline.PipelineConfig(candidates=candidates)
-    return pipeline.run(None, None, planner, config), tested  # pyright: ignore[reportArgumentType]
+            def optimise(self, sequence):
+                optimised.append(sequence.name)
+                failure = Failure("no motion", transition=0) if cost.get(sequence.name, 0.0) == np.inf else None
+                return SimpleNamespace(name=sequence.name), failure
+
+            def test(self, candidate):
+                if candidate.failure is None:
+                    tested.append(candidate.plan.name)
+                passed = candidate.plan.name in passing
+                failure = candidate.failure or (None if passed else Failure("it fell"))
+                return SimpleNamespace(candidate=candidate, passed=passed, merit=(passed,), failure=failure)
+
+        def plan_cost(plan, config):
+            return SimpleNamespace(total=cost.get(plan.name, 0.0))
+
+        monkeypatch.setattr(loop, "Tester", Tester)
+        monkeypatch.setattr(loop, "plan_cost", plan_cost)
+        config = pipeline.PipelineConfig(**{"candidates": 6} | settings)
+        self.result = pipeline.run(None, None, planner, config)  # pyright: ignore[reportArgumentType]
 
 
 FOOT, PALM = Limb.LEFT_FOOT, Limb.RIGHT_PALM
 
 
-def test_the_newest_sequence_comes_first_and_ends_the_run_where_it_passes(monkeypatch):
-    planner = Planner([solution("old", FOOT), solution("new", FOOT, PALM)], [])
-    result, tested = run(planner, {"new", "old"}, monkeypatch)
-    assert tested == ["new"] and planner.calls == [True]
-    assert result.passed and result.tested == 1
+def test_all_are_optimised_and_the_truly_cheapest_is_chosen(monkeypatch):
+    planner = Planner([solution("old", FOOT), solution("cheap", FOOT), solution("new", FOOT, PALM)], [])
+    run = Run(planner, {"new", "cheap", "old"}, monkeypatch, {"old": 3.0, "cheap": 1.0, "new": 2.0})
+    assert run.optimised == ["new", "cheap", "old"]  # the newest is predicted to be the cheapest
+    assert run.tested == ["cheap"] and planner.calls == [True]
+    result = run.result
+    assert result.passed and [item.number for item in result.candidates] == [0, 1, 2]
+    assert [result.is_chosen(item) for item in result.candidates] == [False, True, False]
 
 
-def test_what_was_only_to_come_soon_is_not_tested(monkeypatch):
-    planner = Planner([solution("soon", FOOT), solution("old", FOOT), solution("new", FOOT)], [])
+def test_what_fails_later_makes_room_for_the_next_cheapest(monkeypatch):
+    planner = Planner([solution("old", FOOT), solution("cheap", FOOT), solution("new", FOOT)], [])
+    run = Run(planner, {"old"}, monkeypatch, {"old": 3.0, "cheap": 1.0, "new": 2.0})
+    assert run.tested == ["cheap", "new", "old"] and run.result.passed
+    assert [run.result.reason_against(item) for item in run.result.candidates] == ["it fell", "it fell", ""]
+
+
+def test_what_was_only_to_come_soon_is_tested_like_the_rest(monkeypatch):
+    planner = Planner([solution("soon", FOOT, seconds=0.1), solution("new", FOOT, seconds=0.5)], [])
     planner.hasty = 1
-    result, tested = run(planner, {"soon"}, monkeypatch)
-    assert tested == ["new", "old"] and not result.passed
+    run = Run(planner, {"soon"}, monkeypatch)
+    assert run.optimised == ["new", "soon"] and run.result.passed
+    assert [item.source for item in run.result.candidates] == [Source.SEARCH, Source.HASTY]
+    assert run.result.first_feasible is run.result.candidates[1]
+
+
+def test_the_first_feasible_sequence_counts_and_not_the_first_one(monkeypatch):
+    found = [solution(name, FOOT, seconds=seconds) for name, seconds in (("first", 0.1), ("second", 0.4), ("c", 0.9))]
+    run = Run(Planner(found, []), {"c"}, monkeypatch, {"first": np.inf})
+    first = run.result.first_feasible
+    assert first is not None and first.seconds == 0.4
+    nothing = Run(Planner(found[:1], []), set(), monkeypatch, {"first": np.inf}).result
+    assert nothing.first_feasible is None and not nothing.passed and nothing.reason == "no motion"
+    assert nothing.trial is not None and not nothing.trials
+
+
+def test_the_time_of_a_later_search_includes_those_before_it(monkeypatch):
+    planner = Planner([solution("palms", PALM, seconds=0.3)], [solution("feet", FOOT, seconds=0.2)])
+    run = Run(planner, {"feet"}, monkeypatch, {"palms": np.inf})
+    assert run.result.first_feasible is not None and run.result.first_feasible.seconds == pytest.approx(1.2)
+
+
+def test_equal_sequences_are_optimised_once(monkeypatch):
+    planner = Planner([solution("same", FOOT), solution("other", PALM), solution("same", FOOT)], [])
+    planner.found[False] = planner.found[True]
+    run = Run(planner, set(), monkeypatch)
+    assert sorted(run.optimised) == ["other", "same"]
+    assert planner.calls == [True, False]  # the second search brings nothing new, so there is no third
+
+
+def test_infeasible_sequences_are_excluded_from_the_next_search(monkeypatch):
+    planner = Planner([solution("a", FOOT), solution("b", FOOT), solution("palms", PALM)], [solution("feet", FOOT)])
+    monkeypatch.setattr(loop.Exclusion, "of", lambda stance, transition: SimpleNamespace())
+    monkeypatch.setattr(loop, "_meets", lambda sequence, exclusions: False)
+    run = Run(planner, {"feet"}, monkeypatch, {"a": np.inf, "b": np.inf, "palms": np.inf})
+    assert planner.exclusions == [0, 3] and run.result.passed
 
 
 def test_where_palms_fail_the_feet_are_searched_alone(monkeypatch):
     palms = [solution(f"palms {number}", FOOT, PALM) for number in range(5)]
     planner = Planner(palms, [solution("feet", FOOT)])
-    result, tested = run(planner, {"feet"}, monkeypatch)
-    assert tested == ["palms 4", "palms 3", "palms 2", "feet"]  # palms get half of the six
-    assert planner.calls == [True, False] and result.passed
+    run = Run(planner, {"feet"}, monkeypatch)
+    assert run.tested == ["palms 4", "palms 3", "palms 2", "feet"]  # palms get half of the six
+    assert planner.calls == [True, False] and run.result.passed
 
 
 def test_feet_that_first_let_go_of_the_wall_are_tested_as_feet_alone(monkeypatch):
     palms = [solution(f"palms {number}", FOOT, FOOT, start=[PALM]) for number in range(5)]
     planner = Planner(palms, [solution("feet", PALM, FOOT, start=[PALM])])
-    result, tested = run(planner, {"feet"}, monkeypatch)
-    assert tested == ["palms 4", "palms 3", "palms 2", "feet"] and result.passed
+    run = Run(planner, {"feet"}, monkeypatch)
+    assert run.tested == ["palms 4", "palms 3", "palms 2", "feet"] and run.result.passed
 
 
 @pytest.mark.parametrize("count", [1, 4])
 def test_no_more_than_the_candidates_are_tested(monkeypatch, count):
     planner = Planner([solution("palms", PALM)], [solution(f"feet {number}", FOOT) for number in range(9)])
-    result, tested = run(planner, set(), monkeypatch, candidates=count)
-    assert len(tested) <= count and not result.passed
-    assert result.reason == "it fell"
+    run = Run(planner, set(), monkeypatch, candidates=count)
+    assert len(run.tested) <= count and not run.result.passed
+    assert run.result.reason == "it fell"
+
+
+def test_a_search_gets_half_of_the_optimisations_that_are_left(monkeypatch):
+    planner = Planner([solution(f"palms {number}", PALM) for number in range(9)], [])
+    planner.found[False] = [solution(f"feet {number}", FOOT) for number in range(9)]
+    run = Run(planner, set(), monkeypatch, dict.fromkeys([f"palms {n}" for n in range(9)], np.inf), optimisations=7)
+    assert run.optimised == ["palms 8", "palms 7", "palms 6", "palms 5", "feet 8", "feet 7", "feet 6"]
+    assert planner.calls == [True, False, False] and not run.result.passed

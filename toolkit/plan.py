@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from pathlib import Path
 
@@ -12,9 +11,9 @@ from toolkit import cli
 DESCRIPTION = """\
 Search for a contact sequence through a world and optimise its centroidal motion.
 
-The anytime search finds a first sequence quickly and improves it until its budget is spent; the sequences are then
-optimised as a whole, newest (cheapest) first, until one is dynamically feasible. To see whether the robot can carry it
-out, run python -m toolkit.validate.
+The anytime search finds a first sequence quickly and improves it until its budget is spent. All its sequences are then
+optimised as a whole, and the one with the least true cost among the dynamically feasible ones is the plan. To see
+whether the robot can carry it out, run python -m toolkit.validate.
 """
 
 EPILOG = """\
@@ -43,7 +42,7 @@ def main(argv: list[str] | None = None) -> int:
     args = arguments().parse_args(argv)
     # Heavy imports come after the options, so that --help and mistakes in them answer at once.
     from toolkit.pipeline import PipelineConfig, make_planner, run
-    from toolkit.report.console import StageConsole, solution_table
+    from toolkit.report.console import StageConsole, sequence_table
     from toolkit.report.files import RunFolder
     from toolkit.report.run import RunOptions, write_run
     from toolkit.robot.loader import load_robot
@@ -58,12 +57,12 @@ def main(argv: list[str] | None = None) -> int:
     with RunFolder(args.out, world.name, robot.name) as folder:  # one that cannot be written is noticed here
         display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
         planner = make_planner(robot, world, options.planner, options.planner_config())
-        config = PipelineConfig(seed=args.seed, time_limit=options.time_limit, candidates=sys.maxsize, until="dynamics")
+        config = PipelineConfig(seed=args.seed, time_limit=options.time_limit, until="dynamics")
         result = run(robot, world, planner, config, display)
         written = RunOptions(not args.no_recording, args.pictures, False, surface_seconds, cli.plain_options(args))
         write_run(folder.path, result, written)
-    if result.search.solutions:
-        display.console.print(solution_table(result.search, result.trial.solution if result.trial else None))
+    if result.candidates:
+        display.console.print(sequence_table(result))
     display.verdict((), result.passed, result.reason, folder.target, time.perf_counter() - began)
     return 0 if result.passed else 1
 

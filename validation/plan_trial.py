@@ -87,10 +87,11 @@ class TimedPlanner:
     Attributes:
         search_result: of the first search; None before it.
         figures: of the first search.
+        first_share: of the wall-clock until the first sequence that this process had a processor.
     """
 
     def __init__(self, planner: ContactPlanner):
-        self._planner = planner
+        self._planner, self.first_share = planner, 1.0
         self.search_result: SearchResult | None = None
         self.figures: dict[str, Any] = {}
 
@@ -110,7 +111,7 @@ class TimedPlanner:
         search = self._planner.search(rng, time_limit, clock, exclusions, palms)
         share, after = clock.share(), memory()
         first = search.solutions[0].seconds if search.solutions else None
-        first_share = clock.processor_share or share
+        first_share = self.first_share = clock.processor_share or share
         self.search_result = search
         self.figures = {
             "first_seconds": first,
@@ -168,10 +169,16 @@ def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: b
         return record | {"reason": " ".join(str(error).split())}
     first, trial = planner.search_result, result.trial
     assert first is not None
+    feasible, count = result.first_feasible, sum(candidate.feasible for candidate in result.candidates)
     record |= planner.figures | {
         "found": bool(first.solutions),
         "sequences": len(first.solutions),
-        "tested": result.tested,
+        "optimised": len(result.candidates),
+        "tested": None if count == 0 else len(result.candidates) / count,
+        "searched_first_seconds": planner.figures["first_seconds"],
+        "first_seconds": None if feasible is None else feasible.seconds,
+        "first_processor_seconds": None if feasible is None else feasible.seconds * planner.first_share,
+        "first_optimiser_seconds": None if feasible is None else feasible.plan.motion.seconds,
         "stages": log.entries,
         "feasible": result.passed,
         "passed": result.passed,
@@ -188,8 +195,8 @@ def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: b
     transitions, motion = trial.plan.sequence.transitions, trial.plan.motion
     return record | {
         "stage": "done",
-        "true_cost": None if result.cost is None else result.cost.total,
-        "cost_terms": None if result.cost is None else result.cost.terms,
+        "true_cost": trial.candidate.cost.total,
+        "cost_terms": trial.candidate.cost.terms,
         "walking_seconds": trial.plan.sequence.duration,
         "objective": motion.objective,
         "paper_objective": objective(motion, Weights()),

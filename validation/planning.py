@@ -32,7 +32,7 @@ HEADER = (
     "planner",
     "(1) planned",
     "(2) feasible",
-    "(3) tested",
+    "(3) optimised for each feasible",
     "(4) objective",
     "(5) lin. momentum [kg m/s]",
     "(6) its rate [N]",
@@ -75,6 +75,7 @@ def summarise(kind: str, planner: str, records: Sequence[Record]) -> dict[str, A
         "transitions": mean(values(feasible, "transitions")),
         "first_seconds": median(values(found, "first_seconds")),
         "first_processor_seconds": median(values(found, "first_processor_seconds")),
+        "first_optimiser_seconds": median(values(found, "first_optimiser_seconds")),
         "heuristic_seconds": median(values(records, "heuristic_seconds")),
         "heuristic_processor_seconds": median(values(records, "heuristic_processor_seconds")),
         "expansions_per_second": median(values(records, "expansions_per_second")),
@@ -113,8 +114,9 @@ def time_table(rows: Sequence[dict[str, Any]]) -> str:
     header = (
         "world",
         "planner",
-        "first sequence, median [ms]",
+        "first feasible sequence, median [ms]",
         "the same, processor time [ms]",
+        "its optimisation [ms]",
         "the paper [ms]",
         "heuristic [ms]",
         "the same, processor time [ms]",
@@ -135,6 +137,7 @@ def time_table(rows: Sequence[dict[str, Any]]) -> str:
                 row["planner"],
                 first,
                 processor,
+                number(_ms(row["first_optimiser_seconds"]), ".0f"),
                 number(None if paper is None else 1e3 * paper, ".0f"),
                 heuristic,
                 heuristic_processor,
@@ -155,9 +158,9 @@ def goals_of(rows: Sequence[dict[str, Any]]) -> list[Goal]:
         of = 50 if kind_of(kind).random else 5
         found.append(goals.count(f"{kind}: contact sequence found", row["found"], row["trials"], of, of))
         found.append(goals.count(f"{kind}: dynamically feasible", row["feasible"], row["trials"], of, of))
-        found.append(goals.at_most(f"{kind}: sequences tested, average", row["tested"], 1.1))
+        found.append(goals.at_most(f"{kind}: sequences optimised for each feasible one, average", row["tested"], 1.1))
         if kind in FIRST_SEQUENCE:
-            name, limit = f"{kind}: time to first sequence, median", 1e3 * FIRST_SEQUENCE[kind]
+            name, limit = f"{kind}: time to first feasible sequence, median", 1e3 * FIRST_SEQUENCE[kind]
             found.append(goals.at_most(name, _ms(row["first_seconds"]), limit, "ms"))
         found.append(goals.at_most(f"{kind}: heuristic, median", _ms(row["heuristic_seconds"]), 150.0, "ms"))
     corridor = ours.get("rubble_corridor")

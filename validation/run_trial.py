@@ -86,7 +86,7 @@ def execution_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
     trial = result.trial
     record |= {
         "planned": bool(result.search.solutions),
-        "tested": result.tested,
+        "tested": len(result.trials),
         "stages": log.entries,
         "feasible": trial is not None and trial.plan.motion.feasible,
         "wholebody": trial is not None and trial.trajectory is not None and trial.trajectory.feasible,

@@ -19,9 +19,10 @@ from toolkit.execution.check import Check
 from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_from_quaternion
-from toolkit.pipeline import PipelineConfig, PipelineResult, Trial
+from toolkit.pipeline import Candidate, PipelineConfig, PipelineResult, Source, Trial
 from toolkit.report.run_report import RunReport
 from toolkit.robot.model import LimbModel, RobotModel
+from toolkit.search.costs.plan_cost import plan_cost
 from toolkit.search.result import SearchResult, Solution
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.plan import WholeBodyPlan
@@ -76,7 +77,8 @@ class MadeUpRun:
 
     def only(self, plan: MotionPlan, execution: Execution | None = None) -> PipelineResult:
         """The result of a run that came as far as `plan` or `execution`."""
-        return replace(self.result, trial=Trial(self.solution, plan, execution, FAILURE))
+        trial = Trial(self.result.candidates[-1], plan, execution, FAILURE)
+        return replace(self.result, trial=trial, trials=(trial,))
 
     @property
     def motion_plan(self) -> MotionPlan:
@@ -293,8 +295,15 @@ def make_run(steps: int = 4) -> MadeUpRun:
     expanded = np.column_stack([np.linspace(0, 1, 50), 0.1 * np.sin(np.arange(50)), np.zeros(50)])
     search = SearchResult(solutions, 1.0, 0.2, 50, False, expanded, "")
     plan = WholeBodyPlan(robot, world, sequence, schedule, motion, scene, LimbPaths(()), trajectory)
-    trial = Trial(solutions[-1], plan, execution, FAILURE)
-    result = PipelineResult(robot, world, PipelineConfig(seed=3), search, trial, 1, FAILURE.reason)
+    poor = MotionPlan(robot, world, sequence, schedule, replace(motion, feasible=False))
+    refused = Failure("no feasible centroidal motion: it stretches")
+    config = PipelineConfig(seed=3)
+    candidates = tuple(
+        Candidate(number, Source.SEARCH, 0, item.seconds, item, made, plan_cost(made, config.cost), failure)
+        for number, (item, made, failure) in enumerate(zip(solutions, (poor, plan), (refused, None), strict=True))
+    )
+    trial = Trial(candidates[-1], plan, execution, FAILURE)
+    result = PipelineResult(robot, world, config, search, trial, candidates, (trial,), FAILURE.reason)
     return MadeUpRun(result, plan, execution, RunReport.of(result, 0.1))
 
 

@@ -206,15 +206,19 @@ def test_the_summary_states_verdict_checks_and_legend(run):
     for part in ("slip is 0.03 m", "| slip | 0.03 m | 0.02 m |", "NOT_CHECKED", "1 m = 1000 N", "left foot red"):
         assert part in text
     execution = replace(run.execution, checks=(Check("fall", 0.0, "", 0.0),))
-    passed = RunReport.of(replace(run.result, trial=Trial(run.solution, run.plan, execution)))
+    passed = RunReport.of(replace(run.result, trial=Trial(run.result.candidates[-1], run.plan, execution)))
     assert summary(passed).startswith("# PASS") and "FAIL" not in summary(passed)
     assert json.dumps(passed.as_dict())
 
 
 def test_the_search_s_summary_has_a_row_per_solution(run):
-    text = search_summary(run.result.search)
+    text = search_summary(run.result)
     assert "| 0.100 s | 9.000 | unknown | 6 |" in text and "| 0.600 s | 7.000 | 40 % | 6 |" in text
-    assert "**no way**" in search_summary(replace(run.result.search, solutions=(), reason="no way"))
+    total = f"{run.result.cost.total:.1f}"
+    assert "| 0 | search | 6 | 1 | 9.0 | – | no feasible centroidal motion: it stretches |" in text
+    assert f"| 1 | search | 6 | 1 | 7.0 | {total} | chosen |" in text
+    nothing = replace(run.result.search, solutions=(), reason="no way")
+    assert "**no way**" in search_summary(replace(run.result, search=nothing, trial=None, candidates=()))
 
 
 def test_frames_keep_the_ends():

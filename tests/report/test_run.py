@@ -29,6 +29,14 @@ def test_a_whole_run_is_written(run, tmp_path):
     assert again["schema"] == 3 and dynamics["true_cost"] == pytest.approx(sum(dynamics["cost_terms"].values()))
     assert dynamics["true_cost"] == pytest.approx(cost.total) and dynamics["plan_seconds"] == cost.seconds
     assert dynamics["walking_seconds"] == run.plan.sequence.duration and dynamics["paper_objective"] > 0.0
+    planning = again["stages"]["planning"]
+    assert planning["first_feasible_seconds"] == 0.6 and planning["sequences_tested"] == 1
+    refused, chosen = planning["sequences"]
+    assert (refused["number"], refused["feasible"], refused["true_cost"]) == (0, False, None)
+    assert "it stretches" in refused["reason"] and not refused["chosen"]
+    assert chosen["chosen"] and chosen["feasible"] and chosen["source"] == "search" and "slip" in chosen["reason"]
+    assert chosen["true_cost"] == dynamics["true_cost"] and chosen["predicted_cost"] == run.solution.cost
+    assert (chosen["transitions"], chosen["palm_contacts"]) == (6, 1)
     assert again["seed"] == 3 and again["stages"]["surfaces"]["seconds"] == 0.1
     assert read_plan(tmp_path / "plan.json").duration == run.plan.sequence.duration
     assert read_json(tmp_path / "plan.json")["transitions"][0]["times"]["start"] == pytest.approx(0.2)  # initial rest
@@ -45,7 +53,9 @@ def test_a_rejected_plan_is_written_as_far_as_it_came(run, tmp_path):
 
 def test_a_run_without_a_plan_has_a_report_and_a_recording(run, tmp_path):
     assert replace(run.result, trial=None).cost is None
-    write_run(tmp_path, replace(run.result, trial=None, tested=0, reason="no way"), RunOptions(pictures=True))
+    write_run(
+        tmp_path, replace(run.result, trial=None, candidates=(), trials=(), reason="no way"), RunOptions(pictures=True)
+    )
     assert names(tmp_path) == {"report.json", "recording.rrd"}
     assert read_json(tmp_path / "report.json")["reason"] == "no way"
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.world.timing import Timing
@@ -59,6 +61,22 @@ class ContactSequence:
         return tuple(stances)
 
     @property
+    def identity(self) -> bytes:
+        """Bytes that are equal for equal sequences: limbs, places, surfaces and timings, to the last bit."""
+        parts = [_bytes_of(contact) for contact in self.start.contacts]
+        for transition in self.transitions:
+            times = np.array([transition.timing.shift, transition.timing.swing]).tobytes()
+            contact = b"" if transition.contact is None else _bytes_of(transition.contact)
+            parts.append(bytes([transition.limb]) + times + contact)
+        return b"|".join(parts)
+
+    @property
     def duration(self) -> float:
         """Length of all transitions in s."""
         return sum(transition.timing.shift + transition.timing.swing for transition in self.transitions)
+
+
+def _bytes_of(contact: Contact) -> bytes:
+    """Limb, place and surface of a contact."""
+    numbers = np.array([contact.limb, contact.surface, contact.friction, *contact.pose.position])
+    return numbers.tobytes() + contact.pose.rotation.tobytes()

@@ -18,8 +18,10 @@ class PipelineConfig:
         seed: Seed of every random draw.
         time_limit: s; for the contact search. The search also ends after a number of expansions, so that the same seed
             gives the same plan on any machine that is fast enough.
-        candidates: Most contact sequences to test before giving up. At most half of them use palms; after those, only
-            sequences for the feet alone are searched.
+        optimisations: Most contact sequences to optimise. Each search gets half of what is left; where it finds more,
+            its newest ones count, which it believes to be the cheapest.
+        candidates: Most contact sequences to test after the optimiser before giving up. At most half of them use palms;
+            after those, only sequences for the feet alone are searched.
         until: Last stage that tests a sequence: "dynamics" for the plan alone, "wholebody", or "execution".
         initial_rest: s; at rest before the first transition.
         final_rest: s; at rest after the last transition.
@@ -31,6 +33,7 @@ class PipelineConfig:
 
     seed: int = 0
     time_limit: float = 30.0
+    optimisations: int = 64
     candidates: int = 16
     until: str = "execution"
     initial_rest: float = 0.4

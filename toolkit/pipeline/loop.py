@@ -1,7 +1,8 @@
-"""The loop of a run: search, test what was found, and search again without what failed."""
+"""The loop of a run: search, choose by the true cost among what was found, and search again without what failed."""
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.execution.check import Check
+from toolkit.pipeline.candidate import Candidate, Source
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.pipeline.observer import Observer
 from toolkit.pipeline.planner import Planner
@@ -28,7 +30,8 @@ class PipelineResult:
         robot, world, config: As given to `run`.
         search: Result of the contact search that found the trial's sequence, or of the last search without a trial.
         trial: The trial that passed, or else the one that came furthest; None without a plan.
-        tested: Number of contact sequences tested.
+        candidates: All sequences that were optimised.
+        trials: All trials of candidates with a feasible motion, in the order in which they were made.
         reason: One line where the verdict is FAIL, else "".
     """
 
@@ -37,7 +40,8 @@ class PipelineResult:
     config: PipelineConfig
     search: SearchResult
     trial: Trial | None
-    tested: int
+    candidates: tuple[Candidate, ...]
+    trials: tuple[Trial, ...]
     reason: str
 
     @property
@@ -48,9 +52,22 @@ class PipelineResult:
     @property
     def cost(self) -> PlanCost | None:
         """The true cost of the trial's plan; None without a plan."""
-        if self.trial is None:
-            return None
-        return plan_cost(self.trial.plan, self.config.cost.on_ground(slides=self.search.slides))
+        return None if self.trial is None else self.trial.candidate.cost
+
+    @property
+    def first_feasible(self) -> Candidate | None:
+        """The candidate with a feasible motion that was found first; None where there is none."""
+        return min((item for item in self.candidates if item.feasible), key=lambda item: item.seconds, default=None)
+
+    def is_chosen(self, candidate: Candidate) -> bool:
+        """Whether a candidate is that of the trial."""
+        return self.trial is not None and self.trial.candidate.number == candidate.number
+
+    def reason_against(self, candidate: Candidate) -> str:
+        """One line on why a candidate did not pass; "" where it passed or was not tested."""
+        failures = [trial.failure for trial in self.trials if trial.candidate.number == candidate.number]
+        failure = next(iter([*failures, candidate.failure]))
+        return "" if failure is None else failure.reason
 
     @property
     def checks(self) -> tuple[Check, ...]:
@@ -72,71 +89,134 @@ def run(
     Raises:
         ToolkitError: The input cannot be used at all (no start stance, nothing leads to the goal).
     """
-    observer = observer or Observer()
-    tester = Tester(robot, world, config, observer)
-    search = _search(planner, config, observer, 0, [])
-    best: Trial | None = None
-    chosen = search
-    exclusions: list[Exclusion] = []
-    tested = attempt = 0
-    palms = True
-    while search.solutions:
-        before, failed_with_palms = tested, False
-        for solution in reversed(search.solutions[search.hasty :]):  # newest, cheapest first
-            if tested == config.candidates or _meets(solution, exclusions):
-                continue
-            with_palms = _uses_palms(solution.sequence)
-            if with_palms and tested >= max(1, config.candidates // 2):
-                continue  # the other half is for the feet alone
-            tested += 1
-            failed_with_palms |= with_palms
-            trial = tester.test(solution)
-            if best is None or trial.merit > best.merit:
-                best, chosen = trial, search
-            if trial.failure is None:
-                return PipelineResult(robot, world, config, chosen, best, tested, "")
-            exclusions += _blamed(solution.sequence, trial.failure)
-        if tested in (before, config.candidates) or not (exclusions or failed_with_palms):
-            break
-        attempt += 1
-        palms = palms and not failed_with_palms
-        search = _search(planner, config, observer, attempt, exclusions, palms)
-    reason = best.failure.reason if best and best.failure else search.reason
-    return PipelineResult(robot, world, config, chosen, best, tested, reason)
+    return _Run(robot, world, planner, config, observer or Observer()).result()
 
 
-def _uses_palms(sequence: ContactSequence) -> bool:
-    """Whether palms are in contact later than the transitions that could end the start's palm contacts."""
-    return any(stance.palms for stance in sequence.stances[len(sequence.start.palms) :])
+class _Run:
+    """One run, and what it has found so far."""
+
+    def __init__(self, robot: RobotModel, world: World, planner: Planner, config: PipelineConfig, observer: Observer):
+        self._robot, self._world, self._planner, self._config = robot, world, planner, config
+        self._observer, self._tester = observer, Tester(robot, world, config, observer)
+        self._searches: list[SearchResult] = []
+        self._candidates: list[Candidate] = []
+        self._trials: list[Trial] = []
+        self._exclusions: list[Exclusion] = []
+        self._known: set[bytes] = set()
+
+    def result(self) -> PipelineResult:
+        """Search and test until a trial passes, or nothing is left to try."""
+        palms = True
+        while True:
+            search = self._search(palms)
+            found = self._optimised(search)
+            passed = self._tried(found)
+            failed_with_palms = any(candidate.uses_palms for candidate in found)
+            if passed or not found or self._spent() or not (self._exclusions or failed_with_palms):
+                break
+            palms = palms and not failed_with_palms
+        return self._concluded()
+
+    def _spent(self) -> bool:
+        """Whether nothing more may be optimised or tested."""
+        config = self._config
+        return len(self._candidates) >= config.optimisations or len(self._trials) >= config.candidates
+
+    def _concluded(self) -> PipelineResult:
+        """The result with the best trial; of trials that came equally far, the first."""
+        trials = self._trials or [self._tester.test(candidate) for candidate in self._candidates[:1]]
+        best = max(trials, key=lambda trial: trial.merit, default=None)
+        search = self._searches[-1 if best is None else best.candidate.search]
+        reason = search.reason if best is None else ""
+        if best is not None and best.failure is not None:
+            reason = best.failure.reason
+        candidates, trials = tuple(self._candidates), tuple(self._trials)
+        return PipelineResult(self._robot, self._world, self._config, search, best, candidates, trials, reason)
+
+    def _search(self, palms: bool) -> SearchResult:
+        """One contact search; the first one uses the seed itself."""
+        config, observer, exclusions = self._config, self._observer, self._exclusions
+        observer.started("planning")
+        search = self._planner.search(
+            np.random.default_rng([config.seed, len(self._searches)]),
+            config.time_limit,
+            observer=lambda progress: observer.progress("planning", None, str(progress)),
+            exclusions=tuple(exclusions),
+            palms=palms,
+        )
+        self._searches.append(search)
+        found = len(search.solutions)
+        detail = search.reason or f"{found} sequence{'s' if found > 1 else ''}"
+        if exclusions:
+            detail += f" without {len(exclusions)} transition{'s' if len(exclusions) > 1 else ''} that failed"
+        if not palms:
+            detail += " for the feet alone"
+        if search.warning:
+            detail += f"; warning: {search.warning}"
+        observer.finished("planning", found > 0, search.seconds, detail)
+        return search
+
+    def _optimised(self, search: SearchResult) -> list[Candidate]:
+        """New candidates of the last search, the newest (predicted cheapest) first."""
+        most = (self._config.optimisations - len(self._candidates) + 1) // 2  # the other half is for searches to come
+        order: list[tuple[Solution, Source]] = []
+        for index, solution in reversed(list(enumerate(search.solutions))):
+            if len(order) < most and self._new(solution.sequence):
+                order.append((solution, Source.HASTY if index < search.hasty else Source.SEARCH))
+        if not order:
+            return []
+        began, found = time.perf_counter(), []
+        self._observer.started("dynamics")
+        for solution, source in order:
+            found.append(self._candidate(solution, source))
+            self._observer.progress("dynamics", len(found) / len(order), f"{len(found)} of {len(order)} sequences")
+        self._observer.finished("dynamics", any(c.feasible for c in found), time.perf_counter() - began, _told(found))
+        return found
+
+    def _new(self, sequence: ContactSequence) -> bool:
+        """Whether a sequence comes for the first time."""
+        known = len(self._known)
+        self._known.add(sequence.identity)
+        return len(self._known) > known
+
+    def _candidate(self, solution: Solution, source: Source) -> Candidate:
+        """A sequence of the last search, optimised."""
+        plan, failure = self._tester.optimise(solution.sequence)
+        seconds = sum(search.seconds for search in self._searches[:-1]) + solution.seconds
+        cost = plan_cost(plan, self._config.cost.on_ground(slides=self._searches[-1].slides))
+        number, search = len(self._candidates), len(self._searches) - 1
+        self._candidates.append(Candidate(number, source, search, seconds, solution, plan, cost, failure))
+        return self._candidates[-1]
+
+    def _tried(self, found: list[Candidate]) -> bool:
+        """Whether a candidate passes the stages after the optimiser; the truly cheapest is tried first."""
+        blamed: list[Exclusion] = []
+        for candidate in sorted(found, key=lambda item: (item.cost.total, item.number)):
+            if candidate.failure is not None:
+                self._exclusions += _blamed(candidate.solution.sequence, candidate.failure)
+            elif self._allowed(candidate) and not _meets(candidate.solution.sequence, blamed):
+                trial = self._tester.test(candidate)
+                self._trials.append(trial)
+                if trial.failure is None:
+                    return True
+                blamed += _blamed(candidate.solution.sequence, trial.failure)
+        self._exclusions += blamed
+        return False
+
+    def _allowed(self, candidate: Candidate) -> bool:
+        """Whether one more trial may be made; half of them are for the feet alone."""
+        most = self._config.candidates
+        return len(self._trials) < (max(1, most // 2) if candidate.uses_palms else most)
 
 
-def _search(
-    planner: Planner,
-    config: PipelineConfig,
-    observer: Observer,
-    attempt: int,
-    exclusions: list[Exclusion],
-    palms: bool = True,
-) -> SearchResult:
-    """One contact search; the first attempt uses the seed itself."""
-    observer.started("planning")
-    search = planner.search(
-        np.random.default_rng([config.seed, attempt]),
-        config.time_limit,
-        observer=lambda progress: observer.progress("planning", None, str(progress)),
-        exclusions=exclusions,
-        palms=palms,
-    )
-    found = len(search.solutions)
-    detail = search.reason or f"{found} sequence{'s' if found > 1 else ''}"
-    if exclusions:
-        detail += f" without {len(exclusions)} transition{'s' if len(exclusions) > 1 else ''} that failed"
-    if not palms:
-        detail += " for the feet alone"
-    if search.warning:
-        detail += f"; warning: {search.warning}"
-    observer.finished("planning", found > 0, search.seconds, detail)
-    return search
+def _told(found: list[Candidate]) -> str:
+    """How the optimisation of some sequences ended, in one line."""
+    feasible = [candidate.cost.total for candidate in found if candidate.feasible]
+    count = f"{len(feasible)} of {len(found)} sequence{'s' if len(found) > 1 else ''} feasible"
+    if not feasible:
+        assert found[0].failure is not None
+        return f"{count}; {found[0].failure.reason}"
+    return f"{count}, true cost {min(feasible):.0f}" + (f" to {max(feasible):.0f}" if len(feasible) > 1 else "")
 
 
 def _blamed(sequence: ContactSequence, failure: Failure) -> list[Exclusion]:
@@ -150,9 +230,8 @@ def _blamed(sequence: ContactSequence, failure: Failure) -> list[Exclusion]:
     return [Exclusion.of(sequence.stances[index], sequence.transitions[index])]
 
 
-def _meets(solution: Solution, exclusions: list[Exclusion]) -> bool:
-    """Whether a solution contains an excluded transition."""
-    sequence = solution.sequence
+def _meets(sequence: ContactSequence, exclusions: list[Exclusion]) -> bool:
+    """Whether a sequence contains an excluded transition."""
     for stance, transition in zip(sequence.stances, sequence.transitions, strict=False):
         own = Exclusion.of(stance, transition)
         if excluded(exclusions, own.before, np.array([own.limb]), own.target[None])[0]:

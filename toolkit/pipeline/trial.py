@@ -1,4 +1,4 @@
-"""Testing one contact sequence: optimiser, inverse kinematics, simulation."""
+"""Testing contact sequences: optimiser, inverse kinematics, simulation."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ import numpy as np
 
 from toolkit.centroidal.plan import MotionPlan, plan_motion
 from toolkit.contacts.failure import Failure
+from toolkit.contacts.sequence import ContactSequence
 from toolkit.execution.check import Result
 from toolkit.execution.result import Execution
 from toolkit.execution.run import execute
+from toolkit.pipeline.candidate import Candidate
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.pipeline.observer import Observer
 from toolkit.robot.model import RobotModel
@@ -26,19 +28,24 @@ from toolkit.world.world import World
 
 @dataclass(frozen=True)
 class Trial:
-    """One contact sequence and how far it came.
+    """One candidate and how far it came.
 
     Attributes:
-        solution: The contact sequence as the search found it.
+        candidate: The contact sequence with its optimised motion.
         plan: The plan of the stages so far; a `WholeBodyPlan` from the whole-body stage on.
         execution: Measurements of the simulation; None where an earlier stage rejected the plan or was the last one.
         failure: Why it did not pass; None where every wanted stage passed, and every check of the execution.
     """
 
-    solution: Solution
+    candidate: Candidate
     plan: MotionPlan
     execution: Execution | None = None
     failure: Failure | None = None
+
+    @property
+    def solution(self) -> Solution:
+        """The contact sequence as it was found."""
+        return self.candidate.solution
 
     @property
     def passed(self) -> bool:
@@ -63,7 +70,7 @@ class Tester:
     """Puts contact sequences through optimiser, inverse kinematics and simulation."""
 
     def __init__(self, robot: RobotModel, world: World, config: PipelineConfig, observer: Observer):
-        """Prepare for a robot in a world; the observer is told of every stage."""
+        """Prepare for a robot in a world; the observer is told of every stage after the optimiser."""
         self._robot, self._world, self._config, self._observer = robot, world, config, observer
 
     @cached_property
@@ -71,26 +78,28 @@ class Tester:
         """Robot and world in one model, composed when the first sequence needs it."""
         return compose_scene(self._robot, self._world)
 
-    def test(self, solution: Solution) -> Trial:
-        """Test one sequence; stop at the first stage that fails."""
-        config, observer = self._config, self._observer
-        observer.started("dynamics")
+    def optimise(self, sequence: ContactSequence) -> tuple[MotionPlan, Failure | None]:
+        """Optimise the motion of a sequence; also why there is none."""
+        config = self._config
         plan = plan_motion(
             self._robot,
             self._world,
-            solution.sequence,
+            sequence,
             initial_rest=config.initial_rest,
             final_rest=config.final_rest,
             landing=config.landing,
             config=config.sequence,
         )
         motion = plan.motion
-        observer.finished("dynamics", motion.feasible, motion.seconds, motion.outcome)
-        if not motion.feasible:
-            reason = f"no feasible centroidal motion: {motion.outcome}"
-            return Trial(solution, plan, failure=_because(reason, motion.failure))
-        if config.until == "dynamics":
-            return Trial(solution, plan)
+        if motion.feasible:
+            return plan, None
+        return plan, _because(f"no feasible centroidal motion: {motion.outcome}", motion.failure)
+
+    def test(self, candidate: Candidate) -> Trial:
+        """Put a candidate through the stages after the optimiser; stop at the first that fails."""
+        config, observer, plan = self._config, self._observer, candidate.plan
+        if candidate.failure is not None or config.until == "dynamics":
+            return Trial(candidate, plan, failure=candidate.failure)
 
         observer.started("wholebody")
         plan = whole_body(plan, self._scene)
@@ -98,9 +107,9 @@ class Tester:
         observer.finished("wholebody", trajectory.feasible, trajectory.seconds, trajectory.reason)
         if not trajectory.feasible:
             reason = f"no whole-body motion: {trajectory.reason}"
-            return Trial(solution, plan, failure=_because(reason, trajectory.failure))
+            return Trial(candidate, plan, failure=_because(reason, trajectory.failure))
         if config.until == "wholebody":
-            return Trial(solution, plan)
+            return Trial(candidate, plan)
 
         observer.started("execution")
         began = time.perf_counter()
@@ -110,7 +119,7 @@ class Tester:
             rng=np.random.default_rng([config.seed, 1]),
             observer=lambda fraction, detail="": observer.progress("execution", fraction, detail),
         )
-        trial = Trial(solution, plan, execution, execution.failure)
+        trial = Trial(candidate, plan, execution, execution.failure)
         reason = "" if trial.failure is None else trial.failure.reason
         observer.finished("execution", trial.passed, time.perf_counter() - began, reason)
         return trial

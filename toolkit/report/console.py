@@ -25,8 +25,9 @@ from rich.text import Text
 
 from toolkit.errors import InputError
 from toolkit.execution.check import Check, Result
+from toolkit.pipeline.loop import PipelineResult
 from toolkit.pipeline.observer import Observer
-from toolkit.search.result import SearchResult, Solution
+from toolkit.report.summary import sequence_rows
 
 STYLES = {Result.PASS: "bold green", Result.FAIL: "bold red", Result.NOT_CHECKED: "yellow"}
 PLAIN_WIDTH = 160  # columns assumed where the output is no terminal
@@ -156,20 +157,14 @@ def _check_table(checks: Sequence[Check]) -> Table:
     return table
 
 
-def solution_table(search: SearchResult, chosen: Solution | None) -> Table:
-    """A row per sequence that a search found, oldest first; the chosen one is marked."""
+def sequence_table(result: PipelineResult) -> Table:
+    """A row per sequence that was optimised; the chosen one is marked, and of those that failed the reason is told."""
     table = Table(box=box.SIMPLE, pad_edge=False)
-    for name in ("found after", "transitions", "with palms", "cost", "at most x optimal"):
+    table.add_column("sequence", justify="right")
+    table.add_column("found by")
+    for name in ("transitions", "with palms", "predicted cost", "true cost"):
         table.add_column(name, justify="right")
     table.add_column("")
-    for solution in search.solutions:
-        transitions = solution.sequence.transitions
-        table.add_row(
-            f"{solution.seconds:.3f} s",
-            str(len(transitions)),
-            str(sum(not transition.limb.is_foot for transition in transitions)),
-            f"{solution.cost:.2f}",
-            f"{solution.bound:.2f}",
-            "chosen" if solution is chosen else "",
-        )
+    for row in sequence_rows(result):
+        table.add_row(*map(Text, row))
     return table

@@ -88,7 +88,7 @@ def write_recording(path: Path, result: PipelineResult, report: RunReport, rate:
             plot_motion(stream, motion)
         send_contact_states(stream, schedule, execution)
         if search is not None:
-            text = rr.TextDocument(search_summary(search), media_type=rr.MediaType.MARKDOWN)
+            text = rr.TextDocument(search_summary(result), media_type=rr.MediaType.MARKDOWN)
             stream.log("search/solutions", text, static=True)
             draw_search(stream, search, _heights(_way(world, sequence)))
 

@@ -14,6 +14,7 @@ from toolkit.centroidal.problem import Weights
 from toolkit.centroidal.residual import check, cop_margin, friction_margin, objective
 from toolkit.execution.check import Check
 from toolkit.execution.result import Execution
+from toolkit.pipeline.candidate import Candidate
 from toolkit.pipeline.loop import PipelineResult
 from toolkit.report.files import check_entries, write_json
 from toolkit.world.world import World
@@ -24,13 +25,15 @@ PACKAGES = ("mujoco", "placo", "pin", "casadi", "daqp", "numpy", "scipy", "numba
 SURFACES = ("count", "foot", "palm", "seconds")
 PLANNING = (
     "found",
-    "first_solution_seconds",
+    "first_feasible_seconds",
+    "first_feasible_optimiser_seconds",
     "seconds",
     "heuristic_seconds",
     "expansions",
     "solutions",
     "contacts",
     "palm_contacts",
+    "sequences",
     "sequences_tested",
 )
 DYNAMICS = (
@@ -176,17 +179,37 @@ def _planning(result: PipelineResult) -> dict[str, Any]:
         for s in search.solutions
     ]
     chosen = chosen or (search.solutions[-1] if search.solutions else None)
+    first = result.first_feasible
     made = [t.limb for t in chosen.sequence.transitions if t.contact is not None] if chosen else []
     return {
         "found": bool(search.solutions),
-        "first_solution_seconds": search.solutions[0].seconds if search.solutions else None,
+        "first_feasible_seconds": None if first is None else first.seconds,
+        "first_feasible_optimiser_seconds": None if first is None else first.plan.motion.seconds,
         "seconds": search.seconds,
         "heuristic_seconds": search.heuristic_seconds,
         "expansions": search.expansions,
         "solutions": solutions,
         "contacts": len(chosen.sequence.transitions) if chosen else None,
         "palm_contacts": sum(not limb.is_foot for limb in made) if chosen else None,
-        "sequences_tested": result.tested,
+        "sequences": [_sequence(result, candidate) for candidate in result.candidates],
+        "sequences_tested": len(result.trials),
+    }
+
+
+def _sequence(result: PipelineResult, candidate: Candidate) -> dict[str, Any]:
+    """Figures of one sequence that was optimised."""
+    return {
+        "number": candidate.number,
+        "source": candidate.source,
+        "search": candidate.search,
+        "seconds": candidate.seconds,
+        "transitions": len(candidate.solution.sequence.transitions),
+        "palm_contacts": candidate.palm_contacts,
+        "predicted_cost": candidate.solution.cost,
+        "true_cost": candidate.cost.total if candidate.feasible else None,
+        "feasible": candidate.feasible,
+        "reason": result.reason_against(candidate),
+        "chosen": result.is_chosen(candidate),
     }
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from toolkit.pipeline.loop import PipelineResult
 from toolkit.report.motion_scene import NEWTON_PER_METRE
 from toolkit.report.run_report import RunReport
-from toolkit.search.result import SearchResult
 
 SIGNS = {"PASS": "✔", "FAIL": "✘", "NOT_CHECKED": "–"}
 
@@ -33,7 +33,8 @@ def summary(report: RunReport) -> str:
     facts = []
     if planning["contacts"] is not None:
         facts.append(f"{planning['contacts']} transitions, {planning['palm_contacts']} with a palm")
-        facts.append(f"first sequence after {planning['first_solution_seconds']:.2f} s")
+    if planning["first_feasible_seconds"] is not None:
+        facts.append(f"first feasible sequence found after {planning['first_feasible_seconds']:.2f} s")
     if execution["simulated_seconds"] is not None:
         pace = f"{execution['real_time_factor']:.2f} x real time"
         facts.append(f"{execution['simulated_seconds']:.1f} s simulated at {pace}")
@@ -49,8 +50,9 @@ def summary(report: RunReport) -> str:
     return "\n".join([*lines, LEGEND])
 
 
-def search_summary(search: SearchResult) -> str:
-    """Markdown text of a search: its figures and a row per solution."""
+def search_summary(result: PipelineResult) -> str:
+    """Markdown text of a run's search: its figures, a row per solution, and one per sequence that was optimised."""
+    search = result.search
     spent = f"{search.seconds:.2f} s, after {search.heuristic_seconds:.2f} s for the heuristic"
     everything = "; every reachable state was expanded" if search.exhausted else ""
     lines = [f"{search.expansions} states expanded in {spent}{everything}.", ""]
@@ -62,4 +64,24 @@ def search_summary(search: SearchResult) -> str:
         above = f"{100 * (solution.bound - 1):.0f} %" if math.isfinite(solution.bound) else "unknown"
         count = len(solution.sequence.transitions)
         lines.append(f"| {solution.seconds:.3f} s | {solution.cost:.3f} | {above} | {count} |")
+    if result.candidates:
+        lines += ["", "| sequence | found by | transitions | with palms | predicted cost | true cost | |"]
+        lines += ["|---:|---|---:|---:|---:|---:|---|"]
+        lines += [f"| {' | '.join(row)} |" for row in sequence_rows(result)]
     return "\n".join(lines)
+
+
+def sequence_rows(result: PipelineResult) -> list[tuple[str, ...]]:
+    """Of each sequence that was optimised: number, source, transitions, palm contacts, both costs and the outcome."""
+    return [
+        (
+            str(candidate.number),
+            str(candidate.source),
+            str(len(candidate.solution.sequence.transitions)),
+            str(candidate.palm_contacts),
+            f"{candidate.solution.cost:.1f}",
+            f"{candidate.cost.total:.1f}" if candidate.feasible else "–",
+            "chosen" if result.is_chosen(candidate) else result.reason_against(candidate),
+        )
+        for candidate in result.candidates
+    ]
