@@ -20,7 +20,7 @@ from validation.jobs import Record
 from validation.options import TrialSettings
 from validation.run_trial import executed, robot_of
 from validation.searched import Searched, Tested, cheapest, favourite, search
-from validation.truth import Truth, identity
+from validation.truth import Truth
 
 RAW, BY_COUNT, BY_TIME = "raw favourite", "choice, equal optimisations", "choice, equal seconds"
 VARIANTS = (RAW, BY_COUNT, BY_TIME)
@@ -64,7 +64,7 @@ def spend(effort: Effort, searches: Sequence[Searched]) -> tuple[Tested | None, 
     counted, known = [], set()
     for searched in searches:
         for tested in searched.by_cost:
-            key = identity(tested.solution.sequence)
+            key = tested.solution.sequence.identity
             if key not in known and len(counted) < effort.optimisations:
                 known.add(key)
                 counted.append(tested)
@@ -78,7 +78,7 @@ def accounts(searches: Sequence[Searched]) -> list[Spent]:
     for searched in searches:
         before += searched.result.heuristic_seconds
         for tested in searched.tested:
-            key = identity(tested.solution.sequence)
+            key = tested.solution.sequence.identity
             if key not in known:
                 known.add(key)
                 before += tested.outcome.seconds
@@ -145,9 +145,9 @@ def _execute(
     settings: TrialSettings, robot: RobotModel, world: World, chosen: dict[str, Tested], variants: dict[str, Any]
 ) -> None:
     """Simulate the chosen plans, each different one once, and enter what came of it."""
-    known: dict[tuple, dict[str, Any]] = {}
+    known: dict[bytes, dict[str, Any]] = {}
     for name, tested in chosen.items():
-        key = identity(tested.solution.sequence)
+        key = tested.solution.sequence.identity
         if key not in known:
             known[key] = run_plan(settings, robot, world, tested.outcome.plan)
         variants[name] |= known[key]

@@ -13,6 +13,7 @@ import numpy as np
 
 from toolkit.centroidal.problem import Weights
 from toolkit.centroidal.residual import objective
+from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import ToolkitError
 from toolkit.pipeline import PipelineConfig, run
 from toolkit.pipeline import make_planner as make_pipeline_planner
@@ -25,7 +26,6 @@ from validation.machine import memory
 from validation.motion_figures import motion_figures
 from validation.options import TrialSettings
 from validation.run_trial import StageLog, make_planner, robot_of
-from validation.truth import identity
 
 
 @dataclass
@@ -234,4 +234,17 @@ def growth_trial(settings: TrialSettings, case: Case, length: float, whole: bool
 
 def signature(search: SearchResult) -> list[tuple]:
     """Every sequence of a search as something that compares exactly."""
-    return [identity(solution.sequence) for solution in search.solutions]
+    return [_steps(solution.sequence) for solution in search.solutions]
+
+
+def _steps(sequence: ContactSequence) -> tuple:
+    """Limbs and places of a sequence, bit by bit."""
+    return tuple(
+        (
+            int(transition.limb),
+            b""
+            if transition.contact is None
+            else transition.contact.pose.position.tobytes() + transition.contact.pose.rotation.tobytes(),
+        )
+        for transition in sequence.transitions
+    )

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.centroidal.plan import MotionPlan, plan_motion
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.centroidal.problem import Weights
 from toolkit.centroidal.residual import objective
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import PlanningError
 from toolkit.pipeline.config import PipelineConfig
+from toolkit.pipeline.observer import Observer
+from toolkit.pipeline.trial import Tester
 from toolkit.robot.model import RobotModel
 from toolkit.search.costs.plan_cost import PlanCost, plan_cost
 from toolkit.search.ground import Ground
@@ -80,31 +82,23 @@ class Truth:
     """
 
     def __init__(self, robot: RobotModel, world: World):
-        self._robot, self._world, self._config = robot, world, PipelineConfig()
-        self.cost = self._config.cost.on_ground(slides=slides(robot, world))
-        self._known: dict[tuple, Outcome] = {}
+        config = PipelineConfig()
+        self._tester = Tester(robot, world, config, Observer())
+        self.cost = config.cost.on_ground(slides=slides(robot, world))
+        self._known: dict[bytes, Outcome] = {}
 
     def __call__(self, sequence: ContactSequence) -> Outcome:
         """The outcome of a sequence."""
-        key = identity(sequence)
+        key = sequence.identity
         if key not in self._known:
             self._known[key] = self._optimised(sequence)
         return self._known[key]
 
     def _optimised(self, sequence: ContactSequence) -> Outcome:
-        config = self._config
         began, worked = time.perf_counter(), time.process_time()
-        plan = plan_motion(
-            self._robot,
-            self._world,
-            sequence,
-            initial_rest=config.initial_rest,
-            final_rest=config.final_rest,
-            landing=config.landing,
-            config=config.sequence,
-        )
+        plan, failure = self._tester.optimise(sequence)
         seconds, processor = time.perf_counter() - began, time.process_time() - worked
-        paper = objective(plan.motion, Weights()) if plan.motion.feasible else np.inf
+        paper = objective(plan.motion, Weights()) if failure is None else np.inf
         return Outcome(plan, plan_cost(plan, self.cost), paper, seconds, processor)
 
 
@@ -115,17 +109,3 @@ def slides(robot: RobotModel, world: World) -> bool:
         return ground.way(ground.start_stance()).slides
     except PlanningError:
         return False
-
-
-def identity(sequence: ContactSequence) -> tuple:
-    """Limbs, places and times of a sequence, bit by bit: something that compares exactly."""
-    return tuple(
-        (
-            int(transition.limb),
-            transition.timing,
-            b""
-            if transition.contact is None
-            else transition.contact.pose.position.tobytes() + transition.contact.pose.rotation.tobytes(),
-        )
-        for transition in sequence.transitions
-    )
