@@ -42,10 +42,11 @@ def budget_trial(settings: TrialSettings, case: Case, budgets: Sequence[int]) ->
     for budget in budgets:
         try:
             searched = search(with_expansions(settings, budget), world, settings.planner, [case.seed, 0], truth)
+            check = BoundCheck(searched.planner)
         except PlanningError as error:
             return record | {"found": False, "feasible": False, "passed": False, "reason": str(error), "budgets": {}}
         by_budget[str(budget)] = _described(searched)
-        paths = [BoundCheck(searched.planner)(tested) for tested in searched.tested]
+        paths = [check(tested) for tested in searched.tested]
         violations, states = violations + sum(p.violations for p in paths), states + sum(len(p.h) for p in paths)
     last = searched.summary()
     reason = last["reason"] or ("" if last["feasible"] else searched.tested[-1].outcome.record()["reason"])

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from toolkit import cli
-from toolkit.errors import PlanningError
+from toolkit.errors import InputError, PlanningError
 from toolkit.report.console import make_console
+from toolkit.report.files import read_json
 from validation import goals, options
 from validation.calibration_figures import PREDICTORS, world_figures
 from validation.cases import DRAWN, Case, kind_of, make_cases
@@ -18,7 +20,7 @@ from validation.judged_again import CHAIN, Judge
 from validation.options import TrialSettings
 from validation.path_bounds import BoundCheck
 from validation.run_trial import robot_of
-from validation.searched import completed, search
+from validation.searched import completed, search, with_expansions
 from validation.tables import failure_section, largest, markdown_table, median, number, write_results
 from validation.trial_file import TrialFile
 from validation.truth import Truth
@@ -33,7 +35,8 @@ whether h is a lower bound at every state of every path.
 KINDS = tuple(DRAWN)
 PLANNERS = ("learned", "kinematic", "quasi-static")
 OURS = PLANNERS[0]
-EXPANSIONS, TRIALS, SEARCHES = 10_000, 15, 2
+EXPANSIONS, TRIALS = 10_000, 15
+SEARCHES, MORE_EXPANSIONS = 4, 1_000  # searches of each planner; expansions of all but our planner's first one
 FEWEST = 20  # sequences of a world
 COLUMNS = ("search_cost", "judged", "objective", "paper_objective", "true_cost", "transitions", "walking_seconds")
 COLUMNS += ("feasible", "rejected", "h_part", "h_true_part")
@@ -177,6 +180,20 @@ def goals_of(rows: Sequence[dict[str, Any]]) -> list[Goal]:
     return found
 
 
+def _earlier(path: Path) -> tuple[str, str]:
+    """Heading and tables of a result of another state of the code.
+
+    Raises:
+        InputError: The file is no such result.
+    """
+    found = read_json(path)
+    try:
+        text = f"{table(found['table'])}\n\n{feasibility_table(found['table'])}"
+        return f"The same, measured on {found['date']} with code {found['code']}", text
+    except (KeyError, TypeError, IndexError):
+        raise InputError(f"{path}: is no calibration.json of this program; choose another --beside") from None
+
+
 def _in_columns(record: Record) -> Record:
     """A record with the figures of its sequences as lists, which takes less room."""
     entries = record["entries"]
@@ -197,7 +214,17 @@ def main(argv: list[str] | None = None) -> int:
         type=cli.positive(int),
         default=SEARCHES,
         metavar="N",
-        help="searches of each planner in each world; only the first one's favourite counts (default: %(default)s)",
+        help="searches of each planner in each world; only our first one's favourite counts (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--more-expansions",
+        type=cli.positive(int),
+        default=MORE_EXPANSIONS,
+        metavar="N",
+        help="expansions of all searches but our first one, which have to find many sequences (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--beside", type=cli.path, metavar="FILE", help="calibration.json of another state, shown beside this one"
     )
     parser.add_argument(
         "--fewest",
@@ -210,6 +237,7 @@ def main(argv: list[str] | None = None) -> int:
     args = parser.parse_args(argv)
     for kind in args.kinds:
         kind_of(kind)
+    before = None if args.beside is None else _earlier(Path(args.beside))
     console = make_console()
     settings, first = options.settings_of(args), options.first_seed(args, "calibration")
     cases = [
@@ -218,9 +246,14 @@ def main(argv: list[str] | None = None) -> int:
         for planner in PLANNERS
         for number in range(args.searches)
     ]
-    store = TrialFile(args.out / "trials.jsonl", settings.deciding())
+    less = with_expansions(settings, args.more_expansions)
+    store = TrialFile(args.out / "trials.jsonl", settings.deciding() | {"more_expansions": args.more_expansions})
     jobs = [
-        Job(f"{planner}-{case.name}-{number}", calibration_trial, (settings, case, planner, number))
+        Job(
+            f"{planner}-{case.name}-{number}",
+            calibration_trial,
+            (settings if (planner, number) == (OURS, 0) else less, case, planner, number),
+        )
         for case, planner, number in cases
     ]
     records = run_jobs(jobs, store, options.pool_of(args), console, "searches")
@@ -234,18 +267,19 @@ def main(argv: list[str] | None = None) -> int:
     for kind in args.kinds:
         rows.append(summarise(kind, [record for record in records if record["kind"] == kind], args.fewest))
     found = goals_of(rows)
+    sections = [("Ranks, line and favourite", f"{table(rows)}\n\n{NOTE}")]
+    sections.append(("Feasibility and bound", feasibility_table(rows)))
+    if before is not None:
+        sections.append(before)
     path = write_results(
         args.results,
         "calibration",
         title="What the search believes, and what the motion costs",
-        sections=[
-            ("Ranks, line and favourite", f"{table(rows)}\n\n{NOTE}"),
-            ("Feasibility and bound", feasibility_table(rows)),
-            ("Failures", failure_section(records)),
-        ],
+        sections=[*sections, ("Failures", failure_section(records))],
         content={"table": rows, "trials": [_in_columns(record) for record in records]},
         goals=found,
-        settings={**settings.described(), "trials": args.trials, "seed_offset": first},
+        settings={**settings.described(), "trials": args.trials, "searches": args.searches}
+        | {"more_expansions": args.more_expansions, "seed_offset": first},
     )
     console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
     return options.goal_code(found)

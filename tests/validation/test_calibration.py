@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from toolkit.errors import InputError
 from toolkit.robot.loader import load_robot
 from validation import options
-from validation.calibration import goals_of, summarise
+from validation.calibration import goals_of, main, summarise
 from validation.calibration_figures import rank_correlation, regret, world_figures
 from validation.cases import Case
 from validation.goals import MET, NOT_MET
@@ -85,6 +86,14 @@ def test_a_bound_above_either_cost_to_go_is_told():
     assert PathBounds(to_go * [1.0, 1.02, 1.0], to_go, to_go, to_go).violations == 1
     assert PathBounds(to_go, to_go, to_go * [1.02, 1.0, 1.02], to_go).violations == 2
     assert PathBounds(to_go, to_go, to_go, np.full(3, np.inf)).violations == 0
+
+
+@pytest.mark.parametrize("text", ["[]", "{}", '{"table": [{"kind": "flat"}]}'])
+def test_another_file_cannot_stand_beside(tmp_path, text):
+    path = tmp_path / "calibration.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match="is no calibration.json"):
+        main(["--kinds", "flat", "--beside", str(path), "--out", str(tmp_path), "--results", str(tmp_path)])
 
 
 @pytest.fixture(scope="module")
