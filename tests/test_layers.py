@@ -19,6 +19,7 @@ LAYERS = [
     "centroidal",
     "prediction",
     "search",
+    "refine",
     "learning",
     "wholebody",
     "control",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,13 +71,37 @@ def plan_motion(
     plan = MotionPlan(robot, world, sequence, schedule, motion)
     if landing is None or (motion.feasible and motion.kept is None):
         return plan
-    room = landing_room(robot, world.surfaces, sequence, landing, world.goal)
+    moved = slid(plan, landing, config)
+    if moved is None or not moved.motion.feasible or (motion.feasible and not keeps_margins(moved, plan)):
+        return plan
+    return moved
+
+
+def slid(
+    plan: MotionPlan, landing: RoomConfig, config: SequenceConfig, fixed: Collection[int] = ()
+) -> MotionPlan | None:
+    """The plan with landing points where the optimiser moves them, and the motion to it.
+
+    Args:
+        plan: The plan, with a feasible motion or without.
+        landing: How far feet may land from where the plan has them.
+        config: Settings of the optimiser.
+        fixed: Transitions whose contacts stay.
+
+    Returns:
+        The new plan; `motion.feasible` says whether there is a motion. None where no contact has room to move.
+    """
+    robot, world, schedule, problem = plan.robot, plan.world, plan.schedule, plan.motion.problem
+    room = landing_room(robot, world.surfaces, plan.sequence, landing, world.goal)
+    room[list(fixed)] = 0.0
     if not room.any():
-        return plan
-    moved = optimise(robot, schedule, com, rest, config=config, room=room)
-    tighter = moved.solved.margins.friction < motion.solved.margins.friction + FRICTION_ROUNDING
-    if not moved.feasible or (motion.feasible and not tighter):
-        return plan
-    sequence = moved_sequence(sequence, schedule, moved.problem.times, moved.solved.position)
-    schedule = ContactSchedule.of(sequence, initial_rest=initial_rest, final_rest=final_rest)
-    return MotionPlan(robot, world, sequence, schedule, moved)
+        return None
+    moved = optimise(robot, schedule, problem.com, problem.com_velocity, config=config, room=room)
+    sequence = moved_sequence(plan.sequence, schedule, moved.problem.times, moved.solved.position)
+    return MotionPlan(robot, world, sequence, schedule.through(sequence), moved)
+
+
+def keeps_margins(plan: MotionPlan, other: MotionPlan) -> bool:
+    """Whether a plan's motion uses no more of the friction than another plan's, but for rounding."""
+    used, most = (each.motion.solved.margins.friction for each in (plan, other))
+    return used < most + FRICTION_ROUNDING

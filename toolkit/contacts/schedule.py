@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
@@ -59,6 +59,21 @@ class ContactSchedule:
         if final_rest + rest > 0.0 or not phases:
             phases.append(Phase(time, time + final_rest + rest, stance.contacts, None, len(sequence.transitions)))
         return cls(tuple(phases))
+
+    def through(self, sequence: ContactSequence) -> ContactSchedule:
+        """The same phases with the contacts of another sequence of the same limbs and timings."""
+        stances, transitions = sequence.stances, sequence.transitions
+        return ContactSchedule(
+            tuple(
+                replace(
+                    phase,
+                    contacts=stances[phase.transition].contacts
+                    if phase.swing is None
+                    else transitions[phase.transition].during_swing(stances[phase.transition]),
+                )
+                for phase in self.phases
+            )
+        )
 
     @property
     def duration(self) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.failure import Failure
 from toolkit.search.costs.plan_cost import PlanCost
@@ -16,6 +18,15 @@ class Source(StrEnum):
 
     SEARCH = "search"
     HASTY = "hasty search"
+    LOCAL = "local search"
+
+
+def refined_solution(plan: MotionPlan, cost: PlanCost, seconds: float) -> Solution:
+    """The sequence of an optimised plan as a solution whose prediction is its motion; `seconds` as in `Solution`."""
+    ends = [0.0, *(phase.end for phase in plan.schedule.phases if phase.swing is not None)]
+    com, velocity = (np.array(part) for part in list(zip(*map(plan.motion.sample, ends), strict=True))[:2])
+    unknown = np.full(len(plan.sequence.transitions), np.nan)
+    return Solution(plan.sequence, cost.total, np.inf, seconds, com, velocity, unknown)
 
 
 @dataclass(frozen=True)

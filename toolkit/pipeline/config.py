@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from toolkit.centroidal.sequence import SequenceConfig
 from toolkit.contacts.room import RoomConfig
 from toolkit.execution.config import ExecutionConfig
+from toolkit.refine.local_search import RefineConfig
 from toolkit.search.costs.edge_cost import CostConfig
 
 
@@ -26,6 +27,7 @@ class PipelineConfig:
         initial_rest: s; at rest before the first transition.
         final_rest: s; at rest after the last transition.
         landing: How far feet may land from where the search put them, where margins are short; None for not at all.
+        refine: Settings of the local search on the true cost; None for none.
         cost: Weights of the true cost, by which plans are judged; see `toolkit.search.costs.plan_cost`.
         sequence: Settings of the centroidal optimiser.
         execution: Settings of the simulated run.
@@ -39,6 +41,7 @@ class PipelineConfig:
     initial_rest: float = 0.4
     final_rest: float = 1.0
     landing: RoomConfig | None = field(default_factory=RoomConfig)
+    refine: RefineConfig | None = field(default_factory=RefineConfig)
     cost: CostConfig = field(default_factory=CostConfig)
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
     execution: ExecutionConfig = field(default_factory=ExecutionConfig)

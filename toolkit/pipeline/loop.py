@@ -7,15 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.execution.check import Check
-from toolkit.pipeline.candidate import Candidate, Source
+from toolkit.pipeline.candidate import Candidate, Source, refined_solution
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.pipeline.observer import Observer
 from toolkit.pipeline.planner import Planner
 from toolkit.pipeline.trial import Tester, Trial
+from toolkit.refine.local_search import LocalSearch
 from toolkit.robot.model import RobotModel
+from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.plan_cost import PlanCost, plan_cost
 from toolkit.search.moves.exclusion import Exclusion, excluded
 from toolkit.search.result import SearchResult, Solution
@@ -103,6 +106,7 @@ class _Run:
         self._trials: list[Trial] = []
         self._exclusions: list[Exclusion] = []
         self._known: set[bytes] = set()
+        self._local: LocalSearch | None = None
 
     def result(self) -> PipelineResult:
         """Search and test until a trial passes, or nothing is left to try."""
@@ -120,7 +124,12 @@ class _Run:
     def _spent(self) -> bool:
         """Whether nothing more may be optimised or tested."""
         config = self._config
-        return len(self._candidates) >= config.optimisations or len(self._trials) >= config.candidates
+        return self._optimisations >= config.optimisations or len(self._trials) >= config.candidates
+
+    @property
+    def _optimisations(self) -> int:
+        """Number of sequences of searches that were optimised."""
+        return sum(candidate.source != Source.LOCAL for candidate in self._candidates)
 
     def _concluded(self) -> PipelineResult:
         """The result with the best trial; of trials that came equally far, the first."""
@@ -158,7 +167,7 @@ class _Run:
 
     def _optimised(self, search: SearchResult) -> list[Candidate]:
         """New candidates of the last search, the newest (predicted cheapest) first."""
-        most = (self._config.optimisations - len(self._candidates) + 1) // 2  # the other half is for searches to come
+        most = (self._config.optimisations - self._optimisations + 1) // 2  # the other half is for searches to come
         order: list[tuple[Solution, Source]] = []
         for index, solution in reversed(list(enumerate(search.solutions))):
             if len(order) < most and self._new(solution.sequence):
@@ -182,31 +191,87 @@ class _Run:
     def _candidate(self, solution: Solution, source: Source) -> Candidate:
         """A sequence of the last search, optimised."""
         plan, failure = self._tester.optimise(solution.sequence)
+        return self._entered(source, solution, plan, plan_cost(plan, self._weights), failure)
+
+    def _entered(
+        self, source: Source, solution: Solution, plan: MotionPlan, cost: PlanCost, failure: Failure | None
+    ) -> Candidate:
+        """A new candidate of the last search."""
         seconds = sum(search.seconds for search in self._searches[:-1]) + solution.seconds
-        cost = plan_cost(plan, self._config.cost.on_ground(slides=self._searches[-1].slides))
         number, search = len(self._candidates), len(self._searches) - 1
         self._candidates.append(Candidate(number, source, search, seconds, solution, plan, cost, failure))
         return self._candidates[-1]
 
+    @property
+    def _weights(self) -> CostConfig:
+        """Weights of the true cost on the ground of the last search."""
+        return self._config.cost.on_ground(slides=self._searches[-1].slides)
+
     def _tried(self, found: list[Candidate]) -> bool:
-        """Whether a candidate passes the stages after the optimiser; the truly cheapest is tried first."""
+        """Whether a candidate passes the stages after the optimiser; the truly cheapest is tried first.
+
+        Before a candidate is tested, it is improved, and again where a transition has been blamed since.
+        """
         blamed: list[Exclusion] = []
-        for candidate in sorted(found, key=lambda item: (item.cost.total, item.number)):
+        for candidate in found:
             if candidate.failure is not None:
                 self._exclusions += _blamed(candidate.solution.sequence, candidate.failure)
-            elif self._allowed(candidate) and not _meets(candidate.solution.sequence, blamed):
-                trial = self._tester.test(candidate)
-                self._trials.append(trial)
-                if trial.failure is None:
-                    return True
-                blamed += _blamed(candidate.solution.sequence, trial.failure)
+        ranked = sorted((candidate for candidate in found if candidate.feasible), key=_rank)
+        starts = 0 if self._config.refine is None else self._config.refine.starts
+        tried = {candidate.number: 0 for candidate in ranked[:starts]}
+        ranked += [better for candidate in ranked[:starts] for better in self._improved(candidate, blamed)]
+        while ranked:
+            candidate = min(ranked, key=_rank)
+            ranked.remove(candidate)
+            if not self._allowed(candidate) or _meets(candidate.solution.sequence, blamed):
+                continue
+            if starts and candidate.source != Source.LOCAL and tried.get(candidate.number) != len(blamed):
+                tried[candidate.number] = len(blamed)
+                ranked += [candidate, *self._improved(candidate, blamed)]
+                continue
+            trial = self._tester.test(candidate)
+            self._trials.append(trial)
+            if trial.failure is None:
+                return True
+            blamed += _blamed(candidate.solution.sequence, trial.failure)
         self._exclusions += blamed
         return False
+
+    def _improved(self, candidate: Candidate, blamed: list[Exclusion]) -> list[Candidate]:
+        """What the local search makes of a candidate without transitions that failed; nothing where none is better."""
+        config, screen = self._config.refine, self._searches[candidate.search].screen
+        if config is None or screen is None:
+            return []
+        if self._local is None:
+            self._local = LocalSearch(config, self._weights, self._optimise, self._tester.slide)
+        if self._local.spent >= config.optimisations:
+            return []
+        began, before = time.perf_counter(), self._local.spent
+        exclusions = [*self._exclusions, *blamed]
+        self._observer.started("refinement")
+        plan = self._local.improved(candidate.plan, screen, lambda sequence: not _meets(sequence, exclusions))
+        cost = plan_cost(plan, self._weights)
+        detail = f"true cost {candidate.cost.total:.0f} to {cost.total:.0f} with {self._local.spent - before} motions"
+        self._observer.finished("refinement", True, time.perf_counter() - began, detail)
+        if plan is candidate.plan or not self._new(plan.sequence):
+            return []
+        solution = refined_solution(plan, cost, self._searches[-1].seconds)
+        return [self._entered(Source.LOCAL, solution, plan, cost, None)]
+
+    def _optimise(self, sequence: ContactSequence) -> MotionPlan:
+        """The motion of a variant."""
+        self._observer.progress("refinement", None, f"{len(sequence.transitions)} transitions")
+        return self._tester.optimise(sequence)[0]
 
     def _allowed(self, candidate: Candidate) -> bool:
         """Whether one more trial may be made; half of them are for the feet alone."""
         most = self._config.candidates
         return len(self._trials) < (max(1, most // 2) if candidate.uses_palms else most)
+
+
+def _rank(candidate: Candidate) -> tuple[float, int]:
+    """What comes first: the truly cheapest, and of equal ones the first."""
+    return candidate.cost.total, candidate.number
 
 
 def _told(found: list[Candidate]) -> str:

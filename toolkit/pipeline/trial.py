@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import mujoco
 import numpy as np
 
-from toolkit.centroidal.plan import MotionPlan, plan_motion
+from toolkit.centroidal.plan import MotionPlan, plan_motion, slid
 from toolkit.contacts.failure import Failure
+from toolkit.contacts.room import RoomConfig
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.execution.check import Result
 from toolkit.execution.result import Execution
@@ -94,6 +96,10 @@ class Tester:
         if motion.feasible:
             return plan, None
         return plan, _because(f"no feasible centroidal motion: {motion.outcome}", motion.failure)
+
+    def slide(self, plan: MotionPlan, landing: RoomConfig, fixed: Collection[int]) -> MotionPlan | None:
+        """Move the landing points of a plan; see `toolkit.centroidal.plan.slid`."""
+        return slid(plan, landing, self._config.sequence, fixed)
 
     def test(self, candidate: Candidate) -> Trial:
         """Put a candidate through the stages after the optimiser; stop at the first that fails."""

@@ -27,6 +27,7 @@ from toolkit.search.moves.reach_check import ReachCheck
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.problem import ContactProblem, Parts
 from toolkit.search.result import SearchResult, Solution, reason_of
+from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import CONTACTS, is_pending, moved_last, unpack
@@ -115,6 +116,7 @@ class ContactPlanner:
             reason="" if result.paths else self._reason(result, tally),
             warning=_UNTRAINED if tally.untrained else "",
             slides=way.slides,
+            screen=parts.screen,
         )
 
     def _suited(self, start: Stance, com: np.ndarray, tally: Tally) -> TransitionEvaluator:
@@ -149,7 +151,8 @@ class ContactPlanner:
             None if judge is None else Judging(judge, reader, reach, tally, deadline)
             for judge in (strategy.at_once, strategy.waiting)
         )
-        return Parts(table, reader, candidates, at_once, waiting, cost, delay, tally)
+        screen = SequenceScreen(moves, limbs)
+        return Parts(table, reader, candidates, at_once, waiting, cost, delay, tally, screen)
 
     def _reason(self, result: AnaStarResult[bytes], tally: Tally) -> str:
         limit = self.config.search.max_expansions  # the setting, not the multiple of it that the strategy allows

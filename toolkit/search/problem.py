@@ -18,6 +18,7 @@ from toolkit.search.costs.edge_cost import EdgeCost
 from toolkit.search.judging import Judging, Tally
 from toolkit.search.moves.candidates import CandidateGenerator, Candidates, mean_feet
 from toolkit.search.moves.reasons import Reason
+from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import (
@@ -51,6 +52,7 @@ class Parts:
         cost: Costs of edges, and to the goal.
         delay: Delays of the states.
         tally: Counts the rejections.
+        screen: The same screens for sequences that the search did not make.
     """
 
     table: ContactTable
@@ -61,6 +63,7 @@ class Parts:
     cost: EdgeCost
     delay: Delay
     tally: Tally
+    screen: SequenceScreen
 
 
 class ContactProblem:

@@ -9,6 +9,7 @@ import numpy as np
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.search.anytime.graph import Path
 from toolkit.search.moves.reasons import Reason
+from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import COM, CONTACTS, VELOCITY, is_pending, unpack
 
@@ -24,7 +25,7 @@ class Solution:
         seconds: Time from the start of the search until it was found.
         com: (len(transitions) + 1, 3) m; predicted CoM at the start and after each transition.
         com_velocity: Same shape, m/s; predicted velocity of the CoM.
-        objective: (len(transitions),) predicted dynamics objective of each transition.
+        objective: (len(transitions),) predicted dynamics objective of each transition; NaN where none is predicted.
     """
 
     sequence: ContactSequence
@@ -68,6 +69,7 @@ class SearchResult:
         warning: One line where the judgements are less reliable, else "".
         hasty: Number of first solutions that only had to come soon; better ones follow.
         slides: Whether no way leads over resting ground alone; see `CostConfig.on_ground`.
+        screen: The screens of the search, for sequences that are made from what it found; None where there are none.
     """
 
     solutions: tuple[Solution, ...]
@@ -80,6 +82,7 @@ class SearchResult:
     warning: str = ""
     hasty: int = 0
     slides: bool = False
+    screen: SequenceScreen | None = field(default=None, repr=False, compare=False)
 
 
 def reason_of(stopped_by: str, seconds: float, expansions: int, rejected: np.ndarray, dynamics: str) -> str:

@@ -50,6 +50,11 @@ class CostConfig:
         return replace(self, steep=0.0) if slides else self
 
 
+def arrival_radius(goal: Goal) -> float:
+    """Distance in m from the middle of the goal within which the mean of the feet has to be in the end."""
+    return max(goal.radius - _ARRIVAL, 0.5 * goal.radius)
+
+
 class Terms(NamedTuple):
     """Terms of the cost of n transitions that are known without their dynamics, (n,) each; see `CostConfig`."""
 
@@ -77,7 +82,7 @@ class TransitionCost:
     def __init__(self, config: CostConfig, table: ContactTable, timings: tuple[Timing, ...], goal: Goal):
         self._config, self._table, self._goal = config, table, goal
         self._durations = np.array([timing.shift + timing.swing for timing in timings])
-        self._radius = max(goal.radius - _ARRIVAL, 0.5 * goal.radius)
+        self._radius = arrival_radius(goal)
         self.dynamics, self.time = config.dynamics, config.time
 
     def terms(self, candidates: Candidates) -> Terms:

@@ -15,7 +15,8 @@ from toolkit.search.moves.reasons import Reason
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
 
-_SWING_SPEED = 4.0  # m/s; highest mean speed of a foot
+SWING_SPEED = 4.0
+"""Highest mean speed of a foot in m/s."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class CandidateGenerator:
     ):
         self._moves, self._table, self._palms = moves, moves.table, palms
         self._exclusions, self._rejected = exclusions, rejected
-        self._ways = _SWING_SPEED * np.array([timing.swing for timing in timings])
+        self._ways = SWING_SPEED * np.array([timing.swing for timing in timings])
 
     def out_of(self, contacts: np.ndarray, last: int) -> Candidates | None:
         """Candidates out of contact numbers (4,) whose limb `last` moved last; None where there are none."""

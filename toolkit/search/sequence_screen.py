@@ -1,0 +1,121 @@
+"""The screens of a search for sequences that were not made by it: may each transition follow on the one before?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from toolkit.centroidal.plan import MotionPlan
+from toolkit.contacts.sequence import ContactSequence, ContactTransition
+from toolkit.contacts.stance import Stance
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.search.moves.candidates import SWING_SPEED, Candidates
+from toolkit.search.moves.moves import MoveGenerator
+from toolkit.search.moves.reach_check import ReachCheck
+from toolkit.search.moves.reasons import Reason
+from toolkit.world.timing import Timing
+
+_KEPT = 100_000  # screens that are remembered
+_AT = 0.01  # m; a ray to a palm's contact hits the palm's surface no farther from it than this
+
+
+class SequenceScreen:
+    """Screens single transitions with the moves of one search, and whole motions with its check of what limbs reach.
+
+    Args:
+        moves: The moves of the search.
+        palms: The palms that it may use.
+    """
+
+    def __init__(self, moves: MoveGenerator, palms: Sequence[Limb]):
+        self._moves, self._palms = moves, palms
+        self._known: dict[tuple, int] = {}
+
+    def numbers(self, sequence: ContactSequence) -> np.ndarray:
+        """(transitions + 1, 4) contact numbers of all stances in the search's table, -1 where a palm has no contact."""
+        numbers = np.full((len(sequence.transitions) + 1, 4), -1)
+        for contact in sequence.start.contacts:
+            numbers[:, contact.limb] = self._moves.table.add_contact(contact)
+        for index, transition in enumerate(sequence.transitions):
+            contact = transition.contact
+            numbers[index + 1 :, transition.limb] = -1 if contact is None else self._moves.table.add_contact(contact)
+        return numbers
+
+    def passes(self, sequence: ContactSequence) -> bool:
+        """Whether all transitions of a sequence pass; stops at the first that does not."""
+        return not any(self._codes(sequence))
+
+    def codes(self, sequence: ContactSequence) -> np.ndarray:
+        """(transitions,) int; the `Reason` against each transition, 0 where there is none."""
+        return np.array(list(self._codes(sequence)), int)
+
+    def _codes(self, sequence: ContactSequence) -> Iterator[int]:
+        """See `codes`, one after the other."""
+        numbers, last = self.numbers(sequence), None
+        for before, after, transition in zip(numbers, numbers[1:], sequence.transitions, strict=False):
+            limb, timing = transition.limb, transition.timing
+            yield Reason.STILL if limb == last else self.code(before, limb, int(after[limb]), timing)
+            last = limb
+
+    def code(self, before: np.ndarray, limb: Limb, number: int, timing: Timing) -> int:
+        """The `Reason` against moving a limb to a contact, out of a stance of contact numbers (4,); 0: none."""
+        if not limb.is_foot and limb not in self._palms and number >= 0:
+            return Reason.NO_WALL
+        key = (*before[: len(FEET)].tolist(), int(before[limb]), int(limb), number, timing.swing)
+        if key not in self._known:
+            if len(self._known) >= _KEPT:
+                self._known.clear()
+            code = self._foot if limb.is_foot else self._palm
+            self._known[key] = code(before, limb, number, timing)
+        return self._known[key]
+
+    def _foot(self, before: np.ndarray, limb: Limb, number: int, timing: Timing) -> int:
+        moves, row = self._moves, np.array([number])
+        table, standing = moves.table, int(before[limb.mirrored])
+        place = table.position[row], table.rotation[row], table.yaw[row]
+        code = int(moves.screen(limb, table.surface[row], *place, standing)[0])
+        return code or int(moves.swings(limb, row, int(before[limb]), standing, SWING_SPEED * timing.swing)[0])
+
+    def _palm(self, before: np.ndarray, limb: Limb, number: int, timing: Timing) -> int:
+        if number < 0:
+            return Reason.NONE if before[limb] >= 0 else Reason.STILL
+        if number == before[limb]:
+            return Reason.STILL
+        moves, (left, right) = self._moves, before[: len(FEET)].tolist()
+        place = moves.table.position[number]
+        ray = place - moves.shoulder(limb, left, right)
+        palms, codes = moves.aimed(limb, left, right, ray[None] / np.linalg.norm(ray))
+        if codes[0] == 0 and np.linalg.norm(palms.position[0] - place) > _AT:
+            return Reason.NO_WALL
+        return int(codes[0])
+
+    def reach_codes(self, plan: MotionPlan) -> np.ndarray:
+        """(transitions,) int; the `Reason` why limbs do not reach in the motion of a plan, 0 where they do."""
+        sequence, numbers = plan.sequence, self.numbers(plan.sequence)
+        ends = [0.0, *(phase.end for phase in plan.schedule.phases if phase.swing is not None)]
+        samples = [plan.motion.sample(time) for time in ends]
+        codes = []
+        for index, transition in enumerate(sequence.transitions):
+            (com, velocity, _), (end, end_velocity, _) = samples[index : index + 2]
+            step = Candidates.of(
+                self._moves.table,
+                numbers[index : index + 1],
+                np.array([transition.limb]),
+                numbers[index + 1 : index + 2],
+                np.zeros(1, int),
+            )
+            reach = ReachCheck(self._moves, self._palms, (transition.timing,))
+            codes.append(reach.codes(numbers[index], com, velocity, step, end[None], end_velocity[None])[0])
+        return np.array(codes, int)
+
+    def steps(self, stance: Stance, limb: Limb, timing: Timing) -> list[ContactTransition]:
+        """All steps of a foot out of a stance that the search would consider."""
+        numbers = self.numbers(ContactSequence(stance, ()))[0]
+        standing = int(numbers[limb.mirrored])
+        found = self._moves.steps(limb, standing).numbers
+        if not len(found):
+            return []
+        codes = self._moves.swings(limb, found, int(numbers[limb]), standing, SWING_SPEED * timing.swing)
+        table = self._moves.table
+        return [ContactTransition(limb, table.contact(int(number)), timing) for number in found[codes == 0]]
