@@ -23,7 +23,10 @@ from validation.searched import Searched, Tested, cheapest, favourite, search
 from validation.truth import Truth
 
 RAW, BY_COUNT, BY_TIME = "raw favourite", "choice, equal optimisations", "choice, equal seconds"
-VARIANTS = (RAW, BY_COUNT, BY_TIME)
+LOCAL = {RAW: "favourite, local search", BY_COUNT: "choice, local search"}
+"""What the local search makes of a variant."""
+BEST = LOCAL[BY_COUNT]
+VARIANTS = (RAW, LOCAL[RAW], BY_COUNT, BEST, BY_TIME)
 
 
 @dataclass(frozen=True)
@@ -33,12 +36,19 @@ class Effort:
     Attributes:
         optimisations: Number of sequences that are optimised for the choice.
         seconds: s; of searches and optimisations for the choice.
-        rounds: Most searches, each with a seed of its own, to spend them on.
+        motions: Most motions that a local search may optimise beyond that; 0: there is no local search.
+        rounds: Most searches, each with a seed of its own.
     """
 
     optimisations: int = 20
     seconds: float = 5.0
+    motions: int = 60
     rounds: int = 10
+
+    @property
+    def variants(self) -> tuple[str, ...]:
+        """The variants that the effort allows."""
+        return tuple(name for name in VARIANTS if self.motions or name not in LOCAL.values())
 
 
 @dataclass(frozen=True)
@@ -107,12 +117,20 @@ def ablation_trial(settings: TrialSettings, case: Case, planner: str, effort: Ef
     except PlanningError as error:
         return record | {"found": False, "feasible": False, "passed": False, "reason": str(error)}
     first = searches[0]
-    chosen = dict(zip(VARIANTS, (favourite(first.tested), *spend(effort, searches)), strict=True))
-    summary = first.summary()
-    variants = {name: _described(item) for name, item in chosen.items() if item is not None}
+    chosen = dict(zip((RAW, BY_COUNT, BY_TIME), (favourite(first.tested), *spend(effort, searches)), strict=True))
+    plans: dict[str, MotionPlan] = {}
+    variants: dict[str, Any] = {}
+    for name, item in chosen.items():
+        if item is None:
+            continue
+        plans[name], variants[name] = item.outcome.plan, item.outcome.record()
+        if effort.motions and name in LOCAL:
+            better = truth.improved(item.outcome.plan, item.screen, effort.motions)
+            plans[LOCAL[name]], variants[LOCAL[name]] = better.plan, better.record()
     if execution:
-        _execute(settings, robot, world, {name: item for name, item in chosen.items() if item}, variants)
-    passed = all(variants.get(name, {}).get("executed", name in variants) for name in VARIANTS)
+        _execute(settings, robot, world, plans, variants)
+    summary = first.summary()
+    passed = all(variants.get(name, {}).get("executed", name in variants) for name in effort.variants)
     reasons = [item["execution_reason"] for item in variants.values() if item.get("execution_reason")]
     return record | {
         **summary,
@@ -137,19 +155,19 @@ def _left(effort: Effort, searches: Sequence[Searched]) -> bool:
     return len(searches) < 3 or len(accounts(searches[:-2])) < len(ledger)
 
 
-def _described(tested: Tested) -> dict[str, Any]:
-    return {"search_cost": tested.solution.cost, **tested.outcome.record()}
-
-
 def _execute(
-    settings: TrialSettings, robot: RobotModel, world: World, chosen: dict[str, Tested], variants: dict[str, Any]
+    settings: TrialSettings,
+    robot: RobotModel,
+    world: World,
+    plans: dict[str, MotionPlan],
+    variants: dict[str, Any],
 ) -> None:
-    """Simulate the chosen plans, each different one once, and enter what came of it."""
+    """Simulate the plans, each different one once, and enter what came of it."""
     known: dict[bytes, dict[str, Any]] = {}
-    for name, tested in chosen.items():
-        key = tested.solution.sequence.identity
+    for name, plan in plans.items():
+        key = plan.sequence.identity
         if key not in known:
-            known[key] = run_plan(settings, robot, world, tested.outcome.plan)
+            known[key] = run_plan(settings, robot, world, plan)
         variants[name] |= known[key]
 
 

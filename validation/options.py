@@ -43,7 +43,7 @@ def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> 
     # A trial's own number seeds everything in it: the option of a single run gives way to this one.
     made.add_argument("--seed-offset", "--seed", type=int, default=0, metavar="N", help="first seed (default: 0)")
     made.add_argument(
-        "--workers", type=_count, default=cli.cores(), help="processes, one thread each; 0: this one (default: cores)"
+        "--workers", type=count, default=cli.cores(), help="processes, one thread each; 0: this one (default: cores)"
     )
     made.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
     made.add_argument(
@@ -63,7 +63,7 @@ def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> 
     return made
 
 
-def _count(text: str) -> int:
+def count(text: str) -> int:
     """An argparse type: a whole number from 0 on."""
     value = int(text)
     if value < 0:

@@ -13,6 +13,7 @@ import numpy as np
 
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.result import SearchResult, Solution
+from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.world.world import World
 from validation.cases import Case
 from validation.jobs import Record
@@ -36,12 +37,14 @@ class Tested:
         ready: s from the start of the search until it was optimised, if the search waits while each sequence is
             optimised as soon as it is found. The time for the heuristic is not part of it.
         ready_processor: s; the same in processor time, which leaves out what other programs took.
+        screen: Of the search that found it, for the local search.
     """
 
     solution: Solution
     outcome: Outcome
     ready: float
     ready_processor: float
+    screen: SequenceScreen
 
     def record(self) -> dict[str, Any]:
         """The figures, as JSON can hold them."""
@@ -134,12 +137,14 @@ def search(settings: TrialSettings, world: World, kind: str, seed: Sequence[int]
     result = planner.search(np.random.default_rng(list(seed)), settings.planning.time_limit)
     share = min((time.process_time() - worked) / (time.perf_counter() - began), 1.0)
     tested, spent, processor = [], 0.0, 0.0
+    screen = result.screen
+    assert screen is not None
     for solution in result.solutions:
         outcome = truth(solution.sequence)
         spent += outcome.seconds
         processor += outcome.processor_seconds
         found = solution.seconds
-        tested.append(Tested(solution, outcome, found + spent, share * found + processor))
+        tested.append(Tested(solution, outcome, found + spent, share * found + processor, screen))
     return Searched(planner, result, tuple(tested))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,10 +17,12 @@ from toolkit.errors import PlanningError
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.pipeline.observer import Observer
 from toolkit.pipeline.trial import Tester
+from toolkit.refine import LocalSearch, RefineConfig
 from toolkit.robot.model import RobotModel
 from toolkit.search.costs.plan_cost import PlanCost, plan_cost
 from toolkit.search.ground import Ground
 from toolkit.search.planner_config import PlannerConfig
+from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.world.world import World
 from validation.motion_figures import motion_figures
 
@@ -94,11 +97,27 @@ class Truth:
             self._known[key] = self._optimised(sequence)
         return self._known[key]
 
+    def improved(self, plan: MotionPlan, screen: SequenceScreen, motions: int) -> Outcome:
+        """What the local search of the pipeline makes of a plan with a feasible motion.
+
+        Args:
+            plan: The plan.
+            screen: The screens of the search that found its sequence.
+            motions: Most motions that it may optimise.
+        """
+        config = RefineConfig(optimisations=motions)
+        local = LocalSearch(config, self.cost, lambda sequence: self._tester.optimise(sequence)[0], self._tester.slide)
+        return self._timed(lambda: local.improved(plan, screen, lambda sequence: True))
+
     def _optimised(self, sequence: ContactSequence) -> Outcome:
+        return self._timed(lambda: self._tester.optimise(sequence)[0])
+
+    def _timed(self, make: Callable[[], MotionPlan]) -> Outcome:
+        """The plan that is made, its price, and how long making it took."""
         began, worked = time.perf_counter(), time.process_time()
-        plan, failure = self._tester.optimise(sequence)
+        plan = make()
         seconds, processor = time.perf_counter() - began, time.process_time() - worked
-        paper = objective(plan.motion, Weights()) if failure is None else np.inf
+        paper = objective(plan.motion, Weights()) if plan.motion.feasible else np.inf
         return Outcome(plan, plan_cost(plan, self.cost), paper, seconds, processor)
 
 

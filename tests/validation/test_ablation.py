@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from validation.ablation import goals_of, ratios, summarise
-from validation.ablation_trial import BY_COUNT, RAW, Effort, accounts, spend
+from validation.ablation_trial import BEST, LOCAL, RAW, Effort, accounts, spend
 from validation.goals import MET, NOT_CHECKED
 from validation.searched import Searched, cheapest, favourite
 
@@ -50,7 +50,7 @@ def test_efforts_are_spent_on_the_predicted_cheapest_or_as_sequences_are_found()
 
 def record(planner: str, seed: int, cost: float | None) -> dict:
     plan = {"true_cost": cost, "objective": cost, "transitions": 5, "palm_contacts": 0, "executed": True}
-    variants = {} if cost is None else {name: plan for name in (RAW, BY_COUNT)}
+    variants = {} if cost is None else {name: plan for name in (RAW, BEST)}
     return {"kind": "rubble_field", "planner": planner, "seed": seed, "found": True, "variants": variants}
 
 
@@ -61,10 +61,14 @@ def test_ratios_are_of_the_same_worlds():
     assert (found["worlds"], found["true cost"], found["seconds of walking"]) == (2, 0.75, None)
     results = {goal.name: goal.result for goal in goals_of([found])}
     assert results[f"rubble_field, {RAW}: true cost over quasi-static"] == MET
-    assert results[f"rubble_field, {BY_COUNT}: true cost over quasi-static"] == NOT_CHECKED
+    assert results[f"rubble_field, {BEST}: true cost over quasi-static"] == NOT_CHECKED
 
 
 def test_a_row_counts_worlds_without_a_plan():
     row = summarise("rubble_field", "learned", RAW, [record("learned", 1, 10.0), record("learned", 2, None)])
     assert (row["trials"], row["found"], row["feasible"], row["executed"]) == (2, 2, 1, 1)
     assert row["true cost"] == 10.0
+
+
+def test_without_motions_there_is_no_local_search():
+    assert set(Effort().variants) - set(Effort(motions=0).variants) == set(LOCAL.values())
