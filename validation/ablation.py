@@ -15,7 +15,7 @@ from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
 from validation.jobs import Job, Record, run_jobs
 from validation.searched import PLANNERS, completed
-from validation.tables import failure_section, markdown_table, median, number, values, write_results
+from validation.tables import columns, failure_section, markdown_table, median, number, values, write_results
 from validation.trial_file import TrialFile
 
 DESCRIPTION = """\
@@ -38,6 +38,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "CoP to edge": ("figures", "cop_distance"),
     "CoP to edge, feet": ("figures", "foot_cop_distance"),
 }
+KEPT = ("seed", *(path[-1] for path in QUANTITIES.values()), "palm_contacts", "optimiser_seconds", "executed", "held")
 COST, PAPER_J, SECONDS = "true cost", "J, paper's weights", "seconds of walking"
 MOST = {(FIELD, RAW): 1.0, (CORRIDOR, RAW): 0.8, (FIELD, BEST): 0.95, (CORRIDOR, BEST): 0.75}
 """Most that the true cost may be over the quasi-static planner's, median of the worlds' ratios."""
@@ -146,6 +147,19 @@ def goals_of(found: Sequence[dict[str, Any]]) -> list[Goal]:
     return wanted
 
 
+def _kept(records: Sequence[Record]) -> list[dict[str, Any]]:
+    """Every plan of every variant, as lists by kind of world, planner and variant."""
+    groups: dict[tuple[str, str, str], list[Record]] = {}
+    for record in records:
+        for variant, plan in record["variants"].items():
+            row = {"seed": record["seed"], **plan, **plan["figures"]}
+            groups.setdefault((record["kind"], record["planner"], variant), []).append(row)
+    return [
+        {"kind": kind, "planner": planner, "variant": variant, **columns(rows, KEPT)}
+        for (kind, planner, variant), rows in groups.items()
+    ]
+
+
 def _ms(seconds: float | None) -> float | None:
     return None if seconds is None else 1e3 * seconds
 
@@ -226,7 +240,7 @@ def main(argv: list[str] | None = None) -> int:
             ("Over other planners, median of the worlds' ratios", ratio_table(compared)),
             ("Failures", failure_section(records)),
         ],
-        content={"table": rows, "ratios": compared, "trials": records},
+        content={"table": rows, "ratios": compared, "plans": _kept(records)},
         goals=found,
         settings={**settings.described(), **chosen, "trials": args.trials, "seed_offset": first},
     )

@@ -21,7 +21,7 @@ from validation.options import TrialSettings
 from validation.path_bounds import BoundCheck
 from validation.run_trial import robot_of
 from validation.searched import completed, search, with_expansions
-from validation.tables import failure_section, largest, markdown_table, median, number, write_results
+from validation.tables import columns, failure_section, largest, markdown_table, median, number, write_results
 from validation.trial_file import TrialFile
 from validation.truth import Truth
 
@@ -38,7 +38,17 @@ OURS = PLANNERS[0]
 EXPANSIONS, TRIALS = 10_000, 15
 SEARCHES, MORE_EXPANSIONS = 4, 1_000  # searches of each planner; expansions of all but our planner's first one
 FEWEST = 20  # sequences of a world
-COLUMNS = ("search_cost", "judged", "objective", "paper_objective", "true_cost", "transitions", "walking_seconds")
+COLUMNS = (
+    "seed",
+    "search",
+    "search_cost",
+    "judged",
+    "objective",
+    "paper_objective",
+    "true_cost",
+    "transitions",
+    "walking_seconds",
+)
 COLUMNS += ("feasible", "rejected", "h_part", "h_true_part")
 RANKS, LINE, REGRET, REJECTED, INFEASIBLE = 0.8, (0.9, 1.1), 0.05, 0.05, 0.05
 
@@ -194,10 +204,13 @@ def _earlier(path: Path) -> tuple[str, str]:
         raise InputError(f"{path}: is no calibration.json of this program; choose another --beside") from None
 
 
-def _in_columns(record: Record) -> Record:
-    """A record with the figures of its sequences as lists, which takes less room."""
-    entries = record["entries"]
-    return record | {"entries": {name: [entry.get(name) for entry in entries] for name in COLUMNS if entries}}
+def _kept(records: Sequence[Record]) -> list[dict[str, Any]]:
+    """Every sequence of every search, as lists by kind of world and planner."""
+    groups: dict[tuple[str, str], list[Record]] = {}
+    for record in records:
+        rows = [{"seed": record["seed"], "search": record["search"], **entry} for entry in record["entries"]]
+        groups.setdefault((record["kind"], record["planner"]), []).extend(rows)
+    return [{"kind": kind, "planner": planner, **columns(rows, COLUMNS)} for (kind, planner), rows in groups.items()]
 
 
 def _percent(share: float | None) -> float | None:
@@ -276,7 +289,7 @@ def main(argv: list[str] | None = None) -> int:
         "calibration",
         title="What the search believes, and what the motion costs",
         sections=[*sections, ("Failures", failure_section(records))],
-        content={"table": rows, "trials": [_in_columns(record) for record in records]},
+        content={"table": rows, "sequences": _kept(records)},
         goals=found,
         settings={**settings.described(), "trials": args.trials, "searches": args.searches}
         | {"more_expansions": args.more_expansions, "seed_offset": first},
