@@ -1,4 +1,4 @@
-"""Command line: collect labelled transitions, train the networks, evaluate them."""
+"""Command line: collect labels of whole motions, train the networks, evaluate them."""
 
 from __future__ import annotations
 
@@ -14,19 +14,21 @@ from toolkit.errors import DatasetError, InputError
 from toolkit.learning.collect import Collected, collect
 from toolkit.learning.collect_config import CollectConfig
 from toolkit.learning.dataset import read_dataset, read_datasets
-from toolkit.learning.enrich import EnrichConfig, enrich
 from toolkit.learning.evaluate import Score, balanced, query_seconds, score
 from toolkit.learning.jobs import executor
-from toolkit.prediction.networks import load_networks
+from toolkit.learning.samples import Split
+from toolkit.prediction.networks import digest, load_networks
 from toolkit.report.console import make_console, progress_bar
 from toolkit.report.scores import score_table
 from toolkit.robot.loader import load_robot
+from toolkit.robot.model import RobotModel
 
+QUICK_EPOCHS = 30  # of a training for a first look
 DESCRIPTION = """\
 Make the networks with which the contact search judges transitions.
 
-  collect    run the planner in random terrain and label every transition with the centroidal optimiser
-  enrich     label more transitions that are made of those of a data set, mostly of costly ones
+  collect    draw contact sequences in random worlds by the search, optimise each as a whole, and store what each
+             transition costs in it
   fit        train a classifier and a regressor per category (needs torch: pip install -e '.[train]')
   evaluate   score the trained networks on fresh transitions
 """
@@ -35,51 +37,42 @@ Make the networks with which the contact search judges transitions.
 def run_collect(args: argparse.Namespace, console: Console) -> int:
     """Run `collect`."""
     robot = load_robot(args.robot, args.robots)
+    networks = _searching_networks(args, robot)
     config = CollectConfig(
         robot=robot.name,
         robots=str(robot.folder.parent.resolve()),
         seed=args.seed,
         samples_per_category=args.samples,
+        networks=None if networks is None else str(networks.resolve()),
+        networks_digest="" if networks is None else digest(networks),
     )
     with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
         task = progress.add_task("shards", total=config.shards)
 
         def tick(state: Collected) -> None:
-            transitions = f"{state.labelled} transitions"
-            progress.update(task, completed=state.shards, description=f"shards ({transitions})")
+            labels = f"{state.labelled} labels"
+            progress.update(task, completed=state.shards, description=f"shards ({labels})")
             if not console.is_terminal:
-                console.print(f"{state.shards} of {config.shards} shards, {transitions}, {state.seconds:.0f} s")
+                console.print(f"{state.shards} of {config.shards} shards, {labels}, {state.seconds:.0f} s")
 
         summary = collect(args.out, robot, config, pool, tick)
     rate = (summary.labelled - summary.resumed) / max(summary.seconds, 1e-9)
-    share = summary.feasible / max(summary.labelled, 1)
+    share = summary.feasible / max(summary.samples, 1)
     console.print(
-        f"{summary.labelled} transitions in {summary.seconds:.0f} s ({rate:.0f} per s, {summary.resumed} found "
-        f"from before), feasible: {share:.0%}; fewest of a category: {summary.fewest}\n{args.out}"
+        f"{summary.labelled} labels in {summary.seconds:.0f} s ({rate:.1f} per s, {summary.resumed} found from "
+        f"before), fewest of a category: {summary.fewest}; with those judged alone {summary.samples} transitions, "
+        f"feasible: {share:.0%}\n{args.out}"
     )
     return 0
 
 
-def run_enrich(args: argparse.Namespace, console: Console) -> int:
-    """Run `enrich`."""
-    robot = load_robot(args.robot, args.robots)
-    config = EnrichConfig(
-        robot=robot.name,
-        robots=str(robot.folder.parent.resolve()),
-        seed=args.seed,
-        categories=tuple(args.categories or (int(category) for category in Category)),
-        draws=args.draws,
-        networks=str(args.networks.resolve()) if args.networks else None,
-    )
-    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
-        task = progress.add_task("shards")
-
-        def tick(done: int, of: int) -> None:
-            progress.update(task, completed=done, total=of)
-
-        added = enrich(args.data, args.out, robot, config, pool, tick)
-    console.print(f"{added} transitions added\n{args.out}")
-    return 0
+def _searching_networks(args: argparse.Namespace, robot: RobotModel) -> Path | None:
+    """Folder of the networks that take part in the search, made sure of; None for none."""
+    folder = args.networks or robot.folder / "networks"
+    if args.no_networks or (args.networks is None and not folder.is_dir()):
+        return None
+    load_networks(robot, folder)
+    return folder
 
 
 def run_fit(args: argparse.Namespace, console: Console) -> int:
@@ -100,10 +93,9 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
     wanted = [Category(index) for index in args.categories] if args.categories else list(data)
     check_device(args.device)
     config = FitConfig(
-        epochs=args.epochs,
+        epochs=args.epochs or (QUICK_EPOCHS if args.quick else FitConfig.epochs),
         batch=args.batch,
         learning_rate=args.learning_rate,
-        sensitivity_weight=args.sensitivity_weight,
         device=args.device,
         seed=args.seed,
     )
@@ -144,6 +136,8 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
     robot = load_robot(args.robot, args.robots)
     networks = load_networks(robot, args.networks)
     data = read_dataset(args.data, robot.fingerprint)
+    if args.split != "all":
+        data = {category: samples.of(Split[args.split.upper()]) for category, samples in data.items()}
     at_default = {category: samples.at_default() for category, samples in data.items()}
     for title, chosen in (("1 s + 1 s, friction 0.5", at_default), ("all timings and frictions", data)):
         rng = np.random.default_rng(args.seed)
@@ -171,47 +165,29 @@ def main(argv: list[str] | None = None) -> int:
         sub.add_argument("--seed", type=cli.seed, default=0, help="seed of every random draw (default: %(default)s)")
         return sub
 
-    def add_executor(sub: argparse.ArgumentParser) -> None:
-        sub.add_argument(
-            "--workers", type=cli.positive(int), default=cli.cores(), help="number of processes (default: all cores)"
-        )
-        sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    numbers = [int(category) for category in Category]
+    metavar = f"{numbers[0]}..{numbers[-1]}"
 
-    def add_categories(sub: argparse.ArgumentParser) -> None:
-        numbers = [int(category) for category in Category]
-        metavar = f"{numbers[0]}..{numbers[-1]}"
-        sub.add_argument(
-            "--categories", type=int, nargs="+", choices=numbers, metavar=metavar, help="only these categories"
-        )
-
-    sub = add("collect", "label transitions with the centroidal optimiser; continues where it was stopped")
+    sub = add("collect", "draw and label whole sequences; continues where it was stopped")
     sub.add_argument("--out", type=Path, required=True, help="data set folder, new or begun")
     sub.add_argument(
-        "--samples", type=cli.positive(int), default=100_000, help="samples per category (default: %(default)s)"
+        "--samples", type=cli.positive(int), default=5000, help="labels of each category (default: %(default)s)"
     )
-    add_executor(sub)
+    sub.add_argument(
+        "--networks", type=Path, help="folder of networks that search as well (default: the robot's networks/, if any)"
+    )
+    sub.add_argument("--no-networks", action="store_true", help="search without networks")
+    sub.add_argument(
+        "--workers", type=cli.positive(int), default=cli.cores(), help="number of processes (default: all cores)"
+    )
+    sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
     sub.set_defaults(run=run_collect)
-
-    sub = add("enrich", "label transitions made of a data set's, mostly costly ones; continues where it was stopped")
-    sub.add_argument("--data", type=Path, required=True, help="data set folder")
-    sub.add_argument("--out", type=Path, required=True, help="data set folder for the result, new or begun")
-    sub.add_argument(
-        "--draws", type=cli.positive(int), default=200, help="draws per category and shard (default: %(default)s)"
-    )
-    sub.add_argument(
-        "--networks",
-        type=Path,
-        help="folder of networks: put transitions together from parts of several, instead of varying each, and label "
-        "what these networks call feasible and costly",
-    )
-    add_categories(sub)
-    add_executor(sub)
-    sub.set_defaults(run=run_enrich)
 
     sub = add("fit", "train a classifier and a regressor per category")
     sub.add_argument("--data", type=Path, required=True, nargs="+", help="data set folder, or several")
     sub.add_argument("--out", type=Path, help="folder for the networks (default: the robot's networks/)")
-    sub.add_argument("--epochs", type=cli.positive(int), default=120, help="epochs at most (default: %(default)s)")
+    sub.add_argument("--epochs", type=cli.positive(int), help="epochs at most (default: 120)")
+    sub.add_argument("--quick", action="store_true", help=f"train for {QUICK_EPOCHS} epochs, for a first look")
     sub.add_argument("--batch", type=cli.positive(int), default=512, help="samples per step (default: %(default)s)")
     sub.add_argument("--limit", type=cli.positive(int), help="transitions per category at most")
     sub.add_argument("--resume", action="store_true", help="keep what was trained with the same settings before a stop")
@@ -221,15 +197,11 @@ def main(argv: list[str] | None = None) -> int:
         default=4e-3,
         help="highest learning rate, at most 1 (default: %(default)s)",
     )
-    sub.add_argument(
-        "--sensitivity-weight",
-        type=cli.at_least_zero,
-        default=20.0,
-        help="weight of the derivatives in the loss (default: %(default)s)",
-    )
     sub.add_argument("--refine", action="store_true", help="train the regressors in --out further, keep classifiers")
     sub.add_argument("--keep-classifiers", action="store_true", help="keep the classifiers in --out, train regressors")
-    add_categories(sub)
+    sub.add_argument(
+        "--categories", type=int, nargs="+", choices=numbers, metavar=metavar, help="only these categories"
+    )
     sub.add_argument(
         "--workers", type=cli.positive(int), default=cli.cores(), help="number of threads (default: all cores)"
     )
@@ -237,7 +209,14 @@ def main(argv: list[str] | None = None) -> int:
     sub.set_defaults(run=run_fit)
 
     sub = add("evaluate", "score the networks on transitions that they have not seen")
-    sub.add_argument("--data", type=Path, required=True, help="data set collected with another seed")
+    sub.add_argument("--data", type=Path, required=True, help="data set folder")
+    splits = ["all", *(split.name.lower() for split in Split)]
+    sub.add_argument(
+        "--split",
+        choices=splits,
+        default="test",
+        help="which worlds of the data set; all of them only where the networks did not learn from it (default: test)",
+    )
     sub.add_argument("--networks", type=Path, help="folder of networks (default: the robot's networks/)")
     sub.add_argument(
         "--count", type=cli.positive(int), default=1000, help="transitions per category (default: %(default)s)"

@@ -33,7 +33,8 @@ def fresh(folder: Path, robot: RobotModel, *, count: int, seed: int, workers: in
         robot=robot.name,
         robots=str(robot.folder.parent.resolve()),
         seed=seed,
-        samples_per_category=4 * count,  # a bit less than half of them have the default timing
+        samples_per_category=2 * count,
+        paper_share=0.5,  # the paper's timing in as many transitions as the tables need
     )
     with executor(workers) as pool:
         collect(folder, robot, config, pool)

@@ -17,12 +17,12 @@ from toolkit.centroidal.body import (
     swing_ankles,
 )
 from toolkit.centroidal.build import initial_com, sequence_problem
-from toolkit.centroidal.leg_pieces import leg_limits
-from toolkit.centroidal.pieces import pieces
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion
+from toolkit.centroidal.program import leg_limits
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins, leg_clearances, leg_posture, leg_torques
 from toolkit.robot.loader import find_robots, load_robot
+from validation.reference.pieces import pieces
 
 
 @pytest.fixture(scope="module", params=find_robots())

@@ -8,11 +8,12 @@ import pytest
 from tests.centroidal.walks import foot, walk
 from toolkit.centroidal.body import body_residuals
 from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_problem
-from toolkit.centroidal.pieces import pieces
 from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.program import Landing, Program, Regularisers, wanted_friction
 from toolkit.centroidal.residual import check, confirmed, cop_margin
 from toolkit.centroidal.sequence import WANTED, WANTED_BODY, SequenceConfig, optimise
+from toolkit.centroidal.stages.method import Work, evaluate
+from toolkit.centroidal.stages.rows import prepare_contacts
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
@@ -20,6 +21,8 @@ from toolkit.errors import InputError
 from toolkit.geometry.limb import FEET, PALMS
 from toolkit.geometry.pose import Pose
 from toolkit.robot.loader import find_robots, load_robot
+from validation.reference.pieces import pieces
+from validation.reference.sequence import Reference
 
 
 @pytest.fixture(scope="module", params=find_robots())
@@ -174,19 +177,84 @@ def program(walker, request):
 def sample_point(program, rng):
     """A point near standing: lifted CoM, shared weight, small random changes."""
     layout, problem = program.layout, program.problem
-    x = np.zeros(layout.size)
-    for knot, first in enumerate(layout.offset):
-        x[first : first + 3] = problem.com - [0, 0, 0.05]
-        if knot < problem.steps:
-            for limb in np.flatnonzero(problem.active[knot]):
-                x[layout.wrench[knot, limb] + 2] = 1 / problem.active[knot].sum()
-    return x + 0.02 * rng.normal(size=len(x))
+    y = np.zeros((problem.steps + 1, layout.size.max()))
+    y[:, :3] = problem.com - [0, 0, 0.05]
+    step, limb = np.nonzero(problem.active)
+    y[step, layout.wrench[step, limb] + 2] = 1 / problem.active.sum(1)[step]
+    y += 0.02 * rng.normal(size=y.shape)
+    return np.where(np.arange(y.shape[1]) < layout.size[:, None], y, 0.0)
+
+
+def model_at(program, y, multiplier):
+    """The stage solver's model at y, with all multipliers alike: work arrays and objective."""
+    layout = program.layout
+    work = Work.of(len(layout.size), layout.states, y.shape[1])
+    prepare_contacts(program.blocks.contacts)
+    for block in program.blocks:
+        block.multiplier[:] = multiplier
+    value = evaluate(program.steps, program.prices, program.blocks, layout.size, y, work)
+    return work, value
+
+
+def test_the_solver_and_casadi_see_the_same_program(program):
+    """Objective, gradient, rows, their derivatives and the Hessian: two writings of one problem."""
+    reference, rng = Reference(program), np.random.default_rng(8)
+    functions, p = reference.assembly.functions(), reference.assembly.parameters
+    layout = program.layout
+    for _ in range(3):
+        y = sample_point(program, rng)
+        x, multiplier = reference.flat(y), rng.uniform(0.0, 2.0)
+        work, value = model_at(program, y, multiplier)
+        cost, gradient = functions["nlp_grad_f"](x, p)
+        assert value == pytest.approx(float(cost), rel=1e-9)
+        np.testing.assert_allclose(reference.flat(work.gradient), np.array(gradient).ravel(), rtol=1e-9, atol=1e-9)
+        rows, jacobian = (np.array(part) for part in functions["nlp_jac_g"](x, p))
+        first = 0
+        for block in program.blocks:
+            n, m = block.value.shape
+            at = first + np.arange(n * m).reshape(n, m)
+            np.testing.assert_allclose(block.value, rows[at, 0], atol=1e-9)
+            ours = np.zeros((n, m, len(x)))
+            index = reference.offset[block.stage][:, None] + block.variables
+            for i in range(n):
+                np.add.at(ours[i].T, index[i], block.slope[i].T)
+            np.testing.assert_allclose(ours, jacobian[at], rtol=1e-5, atol=1e-5)
+            first += n * m
+        dynamics = np.flatnonzero(reference.equal)[layout.states + 3 :]
+        defects = [work.defect[step, :12] for count in range(1, 5) for step in steps_with(program, count)]
+        if layout.moving:
+            defects += list(work.defect[:, 12:])
+        np.testing.assert_allclose(-np.concatenate(defects), rows[dynamics, 0], atol=1e-9)
+        following = [work.following[step, :12] for count in range(1, 5) for step in steps_with(program, count)]
+        numbers = [step for count in range(1, 5) for step in steps_with(program, count)]
+        if layout.moving:
+            following += list(work.following[:, 12:])
+            numbers += list(range(program.problem.steps))
+        row = 0
+        for step, slope in zip(numbers, following, strict=True):
+            size, begin = layout.size[step], reference.offset[step]
+            found = -jacobian[dynamics[row : row + len(slope)], begin : begin + size]
+            np.testing.assert_allclose(slope[:, :size], found, atol=1e-9)
+            row += len(slope)
+        lam = np.where(reference.equal, 0.0, -multiplier)
+        upper = np.array(functions["nlp_hess_l"](x, p, 1.0, lam))
+        hessian = upper + np.triu(upper, 1).T
+        for stage, (begin, size) in enumerate(zip(reference.offset, layout.size, strict=True)):
+            ours = np.tril(work.hessian[stage, :size, :size])
+            ours = ours + np.tril(ours, -1).T
+            theirs = hessian[begin : begin + size, begin : begin + size]
+            np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-5 * np.abs(theirs).max())
+
+
+def steps_with(program, count):
+    """Steps with so many contacts."""
+    return np.flatnonzero(np.diff(program.steps.first) == count)
 
 
 def test_derivatives_are_those_of_finite_differences(program):
-    rng = np.random.default_rng(8)
-    x, p = sample_point(program, rng), program.assembly.parameters
-    functions = program.assembly.functions()
+    reference, rng = Reference(program), np.random.default_rng(8)
+    x, p = reference.flat(sample_point(program, rng)), reference.assembly.parameters
+    functions = reference.assembly.functions()
     rows, jacobian = (np.array(part) for part in functions["nlp_jac_g"](x, p))
     gradient = np.array(functions["nlp_grad_f"](x, p)[1]).ravel()
     np.testing.assert_allclose(rows, np.array(functions["nlp_g"](x, p)), atol=1e-12)
@@ -202,10 +270,10 @@ def test_derivatives_are_those_of_finite_differences(program):
 
 def test_hessian_is_convex(program):
     """Gauss-Newton in the objective, and friction rows whose multipliers are not positive: no negative curvature."""
-    rng = np.random.default_rng(9)
-    x, p = sample_point(program, rng), program.assembly.parameters
-    multipliers = -rng.random(program.assembly.rows)
-    upper = np.array(program.assembly.functions()["nlp_hess_l"](x, p, 0.7, multipliers))
+    reference, rng = Reference(program), np.random.default_rng(9)
+    x, p = reference.flat(sample_point(program, rng)), reference.assembly.parameters
+    multipliers = -rng.random(reference.assembly.rows)
+    upper = np.array(reference.assembly.functions()["nlp_hess_l"](x, p, 0.7, multipliers))
     assert not np.tril(upper, -1).any()
     hessian = upper + np.triu(upper, 1).T
     assert np.linalg.eigvalsh(hessian)[0] > -1e-6 * np.abs(hessian).max()

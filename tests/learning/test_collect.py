@@ -21,7 +21,6 @@ from toolkit.learning.collect_config import CollectConfig
 from toolkit.learning.dataset import read_shard, shard_path
 from toolkit.learning.jobs import executor
 from toolkit.learning.samples import Samples
-from toolkit.learning.sensitivity import unknown_sensitivity
 from toolkit.prediction.features import feature_size
 from toolkit.robot.loader import load_robot
 
@@ -45,13 +44,15 @@ class InlineExecutor(Executor):
 def quick_shard(config, index):
     """A shard of random numbers instead of labels."""
     rng = np.random.default_rng([config.seed, index])
-    n = config.per_shard + int(rng.integers(3))
+    n = 2 * config.per_shard + int(rng.integers(3))
+    labelled = np.arange(n) < config.per_shard
     return {
         category: Samples(
             rng.normal(size=(n, feature_size(category))).astype(np.float32),
-            rng.random(n) < 0.6,
-            rng.normal(size=(n, 7)).astype(np.float32),
-            unknown_sensitivity(category, n),
+            labelled | (rng.random(n) < 0.3),
+            np.where(labelled[:, None], rng.normal(size=(n, 7)), np.nan).astype(np.float32),
+            rng.normal(size=(n, 3)).astype(np.float32),
+            np.full(n, index, np.int32),
         )
         for category in Category
     }
@@ -78,7 +79,9 @@ def test_an_interrupted_collection_goes_on_to_the_same_files(tmp_path, robot, co
     assert len(list(whole.glob("shard-*.npz"))) == config.shards == 5
     assert summary.resumed == 0 and config.samples_per_category <= summary.fewest
     shards = [read_shard(path) for path in whole.glob("shard-*.npz")]
-    assert summary.labelled == sum(len(group) for shard in shards for group in shard.values())
+    assert summary.samples == sum(len(group) for shard in shards for group in shard.values())
+    assert summary.labelled == sum(group.known.sum() for shard in shards for group in shard.values())
+    assert summary.labelled == 10 * config.samples_per_category
     assert summary.feasible == sum(group.feasible.sum() for shard in shards for group in shard.values())
     with pytest.raises(KeyboardInterrupt):
         collect(halting, robot, config, InlineExecutor(fail_at=3), ahead=1)
@@ -137,7 +140,7 @@ from toolkit.robot.loader import load_robot
 
 if __name__ == "__main__":
     robot = load_robot(None)
-    config = CollectConfig(robot=robot.name, seed=7, samples_per_category=24, per_shard=4)
+    config = CollectConfig(robot=robot.name, seed=7, samples_per_category=12, per_shard=2, expansions=(40, 60))
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         collect(Path(sys.argv[1]), robot, config, pool, ahead=2)
 """
@@ -175,7 +178,7 @@ def test_a_collection_killed_at_any_moment_goes_on_to_the_same_files(tmp_path):
 @pytest.mark.filterwarnings("ignore")  # of the cluster's own
 def test_a_cluster_makes_the_same_shards(tmp_path, robot):
     distributed = pytest.importorskip("distributed")
-    config = CollectConfig(robot=robot.name, seed=5, samples_per_category=12, per_shard=4)
+    config = CollectConfig(robot=robot.name, seed=5, samples_per_category=4, per_shard=2, expansions=(40, 60))
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         collect(tmp_path / "local", robot, config, pool)
     with (

@@ -19,8 +19,7 @@ from toolkit.learning.dataset import (
     write_shard,
 )
 from toolkit.learning.evaluate import balanced, score
-from toolkit.learning.samples import Samples
-from toolkit.learning.sensitivity import unknown_sensitivity
+from toolkit.learning.samples import PARTS, Samples, Split
 from toolkit.prediction.features import feature_size
 from toolkit.prediction.network import OBJECTIVE_SCALE, load_network, network_path, training_summary
 from toolkit.prediction.networks import NetworkEvaluator
@@ -88,8 +87,9 @@ def some_samples(rng, n=40):
     return Samples(
         rng.normal(size=(n, size)).astype(np.float32),
         feasible,
-        (rng.random((n, 7)) * feasible[:, None]).astype(np.float32),
-        unknown_sensitivity(CATEGORY, n),
+        np.where(feasible[:, None], rng.random((n, 7)), np.nan).astype(np.float32),
+        rng.normal(size=(n, 3)).astype(np.float32),
+        np.arange(n, dtype=np.int32),
     )
 
 
@@ -104,7 +104,9 @@ def data_set(folder, rng, fingerprint="abc"):
 def test_a_data_set_comes_back_in_order(tmp_path):
     groups = data_set(tmp_path, np.random.default_rng(2))
     samples = read_dataset(tmp_path, "abc")[CATEGORY]
-    np.testing.assert_array_equal(samples.features, np.concatenate([group.features for group in groups]))
+    for part in PARTS:
+        expected = np.concatenate([getattr(group, part) for group in groups])
+        np.testing.assert_array_equal(getattr(samples, part), expected)
     assert not list(tmp_path.glob("*.part"))
 
 
@@ -124,10 +126,23 @@ def test_a_broken_data_set_is_refused(tmp_path):
     write_shard(tmp_path, 1, {CATEGORY: group})
     with pytest.raises(DatasetError, match="NaN or infinite"):
         read_shard(path)
-    for name in ("features", "sensitivity"):
+    for name in ("features", "targets", "goal"):
         write_shard(tmp_path, 1, {CATEGORY: replace(group, **{name: getattr(group, name)[:, 1:]})})
         with pytest.raises(DatasetError, match="has shapes"):
             read_shard(path)
+    group = some_samples(np.random.default_rng(3))
+    write_shard(tmp_path, 1, {CATEGORY: replace(group, feasible=~group.feasible)})
+    with pytest.raises(DatasetError, match="outcomes of infeasible transitions"):
+        read_shard(path)
+
+
+def test_worlds_are_split_whole():
+    samples = some_samples(np.random.default_rng(4), 200)
+    parts = [samples.of(split) for split in Split]
+    assert sum(len(part) for part in parts) == 200
+    assert [len(part) for part in parts] == [160, 20, 20]
+    worlds = [set(part.world.tolist()) for part in parts]
+    assert not (worlds[0] & worlds[1] or worlds[0] & worlds[2] or worlds[1] & worlds[2])
 
 
 def test_a_balanced_test_set_keeps_a_quarter_of_each_label(saved):
@@ -168,7 +183,8 @@ def test_a_shard_of_other_types_is_refused(tmp_path, name, value):
         features=np.zeros((2, feature_size(CATEGORY)), np.float32),
         feasible=np.ones(2, bool),
         targets=np.zeros((2, 7), np.float32),
-        sensitivity=np.zeros((2, 1), np.float32),
+        goal=np.zeros((2, 3), np.float32),
+        world=np.zeros(2, np.int32),
     )
     np.savez(path, **{f"{key}_{int(CATEGORY)}": item for key, item in (arrays | {name: value}).items()})
     with pytest.raises(DatasetError, match="arrays of other types"):

@@ -51,20 +51,15 @@ def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
 
     # Few samples, made in this process; the commands themselves are as they are.
     monkeypatch.setattr(train, "executor", lambda workers, cluster: ThreadPoolExecutor(1))
-    monkeypatch.setattr(train, "CollectConfig", partial(CollectConfig, per_shard=30, default_share=0.7))
+    monkeypatch.setattr(train, "CollectConfig", partial(CollectConfig, per_shard=20, paper_share=0.8, most_worlds=30))
     monkeypatch.setattr(fit, "MINIMUM", 3)
-    data, rich, mixed = (str(tmp_path / folder) for folder in ("data", "rich", "mixed"))
-    assert trained("collect", "--out", data, "--samples", "30") == 0
+    data = str(tmp_path / "data")
+    assert trained("collect", "--out", data, "--samples", "20") == 0
     samples = read_dataset(tmp_path / "data", robot.fingerprint)
-    assert list(samples) == categories and min(len(group) for group in samples.values()) >= 30
-    assert trained("enrich", "--data", data, "--out", rich, "--draws", "6") == 0
-    more = read_dataset(tmp_path / "rich", robot.fingerprint)
-    assert list(more) == categories and sum(len(group) for group in more.values()) > 0
-    assert trained("fit", "--data", data, rich, "--epochs", "2") == 0
+    assert list(samples) == categories and min(group.known.sum() for group in samples.values()) >= 20
+    assert trained("fit", "--data", data, "--epochs", "2") == 0
     assert list(load_networks(robot)) == categories
-    networks = str(robot.folder / "networks")
-    assert trained("enrich", "--data", data, "--out", mixed, "--draws", "3", "--networks", networks) == 0
-    assert trained("evaluate", "--data", data, "--count", "20") == 0
+    assert trained("evaluate", "--data", data, "--count", "20", "--split", "all") == 0
     assert planned("learned") in (0, 1)  # what so little training says of a plan is open
     for group in samples.values():
         assert np.isfinite(group.features).all()

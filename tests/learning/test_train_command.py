@@ -55,14 +55,14 @@ def test_regressors_are_refined(dataset, tmp_path):
     fit(dataset, tmp_path)
     robot = load_robot(None)
     before = load_network(tmp_path / "category_0.safetensors", Category.MOVE_FOOT, robot.fingerprint)
-    fit(dataset, tmp_path, "--refine", "--learning-rate", "1e-9", "--sensitivity-weight", "2", "--batch", "64")
+    fit(dataset, tmp_path, "--refine", "--learning-rate", "1e-9", "--batch", "64")
     after = load_network(tmp_path / "category_0.safetensors", Category.MOVE_FOOT, robot.fingerprint)
     # With a step size of nothing the network is what it was, through scaling and back in single precision.
     features = samples(50, seed=3).features
     np.testing.assert_allclose(after.predict(features), before.predict(features), rtol=1e-3, atol=1e-3)
     np.testing.assert_array_equal(before.classifier.weights[0], after.classifier.weights[0])
     config = training_summary(after)["config"]
-    assert config["sensitivity_weight"] == 2.0 and config["batch"] == 64
+    assert config["batch"] == 64
     assert training_summary(after)["config_before"] == training_summary(before)["config"]
 
 
@@ -75,9 +75,9 @@ def test_a_device_that_is_not_there_is_refused(dataset, tmp_path):
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
-        ("--sensitivity-weight", "inf", "not finite"),
-        ("--sensitivity-weight", "nan", "not finite"),
-        ("--sensitivity-weight", "-5", "below zero"),
+        ("--learning-rate", "inf", "not above zero"),
+        ("--learning-rate", "nan", "not above zero"),
+        ("--learning-rate", "-5", "not above zero"),
         ("--learning-rate", "1e300", "above 1"),
         ("--seed", "9" * 23, "give a whole number"),
         ("--seed", "-1", "give a whole number"),

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.oracles.leg import angles_of, chain, torques
-from toolkit.centroidal.pieces import pieces
 from toolkit.compiled import compiled
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.physics.leg import ReachMargins, leg_clearances, leg_posture, leg_torques, posture_between
 from toolkit.robot.loader import find_robots, load_robot
+from validation.reference.pieces import pieces
 
 
 @pytest.fixture(scope="module", params=find_robots())

@@ -3,38 +3,27 @@
 import numpy as np
 import pytest
 
-from tests.centroidal.conftest import NumbersOnlyRobot
-from toolkit.centroidal import fast
-from toolkit.centroidal.build import initial_com, transition_problem
+from tests.conftest import sole
+from toolkit.centroidal.build import initial_com
+from toolkit.centroidal.sequence import optimise_transition
 from toolkit.contacts.sequence import ContactTransition
-from toolkit.contacts.stance import Contact, Stance
+from toolkit.contacts.stance import Stance
 from toolkit.geometry.limb import Limb
-from toolkit.geometry.pose import Pose
 from toolkit.prediction.optimiser import OptimiserEvaluator
 
 
 @pytest.fixture
-def robot():
-    return NumbersOnlyRobot()
-
-
-def foot(limb, x):
-    y = 0.1 if limb.is_left else -0.1
-    return Contact(limb, Pose.from_yaw(np.array([x, y, 0.0]), 0.0), 0.5)
-
-
-@pytest.fixture
-def stance():
-    return Stance((foot(Limb.LEFT_FOOT, 0.0), foot(Limb.RIGHT_FOOT, 0.0)))
+def stance(robot):
+    return Stance((sole(robot, Limb.LEFT_FOOT), sole(robot, Limb.RIGHT_FOOT)))
 
 
 def test_transitions_are_judged_in_order(robot, stance):
     com, velocity = initial_com(robot, stance), np.array([0.1, 0.0, 0.0])
-    transitions = [ContactTransition(Limb.LEFT_FOOT, foot(Limb.LEFT_FOOT, x)) for x in (0.2, 1.6, 0.3)]
+    transitions = [ContactTransition(Limb.LEFT_FOOT, sole(robot, Limb.LEFT_FOOT, x)) for x in (0.2, 1.6, 0.3)]
     batch = OptimiserEvaluator(robot).evaluate(stance, com, velocity, transitions)
     np.testing.assert_array_equal(batch.feasible, [True, False, True])
     assert batch.objective[1] == np.inf
-    motion = fast.solve(transition_problem(robot, stance, com, velocity, transitions[2]))
+    motion = optimise_transition(robot, stance, com, velocity, transitions[2])
     np.testing.assert_allclose(batch.objective[2], motion.objective, rtol=1e-12)
     np.testing.assert_allclose(batch.com[2], motion.com[-1], rtol=1e-12)
     np.testing.assert_allclose(batch.com_velocity[2], motion.linear_momentum[-1] / robot.mass, atol=1e-12)
@@ -42,7 +31,7 @@ def test_transitions_are_judged_in_order(robot, stance):
 
 def test_rest_at_the_end_can_be_asked_for(robot, stance):
     com, velocity = initial_com(robot, stance), np.array([0.2, 0.0, 0.0])
-    transitions = [ContactTransition(Limb.LEFT_FOOT, foot(Limb.LEFT_FOOT, 0.2))]
+    transitions = [ContactTransition(Limb.LEFT_FOOT, sole(robot, Limb.LEFT_FOOT, 0.2))]
     batch = OptimiserEvaluator(robot, final_at_rest=True).evaluate(stance, com, velocity, transitions)
     assert batch.feasible.all()
     np.testing.assert_allclose(batch.com_velocity, 0.0, atol=1e-6)  # the residual check's tolerance

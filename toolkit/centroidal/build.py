@@ -52,6 +52,11 @@ class ProblemConfig:
     weights: Weights = field(default_factory=Weights)
     margins: Margins = field(default_factory=Margins)
 
+    def steps_of(self, duration: float) -> int:
+        """Number of steps of a phase that lasts so many s."""
+        most = int(duration / self.min_dt + 1e-9) if self.min_dt > 0.0 else self.steps
+        return max(min(self.steps, most), math.ceil(duration / self.max_dt - 1e-9), 1)
+
 
 def initial_com(robot: RobotModel, stance: Stance) -> np.ndarray:
     """(3,) m; the CoM of a robot standing at rest: home height above the mean of the feet."""
@@ -68,7 +73,7 @@ def transition_problem(
     config: ProblemConfig | None = None,
     final_at_rest: bool = False,
 ) -> CentroidalProblem:
-    """Problem of one contact transition: `config.steps` equal steps of shift, as many of swing.
+    """Problem of one contact transition: equal steps of shift, then equal steps of swing.
 
     The last knot must be within reach of the new contact too.
 
@@ -88,18 +93,19 @@ def transition_problem(
     timing = transition.timing
     if not (timing.shift > 0.0 and timing.swing > 0.0):
         raise InputError(f"transition timing must be positive, got shift {timing.shift} s and swing {timing.swing} s")
-    n = config.steps
     before, after = stance.contacts, transition.apply(stance).contacts
-    dt = np.empty(2 * n)
-    dt[:n], dt[n:] = timing.shift / n, timing.swing / n
+    lift, swing = config.steps_of(timing.shift), config.steps_of(timing.swing)
+    n = lift + swing
+    dt = np.empty(n)
+    dt[:lift], dt[lift:] = timing.shift / lift, timing.swing / swing
     # A moving foot turns the heading from the mean of the old feet to the mean of the new ones.
     start, end = _heading(before), _heading(after)
-    yaw = np.empty(2 * n + 1)
-    yaw[: n + 1] = start
-    yaw[n + 1 :] = start + wrapped(end - start) / n * np.arange(1, n + 1)
-    arrays = _contact_arrays(2 * n)
+    yaw = np.empty(n + 1)
+    yaw[: lift + 1] = start
+    yaw[lift + 1 :] = start + wrapped(end - start) / swing * np.arange(1, swing + 1)
+    arrays = _contact_arrays(n)
     for contact in before:
-        _put(arrays, contact, 0, n if contact.limb == transition.limb else 2 * n)
+        _put(arrays, contact, 0, lift if contact.limb == transition.limb else n)
     return _problem(robot, config, arrays, dt, yaw, com, com_velocity, after, final_at_rest, landing=transition.contact)
 
 
@@ -128,10 +134,7 @@ def sequence_problem(
     last = phases[-1].contacts
     if [contact.limb for contact in last[:2]] != list(FEET):
         raise InputError("a schedule must end with both feet in contact: give it a final rest longer than 0 s")
-    counts = []
-    for phase in phases:
-        most = int(phase.duration / config.min_dt + 1e-9) if config.min_dt > 0.0 else config.steps
-        counts.append(max(min(config.steps, most), math.ceil(phase.duration / config.max_dt - 1e-9), 1))
+    counts = [config.steps_of(phase.duration) for phase in phases]
     total = sum(counts)
     dt, yaw = np.empty(total), np.empty(total + 1)
     arrays = _contact_arrays(total)

@@ -1,8 +1,8 @@
-"""The whole-sequence problem as an optimal-control program: stages of states and controls.
+"""The centroidal problem as an optimal-control program: stages of states and controls.
 
 Stage t has the state at knot t, the wrench and two slacks of each contact of step t, and the excess and the body's
-slack of the step. The last stage has a state and the body's slack. The rows of stage t are the dynamics to knot t + 1,
-then its other constraints.
+slack of the step. The last stage has a state and the body's slack. See `stages.steps` and `stages.rows` for the
+variables and their units.
 """
 
 from __future__ import annotations
@@ -12,24 +12,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.blocks import Assembly, Block, Piece
 from toolkit.centroidal.body import BodyMargins, knot_contacts, lowest_foot, mean_feet, swing_ankles
-from toolkit.centroidal.leg_pieces import leg_limits
-from toolkit.centroidal.pieces import CONTACT, SLACKS, STATE, WRENCH, G, pieces
-from toolkit.centroidal.problem import CentroidalProblem, Margins
+from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalProblem, Margins
+from toolkit.centroidal.stages.blocks import Block
+from toolkit.centroidal.stages.method import Blocks, Prices
+from toolkit.centroidal.stages.rows import (
+    CONTACT_ROWS,
+    DISTANCE_ROWS,
+    EVEN,
+    FINAL_ROWS,
+    LEG_ROWS,
+    MARGINS,
+    TORQUE_ROWS,
+)
+from toolkit.centroidal.stages.steps import STATE, WRENCH, Steps
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z, steepness
-from toolkit.physics.leg import TORQUE_ROLES
-from toolkit.robot.model import RobotModel
+from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins
+from toolkit.robot.model import LegGeometry, RobotModel
 
-OPEN = 1e3  # bound of rows that are left free
 # Margins that plans keep unless nothing else is feasible: without them, slides and tilts cannot be corrected.
 LEAST = Margins(friction=0.96, cop=(0.01, 0.01), yaw=0.95)
 SCALE = 1e-2  # factor on the objective inside the program
 # Where a foot at rest already uses more of its friction than the wanted margin leaves, it may use `RESERVE` more than
 # at rest, at most `FULL`. Otherwise the motion would lean and run to spare friction, which is less safe.
 RESERVE, FULL = 0.1, 0.9
+CONTACT = WRENCH + 2  # variables of a contact: its wrench and its slacks
+SLACKS = 2  # of a step: its excess and the body's slack
 PAIRS = len(FEET) + 1  # one for each foot's contact, and one for the contact that the foot in the air has left
+AIR = len(FEET)
+NARROW, STIFF = 1e-6, 1e12  # m and its price; a landing point with less room along an axis does not move along it
 
 
 @dataclass(frozen=True)
@@ -85,52 +97,45 @@ class Landing:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things are in the vector of variables.
+    """Where things are among the variables of a stage.
 
     Attributes:
-        offset: (N + 1,) first variable of each stage.
+        size: (N + 1,) number of variables of each stage.
+        states: How many of them are states.
         wrench: (N, 4) first variable of a limb's wrench; -1 where not active.
         slack: (N + 1, 2) variables of the excess and of the body's slack; at the last knot both are the body's.
         landing: (N,) first variable of a landing point that is chosen in a step; -1 where none is.
-        states: (N + 1,) numbers of state variables.
-        size: Number of variables.
         moving: Whether contacts are displaced by variables.
     """
 
-    offset: np.ndarray
+    size: np.ndarray
+    states: int
     wrench: np.ndarray
     slack: np.ndarray
     landing: np.ndarray
-    states: np.ndarray
-    size: int
     moving: bool
 
     @classmethod
     def of(cls, active: np.ndarray, landings: Sequence[int] | None = None) -> Layout:
         """Layout for (N, 4) active contacts; `landings` are the steps that choose a landing point, None for none."""
         moving = landings is not None
-        count = active.sum(1)
+        states = STATE + 2 * PAIRS * moving
+        after = states + CONTACT * active.sum(1)
         chooses = np.zeros(len(active), bool)
         chooses[list(landings or ())] = True
-        controls = np.append(CONTACT * count + SLACKS + 2 * chooses, 1)
-        states = np.full(len(controls), STATE + 2 * PAIRS * moving)
-        offset = np.concatenate([[0], np.cumsum(states + controls)[:-1]])
-        rank = np.cumsum(active, 1) - 1
-        first = offset + states
-        wrench = np.where(active, first[:-1, None] + CONTACT * rank, -1)
-        slack = (first[:-1] + CONTACT * count)[:, None] + np.arange(SLACKS)
-        slack = np.concatenate([slack, np.full((1, SLACKS), first[-1])])
-        landing = np.where(chooses, first[:-1] + CONTACT * count + SLACKS, -1)
-        return cls(offset, wrench, slack, landing, states, int((states + controls).sum()), moving)
+        size = np.append(after + SLACKS + 2 * chooses, states + 1)
+        wrench = np.where(active, states + CONTACT * (np.cumsum(active, 1) - 1), -1)
+        slack = np.concatenate([after[:, None] + np.arange(SLACKS), np.full((1, SLACKS), states)])
+        return cls(size, states, wrench, slack, np.where(chooses, after + SLACKS, -1), moving)
 
-    def pair(self, knot: np.ndarray, which: int | np.ndarray) -> np.ndarray:
-        """(n, 2) variables at (n,) knots of the displacement of a foot's contact, or of the one left (len(FEET))."""
-        return indices(self.offset[knot] + STATE + 2 * np.asarray(which), 2)
+    def pair(self, which: int | np.ndarray) -> np.ndarray:
+        """(..., 2) variables of the displacement of a foot's contact, or of the one left (`AIR`), in any stage."""
+        return indices(STATE + 2 * np.asarray(which), 2)
 
 
 def indices(first: np.ndarray, size: int) -> np.ndarray:
-    """(n, size) consecutive indices from (n,) first ones."""
-    return first[:, None] + np.arange(size)
+    """(..., size) consecutive indices from first ones."""
+    return np.asarray(first)[..., None] + np.arange(size)
 
 
 class Program:
@@ -142,6 +147,12 @@ class Program:
         body: Wanted margins of the body.
         regularisers: Weights of the regularisers.
         landings: Where contacts may move; None where they stay.
+
+    Attributes:
+        layout: Where the variables are.
+        steps: Dynamics and momentum objective.
+        prices: Prices of single variables.
+        blocks: Constraints.
     """
 
     def __init__(
@@ -152,267 +163,246 @@ class Program:
         regularisers: Regularisers,
         landings: Sequence[Landing] | None = None,
     ):
-        self.problem, self.robot, self.body, self.regularisers = problem, robot, body, regularisers
-        self.landings = landings
+        self.problem, self.robot, self._body, self._regularisers = problem, robot, body, regularisers
+        self._landings = list(landings or ())
         self.layout = Layout.of(problem.active, None if landings is None else [item.step for item in landings])
-        self._pieces = pieces(self.layout.moving)
-        self.path_rows = np.zeros(problem.steps + 1, int)
-        self._parts: list[tuple[Piece, np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
-        self._carried: list[tuple[int, np.ndarray]] = []
-        self._bounds: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._heading = rotation_about_z(problem.yaw)
         self._middle_heading = rotation_about_z((problem.yaw[:-1] + problem.yaw[1:]) / 2)
-        self._add_edges()
-        self._add_contacts()
-        self._add_body()
-        self._add_slacks()
-        self._add_landings()
-        self._finish()
+        self._weight = problem.mass * STANDARD_GRAVITY
+        self._knot_contacts = knot_contacts(problem)
+        self.steps = self._steps()
+        self.prices = self._prices()
+        self.blocks = Blocks(
+            self._contacts(),
+            self._legs(),
+            self._torques(),
+            self._distances(),
+            self._heights(),
+            self._final(),
+            self._bounds(),
+        )
 
-    def _add(self, piece: Piece, stage: np.ndarray, variables: np.ndarray, *columns: np.ndarray) -> np.ndarray:
-        """Enter a piece at stages, each at most once; returns the (n, rows) rows counted from the stage's first."""
-        n = len(stage)
-        rows = self.path_rows[stage][:, None] + np.arange(piece.rows)
-        self.path_rows[stage] += piece.rows
-        shaped = [np.reshape(column, (n, -1) if np.size(column) else (n, 0)) for column in columns]
-        parameters = np.concatenate(shaped, 1)
-        self._parts.append((piece, stage, variables, rows, parameters))
-        return rows
+    def finite(self) -> bool:
+        """Whether all numbers of the program are finite."""
+        arrays = [block.parameters for block in self.blocks] + [self.steps.rotation, self.steps.position, self.steps.dt]
+        return all(np.isfinite(array).all() for array in arrays)
 
-    def _state(self, knot: np.ndarray, *parts: slice) -> np.ndarray:
-        """Variables of parts of the states at knots."""
-        index = np.concatenate([np.arange(STATE)[part] for part in parts or (slice(None),)])
-        return self.layout.offset[knot][:, None] + index
+    def _steps(self) -> Steps:
+        """Dynamics and momentum objective of the steps."""
+        p, w, reg, layout = self.problem, self.problem.weights, self._regularisers, self.layout
+        step, limb = np.nonzero(p.active)
+        duration = p.dt / 0.2
+        momenta = w.linear_momentum, w.linear_momentum_rate, w.angular_momentum, w.angular_momentum_rate
+        squares = [weight * p.mass**2 * duration for weight in momenta]
+        squares = np.stack([*squares, reg.jerk / (0.2 * np.maximum(p.dt, 0.02)), reg.height * duration], 1)
+        squares[0, 4] *= not np.any(p.com_velocity)  # the acceleration before a start in motion is unknown
+        height = mean_feet(p)[:, 2] + (p.final_center[2] - p.position[-1, :2, 2].mean())
+        source = np.zeros((p.steps, 0), np.int64)
+        pair = np.full(len(step), -1)
+        if layout.moving:
+            pair = np.where(limb < len(FEET), STATE + 2 * limb, -1)
+            source = np.tile(np.arange(STATE, layout.states), (p.steps, 1))
+            for item in self._landings:
+                source[item.step, 2 * AIR : 2 * AIR + 2] = layout.pair(item.limb)
+                source[item.step, 2 * item.limb : 2 * item.limb + 2] = layout.landing[item.step] + np.arange(2)
+        return Steps(
+            dt=np.ascontiguousarray(p.dt, float),
+            first=np.searchsorted(step, np.arange(p.steps + 1)),
+            wrench=layout.wrench[step, limb],
+            pair=pair,
+            rotation=np.ascontiguousarray(p.rotation[step, limb]),
+            position=np.ascontiguousarray(p.position[step, limb]),
+            weights=SCALE * squares,
+            height=np.ascontiguousarray(height[1:]),
+            source=source,
+        )
 
-    def _add_edges(self) -> None:
-        """Initial state and final conditions."""
-        p, reg = self.problem, self.regularisers
-        n = p.steps
-        first, last = np.array([0]), np.array([n])
-        initial = np.concatenate([p.com, p.com_velocity, p.angular_momentum / p.mass, np.zeros(3)])
-        rows = self._add(self._pieces["initial"], first, self._state(first), initial[None])
-        self._bounds.append((first, rows, np.zeros((STATE, 2))))
-        weights = np.sqrt(SCALE * np.array([reg.final_center, reg.final_acceleration, reg.final_spin]))
-        yaw = p.yaw[-1]
-        columns = np.concatenate([p.final_center, [np.cos(yaw), np.sin(yaw)], weights])
-        variables, tangents = self._state(last), np.zeros((1, 0))
-        if self.layout.moving:
-            variables = np.concatenate([variables, *(self.layout.pair(last, foot) for foot in FEET)], 1)
-            tangents = np.concatenate([p.rotation[-1, foot, :, :2] / 2 for foot in FEET], 1).reshape(1, 12)
-        rows = self._add(self._pieces["final"], last, variables, columns[None], tangents)
-        speed = 0.0 if p.final_at_rest else OPEN
-        bound = np.concatenate([np.full(3, speed), p.final_half_size])
-        self._bounds.append((last, rows, np.stack([-bound, bound], 1)))
+    def _slack_price(self) -> np.ndarray:
+        """(N,) price of a slack in each step."""
+        return SCALE * self._regularisers.slack * self.problem.dt / 0.2
 
-    def _add_contacts(self) -> None:
+    def _prices(self) -> Prices:
+        """Prices of the excess, the body's slack and of landing points."""
+        n, price, slack = self.problem.steps, self._slack_price(), self.layout.slack
+        stage = np.concatenate([np.arange(n), np.arange(n + 1)])
+        linear = np.concatenate([self._regularisers.excess * price, price, price[-1:]])
+        variable = np.concatenate([slack[:-1, 0], slack[:, 1]])
+        at = np.repeat([item.step for item in self._landings], 2).astype(int)
+        moved = indices(self.layout.landing[at[::2]], 2).ravel()
+        room = [np.subtract(item.upper, item.lower) for item in self._landings]
+        narrow = np.reshape(room, len(at)) < NARROW
+        return Prices(
+            np.concatenate([stage, at]),
+            np.concatenate([variable, moved]),
+            np.concatenate([linear, np.zeros(len(at))]),
+            np.concatenate([EVEN * linear, np.where(narrow, STIFF, SCALE * self._regularisers.landing)]),
+        )
+
+    def _contacts(self) -> Block:
         """Cones of the contacts."""
-        p, w, reg = self.problem, self.problem.weights, self.regularisers
-        duration = SCALE * p.dt / 0.2
-        weight = p.mass * G
-        cop_margin, price = p.half_size - p.reduced_half_size, self._price()
-        for limb in range(4):
-            step = np.flatnonzero(p.active[:, limb])
-            if not len(step):
-                continue
-            on = p.active[:, limb]
-            made = np.concatenate([[False], on[1:] & ~on[:-1]])[step]
-            broken = np.concatenate([on[:-1] & ~on[1:], [False]])[step]
-            if Limb(limb).is_foot:
-                press, force, usual = np.where(made | broken, reg.load, 0.0), 0.0, 1.0
-            else:
-                press = np.full(len(step), reg.palm)
-                force = usual = reg.palm_force
-            squares = [np.full(len(step), value) for value in (w.force, w.lateral_force, w.torque * weight**2)]
-            squares += [np.full(len(step), w.cop), np.full(len(step), reg.cop / usual**2), press]
-            weights = np.sqrt(duration[step, None] * np.stack(squares, 1))
-            wanted = np.array([p.margins.friction, *cop_margin[limb], p.margins.yaw])
-            least = np.array([LEAST.friction, *np.minimum(LEAST.cop, cop_margin[limb]), LEAST.yaw])
-            least[[0, 3]] = np.maximum(least[[0, 3]], wanted[[0, 3]])
-            wrench = indices(self.layout.wrench[step, limb], CONTACT)
-            variables = np.concatenate([wrench, self.layout.slack[step, :1]], 1)
-            fixed = np.tile(np.concatenate([p.half_size[limb], wanted, least]), (len(step), 1))
-            if Limb(limb).is_foot:
-                fixed[:, 2] = wanted_friction(p, step, limb)
-            wanted_force = np.full(len(step), force)
-            self._add(
-                self._pieces["contact"],
-                step,
-                variables,
-                p.friction[step, limb],
-                fixed,
-                weights,
-                wanted_force,
-                price[step],
-            )
+        p, w, reg = self.problem, self.problem.weights, self._regularisers
+        step, limb = np.nonzero(p.active)
+        foot = limb < len(FEET)
+        on = np.pad(p.active, ((1, 1), (0, 0)), constant_values=True)
+        changes = (p.active & (~on[:-2] | ~on[2:]))[step, limb]
+        usual = np.where(foot, 1.0, reg.palm_force)
+        press = np.where(foot, np.where(changes, reg.load, 0.0), reg.palm)
+        squares = np.empty((len(step), 6))
+        squares[:, :4] = w.force, w.lateral_force, w.torque * self._weight**2, w.cop
+        squares[:, 4], squares[:, 5] = reg.cop / usual**2, press
+        weights = np.sqrt(SCALE * p.dt[step, None] / 0.2 * squares)
+        cop = (p.half_size - p.reduced_half_size)[limb]
+        friction = np.full(len(step), p.margins.friction)
+        friction[foot] = wanted_friction(p, step[foot], limb[foot])
+        yaw = np.full(len(step), p.margins.yaw)
+        wanted = np.column_stack([friction, cop, yaw])
+        least = np.tile([LEAST.friction, *LEAST.cop, LEAST.yaw], (len(step), 1))
+        least[:, 1:3] = np.minimum(least[:, 1:3], cop)
+        least[:, 0] = np.maximum(LEAST.friction, p.margins.friction)
+        least[:, 3] = np.maximum(LEAST.yaw, yaw)
+        load, price = np.where(foot, 0.0, reg.palm_force), self._slack_price()[step]
+        mu = p.friction[step, limb]
+        parameters = np.column_stack([mu, p.half_size[limb], wanted, least, weights, load, price])
+        wrench = indices(self.layout.wrench[step, limb], CONTACT)
+        return Block.of(step, np.column_stack([wrench, self.layout.slack[step, 0]]), parameters, CONTACT_ROWS)
 
-    def _add_body(self) -> None:
-        """Limits of legs and arms."""
-        p, body, layout = self.problem, self.body, self.layout
-        knots, limbs, positions, rotations = knot_contacts(p)
-        swing_knots, delays, swing_limbs, tips, tangents = swing_ankles(p)
-        weight = p.mass * G
-        com = slice(0, 3)
+    def _legs(self) -> Block:
+        """Limits of stance legs at the knots."""
+        knots, limbs, positions, rotations = self._knot_contacts
+        com, slack, parts = np.arange(3), self.layout.slack, []
         for limb in FEET:
             leg = self.robot.legs[limb]
-            hip = self._heading @ leg.hip_in_com
-            here = limbs == limb
-            at = knots[here]
-            variables = np.concatenate([self._state(at, com), layout.slack[at, 1:], self._moved(at, limb)], 1)
-            rotation = rotations[here]
+            here = np.flatnonzero(limbs == limb)
+            at, rotation = knots[here], rotations[here]
             ankle = positions[here] + rotation @ leg.ankle_in_sole
-            links = np.tile([leg.thigh, leg.shin], (len(at), 1))
-            posture = (hip[at], ankle, rotation, links)
-            self._add(self._pieces["leg"], at, variables, *posture, np.tile(leg_limits(leg, body), (len(at), 1)))
+            hip = (self._heading @ leg.hip_in_com)[at]
+            limits = np.tile(leg_limits(leg, self._body), (len(at), 1))
+            posture = [hip, ankle, rotation.reshape(-1, 9), np.tile([leg.thigh, leg.shin], (len(at), 1)), limits]
+            variables = [np.tile(com, (len(at), 1)), slack[at, 1:], self._moved(at, limb)]
+            parts.append((at, np.column_stack(variables), np.column_stack(posture)))
+        return _joined(parts, LEG_ROWS)
 
-            step = np.flatnonzero(p.active[:, limb])
-            wrench = indices(layout.wrench[step, limb], WRENCH)
-            variables = [self._state(step, com, slice(3, 6)), wrench, layout.slack[step, 1:], self._moved(step, limb)]
-            variables = np.concatenate(variables, 1)
+    def _torques(self) -> Block:
+        """Joint torques of stance legs in the middle of the steps."""
+        p, parts = self.problem, []
+        for limb in FEET:
+            leg, step = self.robot.legs[limb], np.flatnonzero(p.active[:, limb])
             sole, rotation = p.position[step, limb], p.rotation[step, limb]
-            limits = np.array([leg.torques[role] for role in TORQUE_ROLES]) / weight
-            posture = (self._middle_heading[step] @ leg.hip_in_com, sole + rotation @ leg.ankle_in_sole, rotation)
-            fixed = np.tile(np.append(limits, body.torque), (len(step), 1))
-            links = np.tile([leg.thigh, leg.shin], (len(step), 1))
-            # order of the piece: half of dt, posture, sole, limits
-            self._add(self._pieces["torque"], step, variables, p.dt[step] / 2, *posture, links, sole, fixed)
+            fixed = [leg.thigh, leg.shin], [leg.torques[role] / self._weight for role in TORQUE_ROLES]
+            links, limits = (np.tile(item, (len(step), 1)) for item in fixed)
+            parameters = [
+                p.dt[step] / 2,
+                (self._middle_heading @ leg.hip_in_com)[step],
+                sole + rotation @ leg.ankle_in_sole,
+                rotation.reshape(-1, 9),
+                links,
+                sole,
+                limits,
+                np.full(len(step), self._body.torque),
+            ]
+            wrench = indices(self.layout.wrench[step, limb], WRENCH)
+            variables = [np.tile(np.arange(6), (len(step), 1)), wrench, self.layout.slack[step, 1:]]
+            variables.append(self._moved(step, limb))
+            parts.append((step, np.column_stack(variables), np.column_stack(parameters)))
+        return _joined(parts, TORQUE_ROWS)
 
-            for late in (False, True):  # `_add` takes each stage once
-                here = (swing_limbs == limb) & ((delays > 0.0) == late)
-                at, ends = swing_knots[here], tangents[here]
-                self._add_distance(at, delays[here], hip[at], tips[here], 0.0, leg.max_length, limb, ends)
-        for limb in (Limb.LEFT_PALM, Limb.RIGHT_PALM):
+    def _distances(self) -> Block:
+        """Lengths of legs whose foot is in the air, and of arms in contact."""
+        parts = []
+        knots, delays, limbs, tips, tangents = swing_ankles(self.problem)
+        for limb in FEET:
+            leg, here = self.robot.legs[limb], limbs == limb
+            root = (self._heading @ leg.hip_in_com)[knots[here]]
+            span = 0.0, leg.max_length
+            parts.append(self._distance(knots[here], delays[here], root, tips[here], span, limb, tangents[here]))
+        knots, limbs, tips, _ = self._knot_contacts
+        for limb, arm in self.robot.arms.items():
             here = limbs == limb
-            if here.any():
-                arm = self.robot.arms[limb]
-                shoulder = self._heading[knots[here]] @ arm.shoulder_in_com
-                now, reach = np.zeros(here.sum()), (arm.min_reach, arm.max_reach)
-                self._add_distance(knots[here], now, shoulder, positions[here], *reach)
-        floor, lowest = lowest_foot(p)
-        at = np.flatnonzero(np.isfinite(floor))
-        variables = np.concatenate([self._state(at, slice(2, 3)), layout.slack[at, 1:], self._moved(at, lowest[at])], 1)
-        least, rises = floor[at] + p.min_height, np.zeros((len(at), 0))
-        if layout.moving:
-            rises = p.rotation[np.minimum(at, p.steps - 1), lowest[at], 2, :2]
-        self._add(self._pieces["height"], at, variables, least, np.full(len(at), body.height), rises)
+            root, span = (self._heading @ arm.shoulder_in_com)[knots[here]], (arm.min_reach, arm.max_reach)
+            none = np.zeros((here.sum(), 3, 4))
+            parts.append(self._distance(knots[here], np.zeros(here.sum()), root, tips[here], span, FEET[0], none))
+        return _joined(parts, DISTANCE_ROWS)
 
-    def _moved(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
-        """(n, 2) variables that displace a foot's contact at knots; (n, 0) where contacts stay."""
-        return self.layout.pair(knot, foot) if self.layout.moving else np.zeros((len(knot), 0), int)
-
-    def _add_distance(
+    def _distance(
         self,
         knot: np.ndarray,
         delay: np.ndarray,
         root: np.ndarray,
         tip: np.ndarray,
-        lower: float,
-        upper: float,
-        foot: Limb = FEET[0],
-        tangents: np.ndarray | None = None,
-    ) -> None:
-        """Bounds on the distance from a root to a tip `delay` s after knots; `tangents` as in the piece."""
-        if not len(knot):
-            return
-        variables = [self._state(knot, slice(0, 6)), self.layout.slack[knot, 1:]]
-        columns = [delay, root, tip, np.tile([lower, upper, self.body.length], (len(knot), 1))]
+        span: tuple[float, float],
+        foot: Limb,
+        tangents: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Stages, variables and parameters of bounds on the distance from roots to tips; see `rows.fill_distances`."""
+        n, layout = len(knot), self.layout
+        variables = [np.tile(np.arange(6), (n, 1)), layout.slack[knot, 1:], self._moved(knot, foot)]
+        parameters = [delay, root, tip, np.tile([*span, self._body.length], (n, 1))]
+        if layout.moving:
+            variables.append(self._moved(knot, AIR))
+            parameters.append(tangents.reshape(n, 12))
+        return knot, np.column_stack(variables), np.column_stack(parameters)
+
+    def _heights(self) -> Block:
+        """Least height of the CoM at the knots."""
+        p = self.problem
+        floor, lowest = lowest_foot(p)
+        at = np.flatnonzero(np.isfinite(floor))
+        slack = self.layout.slack[at, 1:]
+        variables = np.column_stack([np.full(len(at), 2), slack, self._moved(at, lowest[at])])
+        rises = p.rotation[np.minimum(at, p.steps - 1), lowest[at], 2, :2][:, : 2 * self.layout.moving]
+        parameters = np.column_stack([floor[at] + p.min_height, np.full(len(at), self._body.height), rises])
+        return Block.of(at, variables, parameters, 1)
+
+    def _final(self) -> Block:
+        """Box and price of the last state."""
+        p, reg = self.problem, self._regularisers
+        weights = SCALE * np.array([reg.final_center, reg.final_acceleration, reg.final_spin])
+        heading = np.cos(p.yaw[-1]), np.sin(p.yaw[-1])
+        variables, parameters = np.arange(STATE), np.concatenate([p.final_center, p.final_half_size, heading, weights])
         if self.layout.moving:
-            variables += [self._moved(knot, foot), self.layout.pair(knot, len(FEET))]
-            columns.append(np.zeros((len(knot), 12)) if tangents is None else tangents)
-        self._add(self._pieces["distance"], knot, np.concatenate(variables, 1), *columns)
+            variables = np.concatenate([variables, *(self.layout.pair(foot) for foot in FEET)])
+            tangents = np.concatenate([p.rotation[-1, foot, :, :2] / 2 for foot in FEET], 1)
+            parameters = np.concatenate([parameters, tangents.ravel()])
+        return Block.of(np.array([p.steps]), variables[None], parameters[None], FINAL_ROWS)
 
-    def _add_landings(self) -> None:
-        """Propagation of contacts' displacements from knot to knot, and the price of landing points."""
-        layout, landings = self.layout, self.landings
-        if landings is None:
-            return
-        n, air = self.problem.steps, len(FEET)
-        step = np.arange(n)
-        sources = {which: layout.pair(step, which) for which in range(air + 1)}
-        for item in landings:
-            sources[air][item.step] = layout.pair(np.array([item.step]), item.limb)[0]
-            sources[item.limb][item.step] = layout.landing[item.step] + np.arange(2)
-        for which, source in sources.items():
-            variables = np.concatenate([source, layout.pair(step + 1, which)], 1)
-            self._carried.append((which, variables))
-        for which in range(air + 1):
-            rows = self._add(self._pieces["anchor"], np.array([0]), layout.pair(np.array([0]), which), np.zeros((1, 0)))
-            self._bounds.append((np.array([0]), rows, np.zeros((2, 2))))
-        at = np.array([item.step for item in landings], int)
-        if len(at):
-            price = np.full(len(at), np.sqrt(SCALE * self.regularisers.landing))
-            self._add(self._pieces["landing"], at, indices(layout.landing[at], 2), price)
-
-    def _price(self) -> np.ndarray:
-        """(N,) price of a slack in each step."""
-        return SCALE * self.regularisers.slack * self.problem.dt / 0.2
-
-    def _add_slacks(self) -> None:
-        """Prices of the excess and of the body's slack."""
-        slack, price = self.layout.slack, self._price()
-        step, last = np.arange(self.problem.steps), np.array([self.problem.steps])
-        self._add(self._pieces["slack"], step, slack[:-1], self.regularisers.excess * price, price)
-        self._add(self._pieces["slack"], last, slack[-1:], price[-1:] / 2, price[-1:] / 2)
-
-    def _finish(self) -> None:
-        """Dynamics, bounds and the assembly."""
-        p, w, reg, layout = self.problem, self.problem.weights, self.regularisers, self.layout
-        n = p.steps
-        dynamics = np.append(layout.states[1:], 0)
-        first_row = np.concatenate([[0], np.cumsum(dynamics + self.path_rows)])
-        total = int(first_row[-1])
-        blocks = [
-            Block(piece, variables, (first_row[stage] + dynamics[stage])[:, None] + rows, parameters)
-            for piece, stage, variables, rows, parameters in self._parts
-        ]
-        duration = p.dt / 0.2
-        at_rest = not np.any(p.com_velocity)
-        momenta = w.linear_momentum, w.linear_momentum_rate, w.angular_momentum, w.angular_momentum_rate
-        squares = [weight * p.mass**2 * duration for weight in momenta]
-        squares = np.stack([*squares, reg.jerk / (0.2 * np.maximum(p.dt, 0.02)), reg.height * duration], 1)
-        squares[0, 4] *= at_rest  # the acceleration before a start in motion is unknown
-        height = mean_feet(p)[:, 2] + (p.final_center[2] - p.position[-1, :2, 2].mean())
-        weights = np.sqrt(SCALE * squares)
-        count = p.active.sum(1)
-        for contacts in range(1, 5):
-            step = np.flatnonzero(count == contacts)
-            if not len(step):
-                continue
-            limbs = np.nonzero(p.active[step])[1].reshape(-1, contacts)
-            wrench = indices(layout.wrench[step[:, None], limbs].ravel(), WRENCH).reshape(len(step), -1)
-            variables = [self._state(step), wrench, self._state(step + 1)]
-            rotation = p.rotation[step[:, None], limbs].reshape(len(step), contacts, 9)
-            pose = [rotation, p.position[step[:, None], limbs]]
-            if layout.moving:
-                foot = limbs < len(FEET)
-                pose.append(foot[..., None].astype(float))
-                variables += [layout.pair(step, np.where(foot, limbs, 0)[:, k]) for k in range(contacts)]
-            variables = np.concatenate(variables, 1)
-            pose = np.concatenate(pose, 2).reshape(len(step), -1)
-            parameters = np.concatenate([p.dt[step, None], pose, weights[step], height[step + 1, None]], 1)
-            rows = first_row[step][:, None] + np.arange(STATE)
-            blocks.append(Block(self._pieces[f"stage{contacts}"], variables, rows, parameters))
-        for which, variables in self._carried:
-            rows = first_row[:n, None] + STATE + 2 * which + np.arange(2)
-            blocks.append(Block(self._pieces["carry"], variables, rows, np.zeros((n, 0))))
-        self.assembly = Assembly(blocks, layout.size, total)
-        self.row_bounds = np.stack([np.zeros(total), np.full(total, np.inf)], 1)
-        for stage in range(n):
-            self.row_bounds[first_row[stage] : first_row[stage] + dynamics[stage]] = 0.0
-        for stage, rows, bound in self._bounds:
-            self.row_bounds[first_row[stage[0]] + dynamics[stage[0]] + rows[0]] = bound
-        self.variable_bounds = np.stack([np.full(layout.size, -np.inf), np.full(layout.size, np.inf)], 1)
-        self.variable_bounds[layout.slack, 0] = 0.0
-        for item in self.landings or ():
-            at = layout.landing[item.step] + np.arange(2)
-            self.variable_bounds[at] = np.stack([item.lower, item.upper], 1)
+    def _bounds(self) -> Block:
+        """Bounds of single variables."""
+        p, layout = self.problem, self.layout
         step, limb = np.nonzero(p.active)
-        self.variable_bounds[indices(layout.wrench[step, limb] + WRENCH, 2), 0] = 0.0
-        normal = layout.wrench[step, limb] + 2
-        self.variable_bounds[normal, 0] = 0.0
-        self.variable_bounds[normal, 1] = p.max_normal_force[limb] / (p.mass * G)
+        knot, wrench = np.arange(p.steps + 1), layout.wrench[step, limb]
+        most = p.max_normal_force[limb] / self._weight
+        lower = [(step, wrench + 2), (step, wrench + 6), (step, wrench + 7), (knot[:-1], layout.slack[:-1, 0])]
+        lower.append((knot, layout.slack[:, 1]))
+        parts = [(at, variable[:, None], np.tile([1.0, 0.0], (len(at), 1))) for at, variable in lower]
+        parts.append((step, wrench[:, None] + 2, np.column_stack([np.full(len(step), -1.0), most])))
+        for item in self._landings:
+            for axis, (least, largest) in enumerate(zip(item.lower, item.upper, strict=True)):
+                if largest - least >= NARROW:
+                    variable = np.full((2, 1), layout.landing[item.step] + axis)
+                    parts.append((np.full(2, item.step), variable, np.array([[1.0, least], [-1.0, largest]])))
+        return _joined(parts, 1)
+
+    def _moved(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
+        """(n, 2) variables that displace a foot's contact at knots; (n, 0) where contacts stay."""
+        if not self.layout.moving:
+            return np.zeros((len(knot), 0), int)
+        return np.broadcast_to(self.layout.pair(foot), (len(knot), 2))
 
 
-def wanted_friction(problem: CentroidalProblem, step: np.ndarray, foot: int) -> np.ndarray:
+def leg_limits(leg: LegGeometry, margins: ReachMargins) -> np.ndarray:
+    """Parameters of the limits of a leg: lower and upper end of each, in order, then the wanted margins."""
+    ranges = [limit.range_of(leg) for limit in PLANNED]
+    return np.concatenate([*ranges, [getattr(margins, name) for name in MARGINS]])
+
+
+def _joined(parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]], rows: int) -> Block:
+    """One block of stages, variables and parameters, in the order of the stages."""
+    stage, variables, parameters = (np.concatenate(part) for part in zip(*parts, strict=True))
+    order = np.argsort(stage, kind="stable")
+    return Block.of(stage[order], variables[order], parameters[order], rows)
+
+
+def wanted_friction(problem: CentroidalProblem, step: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
     """(n,) largest part of its friction that a foot's contact should use; see `RESERVE`."""
     wanted = problem.margins.friction
     rest = steepness(problem.rotation[step, foot, 2, 2]) / np.maximum(problem.friction[step, foot], 1e-9)

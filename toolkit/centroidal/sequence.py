@@ -1,7 +1,8 @@
 """The whole-sequence optimisation: the motion that is executed.
 
-Ipopt minimises the paper's objective under exact cones, the limits of the body (`toolkit.centroidal.body`) and margins.
-The wanted margins may be relaxed at a price, so they shrink where nothing else is feasible; the motion says how far.
+The paper's objective is minimised under exact cones, the limits of the body (`toolkit.centroidal.body`) and margins, by
+the stage-structured interior-point method of `toolkit.centroidal.stages`. The wanted margins may be relaxed at a price,
+so they shrink where nothing else is feasible; the motion says how far.
 """
 
 from __future__ import annotations
@@ -9,17 +10,19 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field, replace
 
-import casadi as ca
 import numpy as np
 
 from toolkit.centroidal.body import BodyMargins, mean_feet
-from toolkit.centroidal.build import ProblemConfig, sequence_problem
-from toolkit.centroidal.pieces import WRENCH, G
-from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem, Margins, Weights
+from toolkit.centroidal.build import ProblemConfig, sequence_problem, transition_problem
+from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalMotion, CentroidalProblem, Margins, Weights
 from toolkit.centroidal.program import Landing, Program, Regularisers, indices
+from toolkit.centroidal.stages.method import Options, Work, minimise
+from toolkit.centroidal.stages.steps import WRENCH
 from toolkit.centroidal.verdict import judged
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.sequence import ContactTransition
+from toolkit.contacts.stance import Stance
 from toolkit.errors import InputError
 from toolkit.geometry.limb import FEET
 from toolkit.physics.wrench import pressure
@@ -30,8 +33,6 @@ CALM = Weights(angular_momentum=20.0, angular_momentum_rate=1.0)
 """The paper's weights except for the angular momentum: with the paper's, no body can follow fast swings."""
 WANTED_BODY = BodyMargins(length=0.015, ankle=0.1, hip=0.05, height=0.02, torque=0.85)
 CONVERGED = "converged"
-_IPOPT = {"max_iter": 150, "tol": 1e-4, "constr_viol_tol": 1e-8, "bound_relax_factor": 0.0}
-_SILENT = {"print_level": 0, "sb": "yes"}
 
 
 @dataclass(frozen=True)
@@ -76,16 +77,56 @@ def optimise(
     Raises:
         InputError: As `sequence_problem`, or a contact is not finite.
     """
-    start = time.perf_counter()
     problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem)
     landings = None if room is None else _landings(problem, schedule, room)
-    program = Program(problem, robot, config.body, config.regularisers, landings)
-    if not np.isfinite(program.assembly.parameters).all():
-        raise InputError("a contact pose, a friction coefficient or a timing of the sequence is not finite")
-    x, status, iterations = _solve(program)
-    motion = judged(_motion(program, x, status), robot, x[program.layout.slack])
+    motion = _solved(robot, problem, config, landings)
     failure = None if motion.failure is None else _placed(motion.failure, problem, schedule)
-    return replace(motion, failure=failure, iterations=iterations, seconds=time.perf_counter() - start)
+    return replace(motion, failure=failure)
+
+
+def optimise_transition(
+    robot: RobotModel,
+    stance: Stance,
+    com: np.ndarray,
+    com_velocity: np.ndarray,
+    transition: ContactTransition,
+    *,
+    config: SequenceConfig = SequenceConfig(),
+    final_at_rest: bool = False,
+) -> CentroidalMotion:
+    """Optimise the motion of one transition alone, under the limits and margins of whole sequences.
+
+    It is feasible where a motion leads from the CoM state to some state whose CoM is in the final box of
+    `ProblemConfig`, and at rest if that is wanted.
+
+    Args:
+        robot: The robot.
+        stance: The contacts before the transition.
+        com: (3,) m; initial CoM in the world.
+        com_velocity: (3,) m/s.
+        transition: The limb that moves, its new contact and the timing.
+        config: Settings.
+        final_at_rest: Whether the CoM must be at rest at the end.
+
+    Raises:
+        InputError: As `build.transition_problem`, or a contact is not finite.
+    """
+    given = robot, stance, com, com_velocity, transition
+    problem = transition_problem(*given, config=config.problem, final_at_rest=final_at_rest)
+    return _solved(robot, problem, config, None)
+
+
+def _solved(
+    robot: RobotModel, problem: CentroidalProblem, config: SequenceConfig, landings: list[Landing] | None
+) -> CentroidalMotion:
+    """The motion of a problem with its verdict."""
+    start = time.perf_counter()
+    program = Program(problem, robot, config.body, config.regularisers, landings)
+    if not program.finite():
+        raise InputError("a contact pose, a friction coefficient or a timing of the sequence is not finite")
+    y, status, iterations = _solve(program)
+    motion = motion_of(program, y, status)
+    return replace(motion, iterations=iterations, seconds=time.perf_counter() - start)
 
 
 def _placed(failure: Failure, problem: CentroidalProblem, schedule: ContactSchedule) -> Failure:
@@ -99,34 +140,27 @@ def _placed(failure: Failure, problem: CentroidalProblem, schedule: ContactSched
 
 
 def _solve(program: Program) -> tuple[np.ndarray, str, int]:
-    """Variables at the solution, whether the solver converged, in words, and its iterations."""
-    functions = program.assembly.functions()
-    nlp = functions.pop("nlp")
-    unused = dict.fromkeys(("print_time", "calc_lam_x", "calc_lam_p", "calc_f", "calc_g"), False)
-    instance = ca.nlpsol("sequence", "ipopt", nlp, {"cache": functions, "ipopt": _IPOPT | _SILENT, **unused})
-    (lbx, ubx), (lbg, ubg) = program.variable_bounds.T, program.row_bounds.T
-    guess, parameters = _guess(program), program.assembly.parameters
-    result = instance(x0=guess, p=parameters, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
-    stats = instance.stats()
-    status = CONVERGED if stats["success"] else "the solver stopped early"
-    return np.array(result["x"]).ravel(), status, int(stats["iter_count"])
+    """Variables (N + 1, m) of the stages at the solution, whether the solver converged, and its iterations."""
+    layout, y = program.layout, guess(program)
+    work = Work.of(len(layout.size), layout.states, y.shape[1])
+    options = Options(program.problem.final_at_rest)
+    found = minimise(program.steps, program.prices, program.blocks, layout.size, y, work, options)
+    converged, iterations, _ = found
+    return y, CONVERGED if converged else "the solver stopped early", iterations
 
 
-def _guess(program: Program) -> np.ndarray:
+def guess(program: Program) -> np.ndarray:
     """Start of the solver: the CoM follows the mean of the feet, and the contacts share the weight."""
     p, layout = program.problem, program.layout
     n = p.steps
-    x = np.zeros(layout.size)
-    velocity = np.zeros((n + 1, 3))
+    y = np.zeros((n + 1, int(layout.size.max())))
     com = mean_feet(p) + [0.0, 0.0, p.final_center[2] - p.position[-1, :2, 2].mean()]
     width = max(n // 20, 3)
     padded = np.concatenate([np.repeat(p.com[None], width, 0), com, np.repeat(com[-1:], width, 0)])
     window = np.hanning(2 * width + 3)[1:-1]
-    com = np.stack([np.convolve(padded[:, i], window / window.sum(), "valid") for i in range(3)], 1)
-    velocity[:-1] = np.diff(com, axis=0) / p.dt[:, None]
-    com[0], velocity[0] = p.com, p.com_velocity
-    x[indices(layout.offset, 3)] = com
-    x[indices(layout.offset + 3, 3)] = velocity
+    y[:, :3] = np.stack([np.convolve(padded[:, i], window / window.sum(), "valid") for i in range(3)], 1)
+    y[:-1, 3:6] = np.diff(y[:, :3], axis=0) / p.dt[:, None]
+    y[0, :3], y[0, 3:6], y[0, 6:9] = p.com, p.com_velocity, p.angular_momentum / p.mass
     # The weight is shared, as far as it is inside the cones: a palm on a wall starts with a light touch.
     up = p.rotation[..., 2, :] / np.maximum(p.active[:, :2].sum(1), 1)[:, None, None]
     normal = np.maximum(up[..., 2], 0.02)
@@ -134,10 +168,10 @@ def _guess(program: Program) -> np.ndarray:
     inside = np.minimum(1.0, 0.5 * p.friction * normal / np.maximum(lateral, 1e-9))
     local = np.concatenate([up[..., :2] * inside[..., None], normal[..., None]], -1)
     step, limb = np.nonzero(p.active)
-    x[indices(layout.wrench[step, limb], 3)] = local[step, limb]
-    x[indices(layout.wrench[step, limb] + WRENCH, 2)] = 0.01
-    x[layout.slack] = 0.01
-    return x
+    y[step[:, None], indices(layout.wrench[step, limb], 3)] = local[step, limb]
+    y[step[:, None], indices(layout.wrench[step, limb] + WRENCH, 2)] = 0.01
+    y[np.arange(n + 1)[:, None], layout.slack] = 0.01
+    return y
 
 
 def _landings(problem: CentroidalProblem, schedule: ContactSchedule, room: np.ndarray) -> list[Landing]:
@@ -151,14 +185,14 @@ def _landings(problem: CentroidalProblem, schedule: ContactSchedule, room: np.nd
     return landings
 
 
-def _landed(program: Program, x: np.ndarray) -> np.ndarray | None:
+def _landed(program: Program, y: np.ndarray) -> np.ndarray | None:
     """(N, 4, 3) m; places of the contacts, moved by the variables; None where they cannot move."""
     p, layout = program.problem, program.layout
     if not layout.moving:
         return None
     position, step = p.position.copy(), np.arange(p.steps)
     for foot in FEET:
-        moved = np.einsum("tij,tj->ti", p.rotation[:, foot, :, :2], x[layout.pair(step, foot)])
+        moved = np.einsum("tij,tj->ti", p.rotation[:, foot, :, :2], y[:-1, layout.pair(foot)])
         on = p.active[:, foot]
         position[on, foot] += moved[on]
         held = np.maximum.accumulate(np.where(on, step, -1))  # a foot in the air has the contact that it left
@@ -166,26 +200,26 @@ def _landed(program: Program, x: np.ndarray) -> np.ndarray | None:
     return position
 
 
-def _motion(program: Program, x: np.ndarray, status: str) -> CentroidalMotion:
-    """The motion of the program's variables, its knots integrated exactly from the wrenches."""
+def motion_of(program: Program, y: np.ndarray, status: str) -> CentroidalMotion:
+    """The motion of the variables (N + 1, m) of a program's stages, with its verdict; `status` is the solver's."""
     p, layout = program.problem, program.layout
-    n, weight = p.steps, p.mass * G
+    n, weight = p.steps, p.mass * STANDARD_GRAVITY
     local, moment = np.zeros((n, 4, 3)), np.zeros((n, 4, 3))
     step, limb = np.nonzero(p.active)
-    local[step, limb] = weight * x[indices(layout.wrench[step, limb], 3)]
-    moment[step, limb] = weight * x[indices(layout.wrench[step, limb] + 3, 3)]
+    wrench = weight * y[step[:, None], indices(layout.wrench[step, limb], WRENCH)]
+    local[step, limb], moment[step, limb] = wrench[:, :3], wrench[:, 3:]
     load = np.where(local[..., 2] > 1e-7 * weight, local[..., 2], np.inf)
     *cop, torque = pressure((*np.moveaxis(local, -1, 0), *np.moveaxis(moment, -1, 0)), load)
-    state = x[layout.offset[:, None] + np.arange(9)]
-    return CentroidalMotion(
+    motion = CentroidalMotion(
         problem=p,
         feasible=False,
         status=status,
-        com=state[:, :3],
-        linear_momentum=p.mass * state[:, 3:6],
-        angular_momentum=p.mass * state[:, 6:9],
+        com=y[:, :3].copy(),
+        linear_momentum=p.mass * y[:, 3:6],
+        angular_momentum=p.mass * y[:, 6:9],
         force=np.einsum("tlij,tlj->tli", p.rotation, local),
         cop=np.stack(cop, -1),
         yaw_torque=torque,
-        landed=_landed(program, x),
+        landed=_landed(program, y),
     )
+    return judged(motion, program.robot, y[np.arange(n + 1)[:, None], layout.slack])

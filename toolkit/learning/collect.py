@@ -19,8 +19,8 @@ from toolkit.learning.shard import collect_shard
 from toolkit.robot.model import RobotModel
 
 PACKAGES = ("humanoid-contact-toolkit", "numpy", "numba", "mujoco")
-Counts = Counter[tuple[Category, bool]]
-"""Numbers of transitions by category and label."""
+Counts = Counter[tuple[Category, str]]
+"""Numbers of transitions by category: "all" of them, those "feasible", and those "labelled", whose outcome is known."""
 
 
 @dataclass(frozen=True)
@@ -29,17 +29,19 @@ class Collected:
 
     Attributes:
         shards: Number of shards in the data set.
-        labelled: Number of transitions in the data set.
-        resumed: Number of transitions that were there before this call.
-        feasible: Number of feasible transitions in the data set.
-        fewest: Number of transitions of the rarest category.
+        samples: Number of transitions in the data set.
+        feasible: Number of feasible ones.
+        labelled: Number of those whose outcome in a whole motion is known.
+        resumed: Number of these that were there before this call.
+        fewest: Number of labels of the rarest category.
         seconds: Wall-clock time of this call.
     """
 
     shards: int
+    samples: int
+    feasible: int
     labelled: int
     resumed: int
-    feasible: int
     fewest: int
     seconds: float
 
@@ -75,7 +77,7 @@ def collect(
     """
     began = time.perf_counter()
     # A larger collection of the same kind continues the same data set.
-    settings = plain_settings(config, "robot", "robots", "seed", "samples_per_category")
+    settings = plain_settings(config, "robot", "robots", "seed", "samples_per_category", "networks")
     versions = {name: metadata.version(name) for name in PACKAGES}
     begin(folder, Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings, versions))
     counts, missing = Counts(), []
@@ -85,12 +87,16 @@ def collect(
             counts += _count(read_shard(path))  # raises an error if the shard is broken
         else:
             missing.append(index)
-    resumed, done = counts.total(), config.shards - len(missing)
+
+    def number(name: str) -> int:
+        return sum(counts[category, name] for category in Category)
+
+    resumed, done = number("labelled"), config.shards - len(missing)
 
     def state() -> Collected:
-        feasible = sum(number for (_, label), number in counts.items() if label)
-        fewest = min(counts[category, True] + counts[category, False] for category in categories_of(robot))
-        return Collected(done, counts.total(), resumed, feasible, fewest, time.perf_counter() - began)
+        fewest = min(counts[category, "labelled"] for category in categories_of(robot))
+        seconds = time.perf_counter() - began
+        return Collected(done, number("all"), number("feasible"), number("labelled"), resumed, fewest, seconds)
 
     def take(more: Counts) -> None:
         nonlocal done
@@ -107,6 +113,7 @@ def collect(
 def _count(samples: dict[Category, Samples]) -> Counts:
     counts = Counts()
     for category, group in samples.items():
-        feasible = int(group.feasible.sum())
-        counts[category, True], counts[category, False] = feasible, len(group) - feasible
+        counts[category, "all"] = len(group)
+        counts[category, "feasible"] = int(group.feasible.sum())
+        counts[category, "labelled"] = int(group.known.sum())
     return counts

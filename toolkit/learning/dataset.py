@@ -1,8 +1,8 @@
 """Data sets of labelled transitions: a manifest and numbered shards, each written whole or not at all.
 
     DIR/manifest.json      what was asked for: robot, fingerprint, seed, versions, settings
-    DIR/shard-000000.npz   per category c: features_c (n, d) float32, feasible_c (n,) bool, targets_c (n, 7) float32,
-                           sensitivity_c (n, k) float32
+    DIR/shard-000000.npz   per category c the arrays of its `Samples`: features_c (n, d) float32, feasible_c (n,) bool,
+                           targets_c (n, 7) float32, goal_c (n, 3) float32, world_c (n,) int32
 
 Shard i depends only on the manifest and on i. So a collection that was killed continues with the missing shards.
 """
@@ -20,12 +20,11 @@ import numpy as np
 
 from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError
-from toolkit.learning.samples import Samples, join
-from toolkit.learning.sensitivity import sensitivity_size
+from toolkit.learning.samples import PARTS, Samples, join
 from toolkit.prediction.features import TARGETS, feature_size
 
-SCHEMA = "transition-data-2"
-PARTS = ("features", "feasible", "targets", "sensitivity")
+SCHEMA = "transition-data-3"
+_TYPES = ["f", "b", "f", "f", "i"]  # of the arrays of samples
 
 
 @dataclass(frozen=True)
@@ -163,16 +162,18 @@ def read_shard(path: Path) -> dict[Category, Samples]:
             raise DatasetError(f"{path}: incomplete arrays for category {int(category)}; {remedy}")
         group = Samples(*(arrays[name] for name in names))
         kinds = [arrays[name].dtype.kind for name in names]
-        if kinds != ["f", "b", "f", "f"] or group.feasible.ndim != 1:
+        if kinds != _TYPES or group.feasible.ndim != 1:
             raise DatasetError(f"{path}: category {int(category)} has arrays of other types; {remedy}")
         n = len(group.feasible)
-        expected = [(n, feature_size(category)), (n,), (n, TARGETS), (n, sensitivity_size(category))]
+        expected = [(n, feature_size(category)), (n,), (n, TARGETS), (n, 3), (n,)]
         shapes = [arrays[name].shape for name in names]
         if shapes != expected:
             raise DatasetError(f"{path}: category {int(category)} has shapes {shapes}, expected {expected}; {remedy}")
-        finite = np.isfinite(group.features).all() and np.isfinite(group.targets).all()
-        if not finite or np.isinf(group.sensitivity).any():
+        known = group.known
+        if not all(np.isfinite(values).all() for values in (group.features, group.targets[known], group.goal)):
             raise DatasetError(f"{path}: category {int(category)} holds NaN or infinite values; {remedy}")
+        if (known & ~group.feasible).any():
+            raise DatasetError(f"{path}: category {int(category)} has outcomes of infeasible transitions; {remedy}")
         samples[category] = group
     return samples
 
@@ -184,9 +185,6 @@ def read_dataset(folder: Path, fingerprint: str, *, limit: int | None = None) ->
 
 def read_datasets(folders: list[Path], fingerprint: str, *, limit: int | None = None) -> dict[Category, Samples]:
     """All samples of data sets by category, in the order of the shards' numbers.
-
-    So the variations of a shard (`learning.enrich`) follow it. Training holds out the last samples, and these have no
-    variations among the others.
 
     Args:
         folders: The data sets.

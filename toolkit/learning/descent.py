@@ -13,7 +13,6 @@ from toolkit.learning.layers import linear_layers
 from toolkit.learning.tasks import Classification, Regression
 
 WEIGHT_DECAY = 1e-4
-HELD_OUT = 0.05  # share of the samples that decide on early stopping: the last ones, which come from other terrain
 COARSE = 0.8  # share of the epochs that compute in bfloat16, which is twice as fast on processors that have it
 
 
@@ -26,7 +25,6 @@ class FitConfig:
         classifier_share: The share of `epochs` for the classifier, which learns faster.
         batch: Number of samples per gradient step.
         learning_rate: Peak of the one-cycle schedule.
-        sensitivity_weight: Weight of the loss of the objective's derivatives, see `tasks.Regression`.
         patience: Number of epochs without a better validation loss before training stops.
         device: The device that torch computes on.
         seed: Seed of the initial weights and of the shuffling.
@@ -36,7 +34,6 @@ class FitConfig:
     classifier_share: float = 0.2
     batch: int = 512
     learning_rate: float = 4e-3
-    sensitivity_weight: float = 20.0
     patience: int = 40
     device: str = "cpu"
     seed: int = 0
@@ -74,6 +71,7 @@ def descend(
     task: Classification | Regression,
     config: FitConfig,
     progress: Callable[[int, float, float], None],
+    held_out: np.ndarray,
     *,
     orthogonal: bool = False,
 ) -> Curve:
@@ -84,16 +82,15 @@ def descend(
         task: What the network learns.
         config: Settings.
         progress: Is called with the epoch, the training loss and the validation loss.
+        held_out: (n,) bool; samples that decide on early stopping and are not trained on.
         orthogonal: Whether Muon trains the hidden layers, which needs fewer steps than AdamW.
     """
-    samples = len(task.share)
     device = torch.device(config.device)
     net.to(device)
     generator = torch.Generator(device).manual_seed(config.seed)
-    count = samples - max(1, int(HELD_OUT * samples))
-    held_out = torch.arange(count, samples, device=device)
-    share = task.share[:count]
-    drawn = int(share.sum() - 1e-6 * count) if bool((share < 1.0).any()) else count
+    trained, held = (torch.from_numpy(np.flatnonzero(rows)).to(device) for rows in (~held_out, held_out))
+    share = task.share[trained]
+    drawn = int(share.sum() - 1e-6 * len(share)) if bool((share < 1.0).any()) else len(share)
     size = max(1, min(config.batch, drawn))
     steps = max(1, drawn // size)
     optimisers = _optimisers(net, config, orthogonal)
@@ -107,7 +104,7 @@ def descend(
     training, validation = [], []
     for epoch in range(config.epochs):
         net.train()
-        order = draw(share, generator)
+        order = trained[draw(share, generator)]
         total = torch.zeros((), device=device)
         coarse = device.type == "cpu" and epoch < COARSE * config.epochs
         for step in range(steps):
@@ -122,12 +119,12 @@ def descend(
             total += value.detach()
         net.eval()
         with torch.no_grad():
-            held = float(task.error(net, held_out))
+            error = float(task.error(net, held))
         training.append(float(total) / steps)
-        validation.append(held)
-        progress(epoch, training[-1], held)
-        if held < best:
-            best, best_epoch = held, epoch
+        validation.append(error)
+        progress(epoch, training[-1], error)
+        if error < best:
+            best, best_epoch = error, epoch
             kept = {k: v.clone() for k, v in net.state_dict().items()}
         elif epoch - best_epoch >= config.patience:
             break

@@ -20,7 +20,7 @@ class Score:
         samples: Number of test transitions.
         feasible_share: Share of them that are feasible.
         accuracy: Share of them whose feasibility is predicted correctly.
-        mean_objective: Mean objective of the feasible ones.
+        mean_objective: Mean objective of those whose outcome is known.
         objective_error: Mean absolute error of the objective.
         com_error: Mean distance between the predicted and the optimised final CoM, in m.
         velocity_error: The same for the final CoM velocity, in m/s.
@@ -41,15 +41,16 @@ class Score:
 
 
 def score(network: TransitionNetwork, samples: Samples) -> Score:
-    """Score a network; the regressor is tested on the feasible transitions.
+    """Score a network; the regressor is tested on the transitions whose outcome is known.
 
     Raises:
-        DatasetError: None of the samples is feasible.
+        DatasetError: There is none.
     """
-    if not samples.feasible.any():
-        raise DatasetError(f"category {int(network.category)}: no feasible transition to test on; collect more")
-    targets = samples.targets[samples.feasible]
-    outputs = network.predict(samples.features[samples.feasible])
+    known = samples.known
+    if not known.any():
+        raise DatasetError(f"category {int(network.category)}: no outcome to test on; collect more")
+    targets = samples.targets[known]
+    outputs = network.predict(samples.features[known])
     return Score(
         samples=len(samples),
         feasible_share=float(samples.feasible.mean()),

@@ -16,11 +16,10 @@ from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError, InputError, NetworkError
 from toolkit.learning.descent import Curve, FitConfig, descend
 from toolkit.learning.layers import Scaling, perceptron
-from toolkit.learning.samples import Samples
+from toolkit.learning.samples import Samples, Split, join
 from toolkit.learning.tasks import Classification, Regression
-from toolkit.prediction.features import COM, TARGETS
+from toolkit.prediction.features import COM, TARGETS, TIMING
 from toolkit.prediction.network import (
-    OBJECTIVE_SCALE,
     SCHEMA,
     Perceptron,
     compressed,
@@ -79,9 +78,8 @@ def train_networks(
     """Train both networks on samples, in any encoding whose last columns are those of `features.encode`.
 
     The classifier minimises the logistic loss, the regressor the smooth L1 loss of its scaled outputs. These are the
-    compressed objective, not centred, as in the original, and the z-scored displacement and velocity of the CoM. Where
-    samples have derivatives of their objective, the regressor learns these too (Sobolev training). They help as much as
-    many more labels, but are known only in the encoding of `features`.
+    compressed objective, not centred, as in the original, and the z-scored displacement and velocity of the CoM. The
+    worlds of the validation split decide on early stopping, those of the test split are not used.
 
     Args:
         samples: Labelled transitions of one category.
@@ -91,6 +89,7 @@ def train_networks(
         start: The regressor whose training continues; None for random weights.
     """
     torch.manual_seed(config.seed)
+    samples = join([samples.of(Split.TRAINING), samples.of(Split.VALIDATION)])
 
     def tensor(values: np.ndarray) -> torch.Tensor:
         return torch.from_numpy(values.astype(np.float32)).to(config.device)
@@ -106,31 +105,37 @@ def train_networks(
             Classification(inputs, tensor(samples.feasible[:, None])),
             replace(config, epochs=max(1, round(config.classifier_share * config.epochs))),
             lambda *state: progress("classifier", *state),
+            _held_out(samples),
         )
         classifier = Scaling(mean, std, np.zeros(1), np.ones(1)).fold(net)
 
-    kept = np.flatnonzero(samples.feasible & (samples.targets[:, 0] < OBJECTIVE_LIMIT))
+    kept = np.flatnonzero(samples.known & (samples.targets[:, 0] < OBJECTIVE_LIMIT))
     targets = samples.targets[kept].astype(np.float64)
     targets[:, 0] = compressed(targets[:, 0])
     targets[:, 1:4] -= features[kept, COM]
     out_mean = np.concatenate([[0.0], targets[:, 1:].mean(0)])
     scaling = Scaling(mean, std, out_mean, np.maximum(targets.std(0), 1e-4))
-    per_target = (OBJECTIVE_SCALE + samples.targets[kept, :1]) * scaling.out_std[0]  # d objective / d scaled output
     regressor = perceptron(size, TARGETS)
     if start is not None:
         scaling.unfold(start, regressor)
     task = Regression(
-        tensor(samples.features[kept]),
+        tensor(samples.features[kept, TIMING]),
         inputs[torch.from_numpy(kept).to(config.device)],
-        tensor(std),
         tensor((targets - out_mean) / scaling.out_std),
-        tensor(samples.sensitivity[kept] / per_target),
-        config.sensitivity_weight,
     )
+    held_out = _held_out(samples.select(kept))
     curves["regressor"] = descend(
-        regressor, task, config, lambda *state: progress("regressor", *state), orthogonal=True
+        regressor, task, config, lambda *state: progress("regressor", *state), held_out, orthogonal=True
     )
     return TrainedNetworks(classifier, scaling.fold(regressor), curves)
+
+
+def _held_out(samples: Samples) -> np.ndarray:
+    """(n,) bool; samples that decide on early stopping: the validation split, or the last ones where it is empty."""
+    held_out = np.isin(samples.world % 10, Split.VALIDATION.value)
+    if not held_out.any():
+        held_out[-max(1, len(samples) // 20) :] = True
+    return held_out
 
 
 def fit_category(
@@ -163,10 +168,10 @@ def fit_category(
         DatasetError: There are too few samples of a label.
         NetworkError: The existing file is wanted, but is missing or does not fit.
     """
-    feasible = int(samples.feasible.sum())
-    if min(feasible, len(samples) - feasible) < MINIMUM:
+    known, infeasible = int(samples.known.sum()), int((~samples.feasible).sum())
+    if min(known, infeasible) < MINIMUM:
         raise DatasetError(
-            f"category {int(category)} has {feasible} feasible and {len(samples) - feasible} infeasible transitions; "
+            f"category {int(category)} has {known} transitions of whole motions and {infeasible} infeasible ones; "
             f"{MINIMUM} of each are needed: collect more"
         )
     path, classifier, start, before = network_path(folder, category), None, None, {}
@@ -204,7 +209,7 @@ def _summary(samples: Samples, config: FitConfig, curves: dict[str, Curve], befo
         "feasible": int(samples.feasible.sum()),
         "config": asdict(config),
         "config_before": before.get("config"),
-        "known_sensitivities": int((~np.isnan(samples.sensitivity[:, 0])).sum()),
+        "labelled": int(samples.known.sum()),
         "epochs": before.get("epochs", {}) | {name: len(curve.training) for name, curve in curves.items()},
         "validation_loss": before.get("validation_loss", {})
         | {name: float(curve.validation.min()) for name, curve in curves.items()},

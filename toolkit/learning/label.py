@@ -1,4 +1,8 @@
-"""Labels in bulk: the judgement of `OptimiserEvaluator` in less than half of its time."""
+"""Labels: what each transition costs in the motion of its whole sequence, and the CoM's state after it there.
+
+The motion is optimised as an executed plan's is, with the same weights, limits and rests, so the labels of a sequence
+add up to the objective of what is executed.
+"""
 
 from __future__ import annotations
 
@@ -6,81 +10,88 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal import fast
-from toolkit.centroidal.arrays import ProblemArrays
-from toolkit.centroidal.build import transition_problem
-from toolkit.centroidal.residual import evaluate
-from toolkit.contacts.category import category_of
-from toolkit.contacts.sequence import ContactTransition
-from toolkit.contacts.stance import Stance
+from toolkit.centroidal.build import initial_com
+from toolkit.centroidal.intervals import Intervals, intervals
+from toolkit.centroidal.sequence import optimise
+from toolkit.contacts.category import Category, category_of
+from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.learning.feasible import TransitionProblem
 from toolkit.learning.samples import Samples
-from toolkit.learning.sensitivity import canonical, unknown_sensitivity
-from toolkit.prediction.evaluator import TransitionBatch
 from toolkit.prediction.features import TARGETS, encode
-from toolkit.prediction.reach import within_reach
 from toolkit.robot.model import RobotModel
+
+INITIAL_REST, FINAL_REST = 0.4, 1.0
+"""Rests in s at the start and at the end of a labelled sequence; those of executed plans."""
 
 
 @dataclass(frozen=True)
-class Labels(TransitionBatch):
-    """The optimiser's judgement of n transitions, and the derivatives of its objective.
+class LabelledSequence:
+    """A contact sequence with a feasible whole motion.
 
     Attributes:
-        sensitivity: The n derivatives in the world. One is None where the transition is infeasible, or where the CoM
-            had to be moved within reach, so that a slightly different problem was solved.
+        robot: The robot.
+        sequence: The contacts and their timing.
+        parts: The motion, cut at the ends of the transitions.
     """
 
-    sensitivity: tuple[fast.Sensitivity | None, ...]
+    robot: RobotModel
+    sequence: ContactSequence
+    parts: Intervals
+
+    @property
+    def goal(self) -> np.ndarray:
+        """(3,) m; mean of the feet at the end."""
+        return self.sequence.stances[-1].mean_feet.position
+
+    def problem(self, index: int) -> TransitionProblem:
+        """One transition, from the state that the whole motion has at its beginning."""
+        parts, sequence = self.parts, self.sequence
+        com, velocity = parts.com[index], parts.com_velocity[index]
+        return TransitionProblem(self.robot, sequence.stances[index], com, velocity, sequence.transitions[index])
+
+    def outcome(self, index: int) -> tuple[float, np.ndarray, np.ndarray]:
+        """Objective of one transition, and CoM (3,) m and velocity (3,) m/s after it."""
+        parts = self.parts
+        return float(parts.objective[index]), parts.com[index + 1], parts.com_velocity[index + 1]
 
 
-def label(
-    robot: RobotModel, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition]
-) -> Labels:
-    """Solve n transitions out of a stance; the compiled residual check confirms each that is feasible.
+def label(robot: RobotModel, sequence: ContactSequence) -> LabelledSequence | None:
+    """Optimise the motion of a whole sequence; None where none is feasible, or there are no transitions."""
+    if not sequence.transitions:
+        return None
+    schedule = ContactSchedule.of(sequence, initial_rest=INITIAL_REST, final_rest=FINAL_REST)
+    motion = optimise(robot, schedule, initial_com(robot, sequence.start), np.zeros(3))
+    return LabelledSequence(robot, sequence, intervals(motion, schedule)) if motion.feasible else None
+
+
+def sample_of(
+    problem: TransitionProblem,
+    feasible: bool,
+    outcome: tuple[float, np.ndarray, np.ndarray] | None,
+    goal: np.ndarray,
+    world: int,
+) -> tuple[Category, Samples]:
+    """One judged transition as a data set stores it.
 
     Args:
-        robot: The robot.
-        stance: The stance before the transitions.
-        com: (n, 3) Initial CoM of each transition in the world, in m.
-        com_velocity: (n, 3) Initial CoM velocities in m/s.
-        transitions: The transitions.
-
-    Returns:
-        The labels; the objective is infinite where a transition is infeasible.
+        problem: The transition.
+        feasible: Whether it is feasible.
+        outcome: Objective, CoM (3,) m and velocity (3,) m/s after it, world frame; None where unknown.
+        goal: (3,) m; mean of the feet at the end of its sequence, world frame.
+        world: Number of the world.
     """
-    n = len(transitions)
-    feasible, objective = np.zeros(n, bool), np.full(n, np.inf)
-    final_com, velocity = np.array(com, float), np.zeros((n, 3))
-    sensitivity: list[fast.Sensitivity | None] = [None] * n
-    start = within_reach(robot, stance, com)
-    for row, transition in enumerate(transitions):
-        problem = transition_problem(robot, stance, start[row], com_velocity[row], transition)
-        found = fast.sensitive_wrenches(problem)
-        if found is None:
-            continue
-        motion, derivatives = found
-        residuals, costs = evaluate(ProblemArrays.of(problem), motion)
-        if residuals.within():
-            feasible[row], objective[row] = True, costs.sum()
-            final_com[row], velocity[row] = motion.com[-1], motion.linear_momentum[-1] / problem.mass
-            if (start[row] == com[row]).all():
-                sensitivity[row] = derivatives
-    return Labels(feasible, objective, final_com, velocity, tuple(sensitivity))
-
-
-def samples_of(
-    stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: list[ContactTransition], labels: Labels
-) -> Samples:
-    """Labelled transitions of ONE category by the same limb, as a data set stores them; see `label` for arguments."""
-    n, category = len(transitions), category_of(stance, transitions[0])
-    frame, features = encode(stance, com, com_velocity, transitions)
-    good = labels.feasible
-    targets = np.zeros((n, TARGETS), np.float32)
-    targets[good, 0] = labels.objective[good]
-    targets[good, 1:4] = frame.point(labels.com[good])
-    targets[good, 4:7] = frame.vector(labels.com_velocity[good])
-    known = unknown_sensitivity(category, n)
-    for row, found in enumerate(labels.sensitivity):
-        if found is not None:
-            known[row] = canonical(frame, category, found)
-    return Samples(features.astype(np.float32), good, targets, known)
+    stance, transition = problem.stance, problem.transition
+    frame, features = encode(stance, problem.com, problem.com_velocity, [transition])
+    targets = np.full((1, TARGETS), np.nan, np.float32)
+    if outcome is not None:
+        objective, com, velocity = outcome
+        targets[0] = np.concatenate([[objective], frame.point(com), frame.vector(velocity)])
+    samples = Samples(
+        features.astype(np.float32),
+        np.array([feasible]),
+        targets,
+        frame.point(goal)[None].astype(np.float32),
+        np.array([world], np.int32),
+    )
+    return category_of(stance, transition), samples

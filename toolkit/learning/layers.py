@@ -1,4 +1,4 @@
-"""Perceptrons in torch: their layers, their gradient, and their exchange with the networks of `prediction`."""
+"""Perceptrons in torch: their layers, and their exchange with the networks of `prediction`."""
 
 from __future__ import annotations
 
@@ -23,22 +23,6 @@ def perceptron(inputs: int, outputs: int) -> nn.Sequential:
 def linear_layers(net: nn.Sequential) -> list[nn.Linear]:
     """The layers that have weights."""
     return [layer for layer in net if isinstance(layer, nn.Linear)]
-
-
-def with_gradient(net: nn.Sequential, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Outputs (n, k) of a perceptron, and the gradient (n, d) of the first output in the inputs (n, d).
-
-    The gradient is computed from the weights and the active units, so that a loss of it can be differentiated.
-    """
-    linear = linear_layers(net)
-    x, active = inputs, []
-    for layer in linear[:-1]:
-        x = torch.relu(layer(x))
-        active.append(x > 0)
-    gradient = linear[-1].weight[0].expand(len(inputs), -1)
-    for layer, on in zip(reversed(linear[:-1]), reversed(active), strict=True):
-        gradient = (gradient * on) @ layer.weight
-    return linear[-1](x), gradient
 
 
 @dataclass(frozen=True)

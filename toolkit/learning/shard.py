@@ -1,34 +1,36 @@
-"""One shard of labelled transitions: the planner runs in random terrain, and the optimiser labels its transitions.
+"""One shard of labelled transitions: searches draw whole sequences in random worlds, and the optimiser labels them.
 
-The planner walks at random through tilted tiles with one or two walls (paper, Sec. VI). Ground that is too steep for
-rest must be crossed in motion. So a part of each shard is collected on slopes, with quick steps from running states.
+Every transition of a feasible sequence is a sample: what it costs in the motion of the whole sequence, and the CoM's
+state after it. What is infeasible comes from transitions that the searches asked about, and from feasible ones that are
+changed until they are not.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from toolkit.contacts.category import Category, categories_of
-from toolkit.errors import PlanningError
+from toolkit.contacts.category import Category, categories_of, category_rows
+from toolkit.learning.boundary import at_boundary
 from toolkit.learning.collect_config import CollectConfig
-from toolkit.learning.quota import Balance, Ground, Quota
-from toolkit.learning.recorder import Recorder
-from toolkit.learning.samples import Samples, join
-from toolkit.learning.terrain import random_slope, random_terrain
+from toolkit.learning.draws import Place, draw_sequences
+from toolkit.learning.feasible import TransitionProblem, transition_feasible
+from toolkit.learning.label import LabelledSequence, label, sample_of
+from toolkit.learning.quota import Quota
+from toolkit.learning.samples import PAPER, PLANNED, Samples
+from toolkit.learning.scout import Scout
+from toolkit.learning.terrain import OPEN, STEEP, WALLED, random_world, steep_slope
+from toolkit.prediction.network import TransitionNetwork
+from toolkit.prediction.networks import load_networks
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
-from toolkit.search.anytime.ana_star import AnaStarConfig
-from toolkit.search.costs.edge_cost import CostConfig
-from toolkit.search.planner import ContactPlanner, PlannerConfig
-from toolkit.world.loader import load_world
-from toolkit.world.world import Goal
+from toolkit.world.timing import Timing
 
-_NOWHERE = Goal(np.array([20.0, 0.0, 0.0]), 0.1)  # so far away that the search never ends there
+WORLDS = 1000
+"""Numbers of worlds that a shard may use: those of shard i begin with i times this."""
+_PAPER_FRICTION = 0.5
 
 
 @lru_cache(maxsize=2)
@@ -37,38 +39,85 @@ def robot_of(name: str, robots: str | None) -> RobotModel:
     return load_robot(name, Path(robots) if robots else None)
 
 
+@lru_cache(maxsize=2)
+def _networks_of(name: str, robots: str | None, folder: str, digest: str) -> dict[Category, TransitionNetwork]:
+    """Networks of a robot, loaded once per process; the digest tells those of one folder apart."""
+    del digest
+    return load_networks(robot_of(name, robots), Path(folder))
+
+
 def collect_shard(config: CollectConfig, index: int) -> dict[Category, Samples]:
-    """Label the transitions of the shard with this index; a pure function of its arguments.
+    """Draw and label the sequences of the shard with this index; a pure function of its arguments.
 
     Returns:
-        At least `config.per_shard` samples of every category that the robot can perform.
+        Samples of every category that the robot can perform, at least `config.per_shard` of them with an outcome,
+        unless `config.most_worlds` worlds did not give so many.
     """
     rng = np.random.default_rng([config.seed, index])
     robot = robot_of(config.robot, config.robots)
-    balance = Balance(config.infeasible)
-    tilted = Quota(config.per_shard, categories_of(robot))
-    slopes = Quota(round(config.slope_share * config.per_shard), [Category.MOVE_FOOT])
-    while not tilted.full:
-        ground = Ground.DEFAULT if rng.random() < config.default_share else Ground.VARIED
-        walls = 1 + int(rng.random() < config.two_walls)
-        ranges = (rng.uniform(*config.tilt), rng.uniform(*config.rise)) if ground == Ground.VARIED else ()
-        recorder = Recorder(robot, tilted, balance, config, rng, ground)
-        _walk(robot, random_terrain(rng, walls, *ranges), recorder, config.expansions, rng)
-    while not slopes.full:
-        recorder = Recorder(robot, slopes, balance, config, rng, Ground.SLOPE)
-        _walk(robot, random_slope(rng), recorder, config.slope_expansions, rng)
-    samples = tilted.samples()
-    for category, more in slopes.samples().items():
-        joined = join([samples[category], more])
-        samples[category] = joined.select(rng.permutation(len(joined)))
-    return samples
+    quota = Quota(config.per_shard, categories_of(robot))
+    for number in range(min(config.most_worlds, WORLDS)):
+        if not quota.lacking:
+            break
+        for sequence, scout in draw_sequences(_place(robot, quota, config, rng), quota, config, rng):
+            labelled = label(robot, sequence)
+            if labelled is not None:
+                _add(labelled, scout, quota, WORLDS * index + number, config, rng)
+    return quota.samples()
 
 
-def _walk(robot: RobotModel, text: str, recorder: Recorder, expansions: int, rng: np.random.Generator) -> None:
-    """Let the planner walk at random on one terrain."""
-    world = replace(load_world("training.xml", mjcf=text), goal=_NOWHERE)
-    search = AnaStarConfig(epsilon=0.9, max_expansions=expansions)
-    config = PlannerConfig(heuristic="euclidean", wide_steps="on", cost=CostConfig(steep=0.0), search=search)
-    planner = ContactPlanner(robot, world, recorder, config)
-    with suppress(PlanningError):  # the ground at the start is too steep to stand on
-        planner.search(rng, np.inf)
+def _place(robot: RobotModel, quota: Quota, config: CollectConfig, rng: np.random.Generator) -> Place:
+    """A random world with random timings and friction."""
+    networks = {}
+    if config.networks is not None:
+        networks = _networks_of(config.robot, config.robots, config.networks, config.networks_digest)
+    walls = robot.arms and any(category.palms_before or not category.moving.is_foot for category in quota.lacking)
+    kinds = list(WALLED) if rng.random() < (config.walled if walls else 0.2) else [*OPEN, STEEP]
+    kind, friction = kinds[int(rng.integers(len(kinds)))], rng.uniform(*config.friction)
+    if kind == STEEP:
+        timings = (_random_timing(config.quick_shift, config.quick_swing, rng),)
+        return Place(robot, steep_slope(rng, friction), timings, True, networks)
+    which = rng.random()
+    if which < config.paper_share:
+        timings, friction = (PAPER,), _PAPER_FRICTION
+    elif which < config.paper_share + config.planned_share:
+        timings = (PLANNED,)
+    else:
+        count = int(rng.integers(1, config.choices + 1))
+        timings = tuple(_random_timing(config.shift, config.swing, rng) for _ in range(count))
+    return Place(robot, random_world(rng, config, kind, friction), timings, False, networks)
+
+
+def _random_timing(shift: tuple[float, float], swing: tuple[float, float], rng: np.random.Generator) -> Timing:
+    """A timing whose times are uniform in their logarithm."""
+    return Timing(*(float(np.exp(rng.uniform(*np.log(bounds)))) for bounds in (shift, swing)))
+
+
+def _add(
+    labelled: LabelledSequence, scout: Scout, quota: Quota, world: int, config: CollectConfig, rng: np.random.Generator
+) -> None:
+    """Add all transitions of a sequence to the quota, and transitions near them that are judged alone."""
+    goal = labelled.goal
+    for index in range(len(labelled.sequence.transitions)):
+        problem = labelled.problem(index)
+        category, samples = sample_of(problem, True, labelled.outcome(index), goal, world)
+        quota.add(category, samples)
+        judged = _sibling(problem, scout, rng)
+        if quota.infeasible_share(category) < config.infeasible:
+            judged += at_boundary(problem, rng)
+        for other, feasible in judged:
+            quota.add(*sample_of(other, feasible, None, goal, world))
+
+
+def _sibling(
+    problem: TransitionProblem, scout: Scout, rng: np.random.Generator
+) -> list[tuple[TransitionProblem, bool]]:
+    """Another transition out of the same state about which the search asked, judged; all categories are as likely."""
+    asked = scout.asked(problem.stance)
+    if not len(asked):
+        return []
+    numbers = category_rows(problem.stance, asked)
+    number = int(rng.choice(np.unique(numbers)))
+    row = int(rng.choice(np.flatnonzero(numbers == number)))
+    other = TransitionProblem(problem.robot, problem.stance, problem.com, problem.com_velocity, asked[row])
+    return [(other, transition_feasible(other))]

@@ -1,40 +1,39 @@
-"""Terrain for collections: tilted tiles with walls within reach of the palms, and slopes to run down."""
+"""Random worlds of every kind for collections, with random ways through them."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from toolkit.geometry.pose import Pose
+from toolkit.learning.collect_config import CollectConfig
+from toolkit.world import generators, regular
 from toolkit.world.authoring import WorldText
+from toolkit.world.loader import load_world
+from toolkit.world.world import Goal, World
 
 TILE = 0.4  # m; edge of the square tiles
 DISTANCE = (0.45, 0.8)  # m; range of a wall's distance from the start at the height of its middle
 BEARING = 45.0  # deg; largest angle of a wall before or behind the robot's side
-SLOPE_ANGLE = (5.0, 35.0)  # deg; range
-SLOPE_LENGTH = (0.8, 3.0)  # m; range
-SLOPE_WIDTH = 1.2  # m
+_TURNED = 25.0  # deg; deviation of the heading at the start
+_BACK = 0.3  # share of ways from the goal to the start
+_SHORT = 0.3  # share of ways that end before the goal
+_ASIDE = 0.12  # m; deviation of such an end to the side
 
 
-def random_slope(rng: np.random.Generator) -> str:
-    """MJCF text of a slope that descends along x between level ground; the start is on it or shortly above it."""
-    angle, length = np.radians(rng.uniform(*SLOPE_ANGLE)), rng.uniform(*SLOPE_LENGTH)
-    along = np.array([np.cos(angle), 0.0, -np.sin(angle)])
-    down = rng.uniform(-0.4, 0.8 * length)  # from the upper edge to the start
-    start = down * along if down > 0.0 else np.array([down, 0.0, 0.0])
-    end = length * along
-    world = WorldText("training", "a slope", 0.5, (0.05, 0.35), (20.0, 0.0, 0.0), tuple(start), abyss=None)
-    world.platform("above", (-1.5, 0.0), SLOPE_WIDTH)
-    world.tile("slope", (length, SLOPE_WIDTH), end / 2, material="slope", rotation=Rotation.from_euler("y", angle))
-    world.platform("below", (end[0], end[0] + 3.0), SLOPE_WIDTH, end[2])
-    return world.render()
-
-
-def random_terrain(rng: np.random.Generator, walls: int, tilt: float = 20.0, rise: float = 0.05) -> str:
-    """MJCF text of 3 x 3 tiles with one or two walls (paper, Sec. VI, Fig. 3); the start is on the middle tile.
+def tiles_and_walls(
+    rng: np.random.Generator, walls: int, tilt: float = 20.0, rise: float = 0.05, friction: float = 0.5
+) -> str:
+    """MJCF text of 3 x 3 tiles with up to two walls (paper, Sec. VI, Fig. 3); the start is on the middle tile.
 
     Roll and pitch of tiles and the lean of walls stay within `tilt` degrees, and heights of tiles within `rise` m.
     """
-    world = WorldText("training", "tilted tiles and walls", 0.5, (1.0, 1.0), (20.0, 0.0, 0.0), (0.0, 0.0, 0.05))
+    towards = rng.uniform(-np.pi, np.pi)
+    goal = (1.2 * TILE * np.cos(towards), 1.2 * TILE * np.sin(towards), 0.0)
+    world = WorldText("training", "tilted tiles and walls", friction, (1.0, 1.0), goal, (0.0, 0.0, 0.05))
     for row in range(3):
         for column in range(3):
             turn = Rotation.from_euler("xy", rng.uniform(-tilt, tilt, 2), degrees=True)
@@ -50,3 +49,98 @@ def random_terrain(rng: np.random.Generator, walls: int, tilt: float = 20.0, ris
         centre = rng.uniform(*DISTANCE) * np.array([np.cos(bearing), np.sin(bearing), 0.0]) + [0.0, 0.0, 1.1]
         world.tile(f"wall_{number}", (1.4, 1.8), centre, material="panel", rotation=turn)
     return world.render()
+
+
+def passage(rng: np.random.Generator, friction: float) -> str:
+    """MJCF text of level ground between two even walls that stand at random distances."""
+    length, goal = rng.uniform(1.5, 3.0), (rng.uniform(0.8, 2.0), 0.0, 0.0)
+    world = WorldText("passage", "level ground between walls", friction, (0.6, 0.8), goal)
+    world.platform("ground", (-0.8, length), 1.6)
+    for side, name in ((1.0, "left"), (-1.0, "right")):
+        turn = Rotation.from_euler("x", side * (90.0 + rng.uniform(-10.0, 10.0)), degrees=True)
+        centre = (length / 2 - 0.4, side * rng.uniform(*DISTANCE), 1.0)
+        world.tile(f"wall_{name}", (length + 0.8, 1.2), centre, material="panel", rotation=turn)
+    return world.render()
+
+
+def level(rng: np.random.Generator, friction: float) -> str:
+    """MJCF text of level ground, with the goal in a random direction."""
+    distance, bearing = rng.uniform(0.5, 3.0), rng.uniform(-np.pi, np.pi)
+    goal = (distance * np.cos(bearing), distance * np.sin(bearing), 0.0)
+    world = WorldText("level", "level ground", friction, (0.6, 0.8), goal)
+    world.platform("ground", (-4.0, 4.0), 8.0)
+    return world.render()
+
+
+Maker = Callable[[np.random.Generator, CollectConfig, float], str]
+WALLED: dict[str, Maker] = {
+    "corridor": lambda rng, config, friction: generators.rubble_corridor(
+        rng,
+        rows=int(rng.integers(2, 6)),
+        wall=rng.uniform(0.5, 0.8),
+        wall_tilt=rng.uniform(0.0, 20.0),
+        friction=friction,
+        tilt=rng.uniform(*config.tilt),
+        rise=rng.uniform(*config.rise),
+    ),
+    "tiles": lambda rng, config, friction: tiles_and_walls(
+        rng, 1 + int(rng.random() < 0.7), rng.uniform(*config.tilt), rng.uniform(*config.rise), friction
+    ),
+    "passage": lambda rng, config, friction: passage(rng, friction),
+}
+"""Kinds of worlds with walls in reach."""
+OPEN: dict[str, Maker] = {
+    "field": lambda rng, config, friction: generators.rubble_field(
+        rng,
+        rows=int(rng.integers(1, 6)),
+        tilt=rng.uniform(*config.tilt),
+        rise=rng.uniform(*config.rise),
+        friction=friction,
+    ),
+    "stones": lambda rng, config, friction: generators.stepping_stones(
+        rng,
+        rows=int(rng.integers(2, 6)),
+        gap=rng.uniform(0.02, 0.1),
+        tilt=rng.uniform(0.0, 15.0),
+        rise=rng.uniform(*config.rise),
+        friction=friction,
+    ),
+    "stairs": lambda rng, config, friction: regular.stairs(
+        rng,
+        steps=int(rng.integers(2, 6)),
+        step_height=rng.choice([-1.0, 1.0]) * rng.uniform(0.04, 0.15),
+        tread=rng.uniform(0.28, 0.4),
+        friction=friction,
+    ),
+    "gap": lambda rng, config, friction: regular.gap(rng, width=rng.uniform(0.1, 0.5), friction=friction),
+    "slope": lambda rng, config, friction: regular.slope(
+        rng,
+        length=rng.uniform(0.8, 2.5),
+        angle=rng.choice([-1.0, 1.0]) * rng.uniform(3.0, 0.8 * np.degrees(np.arctan(friction))),
+        friction=friction,
+    ),
+    "level": lambda rng, config, friction: level(rng, friction),
+}
+"""Kinds of worlds without walls in reach."""
+STEEP = "steep slope"
+"""The kind of world in which no foot can rest; it is crossed fast."""
+
+
+def steep_slope(rng: np.random.Generator, friction: float) -> World:
+    """A slope downwards that is about as steep as friction allows, or steeper."""
+    angle = np.degrees(np.arctan(friction)) * rng.uniform(0.8, 1.25)
+    text = regular.slope(rng, length=rng.uniform(0.6, 3.0), angle=min(angle, 35.0), width=1.2, friction=friction)
+    return load_world("training.xml", mjcf=text)
+
+
+def random_world(rng: np.random.Generator, config: CollectConfig, kind: str, friction: float) -> World:
+    """A world of one of the kinds `WALLED` and `OPEN`, with a random way through it."""
+    world = load_world("training.xml", mjcf=(WALLED | OPEN)[kind](rng, config, friction))
+    start, goal = world.start.position, world.goal.position
+    yaw = np.radians(_TURNED) * rng.normal()
+    if rng.random() < _BACK:
+        start, goal, yaw = goal, start, yaw + np.arctan2(*(start - goal)[1::-1])
+    if rng.random() < _SHORT:
+        aside = np.array([start[1] - goal[1], goal[0] - start[0], 0.0]) / np.linalg.norm(goal - start)
+        goal = start + rng.uniform(0.3, 1.0) * (goal - start) + _ASIDE * rng.normal() * aside
+    return replace(world, start=Pose.from_yaw(start, yaw), goal=Goal(goal, world.goal.radius))

@@ -29,6 +29,7 @@ CONTACT = 9  # numbers per contact
 STATE = 9  # numbers after the contacts: CoM, CoM velocity, shift, swing, friction
 TARGETS = 7  # objective, CoM, CoM velocity
 COM = slice(-9, -6)  # columns of the initial CoM
+TIMING = slice(-3, -1)
 TIMING_AND_FRICTION = slice(-3, None)
 
 

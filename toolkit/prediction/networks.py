@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,6 +36,14 @@ def load_networks(robot: RobotModel, folder: Path | None = None) -> dict[Categor
         category: load_network(network_path(folder, category), category, robot.fingerprint)
         for category in categories_of(robot)
     }
+
+
+def digest(folder: Path) -> str:
+    """Digest of the networks in a folder; other networks have another one."""
+    found = hashlib.sha256()
+    for path in sorted(folder.glob("*.safetensors")):
+        found.update(path.name.encode() + path.read_bytes())
+    return found.hexdigest()
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from toolkit.centroidal import fast
-from toolkit.centroidal.build import sequence_problem, transition_problem
+from toolkit.centroidal.sequence import SequenceConfig, optimise, optimise_transition
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Stance
@@ -17,17 +16,18 @@ from toolkit.robot.model import RobotModel
 
 
 class OptimiserEvaluator(TransitionEvaluator):
-    """Solves the centroidal problem of every transition, which takes about a millisecond each.
+    """Solves the centroidal problem of every transition, which takes about two milliseconds each.
 
     Args:
         robot: The robot.
         final_at_rest: Whether the CoM must be at rest after the transition, as at the goal.
+        config: Settings of the optimiser; the default ones where None.
     """
 
     costly = True
 
-    def __init__(self, robot: RobotModel, *, final_at_rest: bool = False):
-        self._robot, self._final_at_rest = robot, final_at_rest
+    def __init__(self, robot: RobotModel, *, final_at_rest: bool = False, config: SequenceConfig | None = None):
+        self._robot, self._final_at_rest, self._config = robot, final_at_rest, config or SequenceConfig()
 
     def evaluate(
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
@@ -42,13 +42,11 @@ class OptimiserEvaluator(TransitionEvaluator):
         final_com, velocity = np.tile(np.asarray(com, float), (n, 1)), np.zeros((n, 3))
         com = within_reach(self._robot, stance, np.asarray(com, float)[None])[0]
         for index, transition in enumerate(transitions):
-            problem = transition_problem(
-                self._robot, stance, com, com_velocity, transition, final_at_rest=self._final_at_rest
-            )
-            motion = fast.solve(problem)
+            given = self._robot, stance, com, com_velocity, transition
+            motion = optimise_transition(*given, config=self._config, final_at_rest=self._final_at_rest)
             if motion.feasible:
                 feasible[index], objective[index] = True, motion.objective
-                final_com[index], velocity[index] = motion.com[-1], motion.linear_momentum[-1] / problem.mass
+                final_com[index], velocity[index] = motion.com[-1], motion.linear_momentum[-1] / self._robot.mass
         return TransitionBatch(feasible, objective, final_com, velocity)
 
     def halt(
@@ -62,5 +60,5 @@ class OptimiserEvaluator(TransitionEvaluator):
         """Objective of coming to rest; see `TransitionEvaluator`."""
         com = within_reach(self._robot, stance, np.asarray(com, float)[None])[0]
         schedule = ContactSchedule.of(ContactSequence(stance, tuple(transitions)), final_rest=rest)
-        motion = fast.solve(sequence_problem(self._robot, schedule, com, com_velocity))
+        motion = optimise(self._robot, schedule, com, com_velocity, config=self._config)
         return motion.objective if motion.feasible else None

@@ -5,15 +5,11 @@ from __future__ import annotations
 from functools import partial
 
 import casadi as ca
-import numpy as np
 
-from toolkit.centroidal.blocks import Parameters, Piece
-from toolkit.physics.leg import PLANNED, LegPosture, ReachMargins, joint_torques, posture_between
-from toolkit.robot.model import LegGeometry
-
-WRENCH = 6
-TINY = 1e-12  # m^2; keeps the derivatives of roots finite
-_MARGINS = tuple(dict.fromkeys(limit.margin for limit in PLANNED))
+from toolkit.centroidal.stages.rows import MARGINS, TINY
+from toolkit.centroidal.stages.steps import WRENCH
+from toolkit.physics.leg import PLANNED, LegPosture, joint_torques, posture_between
+from validation.reference.assembly import Parameters, Piece
 
 
 def displacement(rotation: ca.SX, offset: ca.SX) -> ca.SX:
@@ -47,13 +43,13 @@ def _posture(com: ca.SX, p: Parameters, offset: ca.SX) -> tuple[LegPosture, ca.S
 def leg(moving: bool) -> Piece:
     """Limits of a leg that motions keep.
 
-    Parameters: those of `_posture`; then those of `leg_limits`.
+    Parameters: those of `_posture`; then those of `program.leg_limits`.
     """
     p = Parameters()
     com, slack, offset = ca.SX.sym("c", 3), ca.SX.sym("s"), ca.SX.sym("d", 2 * moving)
     posture, _ = _posture(com, p, offset)
     ranges = [p(2) for _ in PLANNED]
-    margins = {name: p() for name in _MARGINS}
+    margins = {name: p() for name in MARGINS}
     rows = []
     for limit, (lower, upper) in zip(PLANNED, map(ca.vertsplit, ranges), strict=True):
         value, kept = getattr(posture, limit.quantity), margins[limit.margin] * (1 - slack)
@@ -64,12 +60,6 @@ def leg(moving: bool) -> Piece:
     longest = 2 * [limit.quantity for limit in PLANNED].index("length") + 1  # the row of the upper end
     curvature = partial(stretched, reach=reach, length=posture.length, v=v)
     return Piece("leg", v, p.vector, rows=ca.vertcat(*rows), curvature=lambda m: 5 * curvature(m[longest]))
-
-
-def leg_limits(leg: LegGeometry, margins: ReachMargins) -> np.ndarray:
-    """Parameters of the limits of `leg`: lower and upper end of each, in order, then the wanted margins."""
-    ranges = [limit.range_of(leg) for limit in PLANNED]
-    return np.concatenate([*ranges, [getattr(margins, name) for name in _MARGINS]])
 
 
 def torque(moving: bool) -> Piece:

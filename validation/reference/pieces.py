@@ -1,4 +1,6 @@
-"""The pieces of the whole-sequence problem, independent of robot, contacts and timing.
+"""The pieces of the centroidal problem in CasADi, independent of robot, contacts and timing.
+
+They say a second time what `toolkit.centroidal.stages` evaluates, with derivatives that CasADi finds.
 
 Scaled variables of a stage: x = [CoM r (m), velocity v (m/s), kappa = k / m (m^2/s), acceleration a of the step before
 (m/s^2)] and u = [per contact: force and moment at the patch centre, in the contact frame, in weights (and weights
@@ -16,25 +18,23 @@ from functools import lru_cache
 
 import casadi as ca
 
-from toolkit.centroidal.blocks import Parameters, Piece
-from toolkit.centroidal.leg_pieces import WRENCH, displacement, leg, stretched, torque
-from toolkit.centroidal.problem import GRAVITY, STANDARD_GRAVITY
+from toolkit.centroidal.problem import GRAVITY
+from toolkit.centroidal.problem import STANDARD_GRAVITY as G
+from toolkit.centroidal.stages.rows import EVEN
+from toolkit.centroidal.stages.steps import STATE, WRENCH
 from toolkit.physics.momentum import advanced, mean_com
 from toolkit.physics.wrench import SIGNS, pressure, pressure_rows, yaw_row
-
-STATE = 12
-CONTACT = WRENCH + 2
-SLACKS = 2
-EVEN = 0.1  # part of a slack's price that is on its square, so that slacks are shared evenly
-G = STANDARD_GRAVITY
+from validation.reference.assembly import Parameters, Piece
+from validation.reference.leg_pieces import displacement, leg, stretched, torque
 
 
 @lru_cache(maxsize=2)
 def pieces(moving: bool = False) -> dict[str, Piece]:
     """All pieces by their names; contacts are displaced by variables where `moving`. Building takes tens of ms once."""
     made = [_stage(contacts, moving) for contacts in range(1, 5)]
-    made += [_contact(), leg(moving), torque(moving), _distance(moving), _height(moving), _slack(), _initial()]
-    made += [_final(moving), _carry(), _anchor(), _landing()]
+    made += [_contact(), leg(moving), torque(moving), _distance(moving), _height(moving), _final(moving)]
+    made += [_bound(), _price(), _fixed(STATE + 6 * moving), _fixed(3)]
+    made += [_carry()] * moving
     return {piece.name: piece for piece in made}
 
 
@@ -92,7 +92,7 @@ def _contact() -> Piece:
     cone = held - (fx**2 + fy**2) / held  # smooth at rest, unlike the square root
     loaded = ca.vertsplit((half - cop_margin) * fz + (cop_margin - least_cop) * slack[1] + half * excess)
     inside = [-ca.dot(ca.vertcat(*row), ca.vertcat(fx, fy, 1, tx, ty, tz)) for row in pressure_rows(*loaded)]
-    rows = [cone, *inside[2:], *inside[:2], fz - slack[0], fz - slack[1]]
+    rows = [cone, *inside, fz - slack[0], fz - slack[1]]
     # Yaw: what the wanted margins leave, and the least ones, which no slack takes back.
     most = 2 * mu * (half[0] + half[1])
     ranges = [
@@ -125,7 +125,7 @@ def _contact() -> Piece:
     linear = price * (slack[0] + slack[1])
     # The square of a ratio t / f bends three times as much along f as Gauss-Newton knows: where a contact is lightly
     # loaded, steps would swing ever farther around the solution.
-    bend = ca.SX(CONTACT + 1, CONTACT + 1)
+    bend = ca.SX(v.numel(), v.numel())
     bend[2, 2] = 4 * (ca.sumsqr(off_centre) + ca.fmax(spin * weights[2] * leverage, 0)) / pressed**2
     rows = 10 * ca.vertcat(*rows)
     return Piece("contact", v, p.vector, rho=rho, linear=linear, rows=rows, bend=bend, curvature=curvature)
@@ -163,52 +163,47 @@ def _height(moving: bool) -> Piece:
     return Piece("height", ca.vertcat(z, slack, offset), p.vector, rows=5 * (z - least - margin * (1 - slack)))
 
 
-def _slack() -> Piece:
-    """Price of the excess and of the body's slack of a step; parameters: both prices."""
+def _price() -> Piece:
+    """Price of a single variable; parameters: linear and quadratic."""
     p = Parameters()
-    slack, prices = ca.SX.sym("s", SLACKS), p(SLACKS)
-    return Piece("slack", slack, p.vector, rho=ca.sqrt(EVEN * prices) * slack, linear=ca.dot(prices, slack))
+    value, linear, quadratic = ca.SX.sym("u"), p(), p()
+    return Piece("price", value, p.vector, rho=ca.sqrt(quadratic) * value, linear=linear * value)
 
 
-def _initial() -> Piece:
-    """Given state; parameters: the state (12), with the acceleration with which the first step is compared."""
+def _bound() -> Piece:
+    """Bound of a single variable; parameters: 1 for a lower bound or -1 for an upper one, and the bound."""
     p = Parameters()
-    x = ca.SX.sym("x", STATE)
-    rows = x - p(STATE)
-    return Piece("initial", x, p.vector, rows=rows)
+    value, sign, bound = ca.SX.sym("u"), p(), p()
+    return Piece("bound", value, p.vector, rows=sign * (value - bound))
+
+
+def _fixed(size: int) -> Piece:
+    """Given values of variables; parameters: the values."""
+    p = Parameters()
+    value, given = ca.SX.sym("x", size), p(size)
+    return Piece(f"fixed{size}", value, p.vector, rows=value - given)
 
 
 def _final(moving: bool) -> Piece:
-    """Rest, box and centring; rows: the velocity (3), and the offset from the centre in the yaw frame (3).
+    """Box and centring of the last CoM.
 
-    Parameters: centre (3), (2) cos and sin of the final yaw, square roots of the weights of centring, acceleration and
+    Parameters: centre (3), half sizes (3), (2) cos and sin of the final yaw, weights of centring, acceleration and
     angular momentum; where contacts move, how the centre follows both feet's displacements (3 x 4, row-major).
     """
     p = Parameters()
     x, moved = ca.SX.sym("x", STATE), ca.SX.sym("d", 4 * moving)
-    center, heading, weights = p(3), p(2), p(3)
+    center, half, heading, weights = p(3), p(3), p(2), p(3)
     if moving:
         center += ca.reshape(p(12), 4, 3).T @ moved
     dx, dy, dz = ca.vertsplit(x[:3] - center)
     offset = ca.vertcat(heading[0] * dx + heading[1] * dy, -heading[1] * dx + heading[0] * dy, dz)
-    rho = ca.vertcat(weights[0] * offset[:2], weights[1] * x[9:12], weights[2] * x[6:9])
-    return Piece("final", ca.vertcat(x, moved), p.vector, rho=rho, rows=ca.vertcat(x[3:6], offset))
+    roots = ca.sqrt(weights)
+    rho = ca.vertcat(roots[0] * offset[:2], roots[1] * x[9:12], roots[2] * x[6:9])
+    pairs = [row for a in range(3) for row in (half[a] + offset[a], half[a] - offset[a])]
+    return Piece("final", ca.vertcat(x, moved), p.vector, rho=rho, rows=ca.vertcat(*pairs))
 
 
 def _carry() -> Piece:
-    """Change of a pair of variables to the next knot: rows b - a."""
-    now, after = ca.SX.sym("a", 2), ca.SX.sym("b", 2)
+    """Displacements of contacts at the next knot: rows b - a."""
+    now, after = ca.SX.sym("a", 6), ca.SX.sym("b", 6)
     return Piece("carry", ca.vertcat(now, after), ca.SX(0, 1), rows=after - now)
-
-
-def _anchor() -> Piece:
-    """A pair of variables that is zero."""
-    pair = ca.SX.sym("a", 2)
-    return Piece("anchor", pair, ca.SX(0, 1), rows=pair)
-
-
-def _landing() -> Piece:
-    """Price of moving a landing point; parameter: square root of the weight."""
-    p = Parameters()
-    offset, weight = ca.SX.sym("u", 2), p()
-    return Piece("landing", offset, p.vector, rho=weight * offset)

@@ -1,0 +1,208 @@
+"""Primal-dual interior-point method for centroidal problems, with Mehrotra's predictor and corrector.
+
+Hessians are Gauss and Newton's, with convex curvature of the constraints where it is known, so that they are positive
+definite at any point. Dynamics and rows need not hold at the start.
+
+Reference: J. Nocedal, S. Wright, Numerical Optimization (2006), Sec. 14.2 and 19.3.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from toolkit.centroidal.stages import blocks, newton, rows
+from toolkit.centroidal.stages import steps as dynamics
+from toolkit.centroidal.stages.blocks import Block
+from toolkit.centroidal.stages.newton import Sweep, allocate
+from toolkit.compiled import compiled
+
+SMALL = 1e-3
+"""Objective below which accuracy is absolute."""
+REST_STIFFNESS = 1e5
+"""Stiffness of the proximal term for the final rest; a multiplier makes the rest exact."""
+
+
+class Blocks(NamedTuple):
+    """The constraints of a program; see `rows` for each."""
+
+    contacts: Block
+    legs: Block
+    torques: Block
+    distances: Block
+    heights: Block
+    final: Block
+    bounds: Block
+
+
+class Prices(NamedTuple):
+    """Prices of n single variables: linear * v + quadratic * v^2.
+
+    Attributes:
+        stage, variable: (n,) its stage and its number there.
+        linear, quadratic: (n,).
+    """
+
+    stage: np.ndarray
+    variable: np.ndarray
+    linear: np.ndarray
+    quadratic: np.ndarray
+
+
+class Work(NamedTuple):
+    """Room for the model of an iteration, for T stages of at most m variables, n of them states.
+
+    Attributes:
+        hessian: (T, m, m); gradient: (T, m) of the objective; condensed: (T, m) with the rows'.
+        following: (T - 1, n, m) derivative of the next state; defect: (T - 1, n).
+        change: (T, m) Newton step.
+        sweep: Factors of the Newton step.
+    """
+
+    hessian: np.ndarray
+    gradient: np.ndarray
+    condensed: np.ndarray
+    following: np.ndarray
+    defect: np.ndarray
+    change: np.ndarray
+    sweep: Sweep
+
+    @classmethod
+    def of(cls, stages: int, states: int, variables: int) -> Work:
+        """Room for so many stages of at most so many variables."""
+        t, n, m = stages, states, variables
+        return cls(
+            hessian=np.zeros((t, m, m)),
+            gradient=np.zeros((t, m)),
+            condensed=np.zeros((t, m)),
+            following=np.zeros((t - 1, n, m)),
+            defect=np.zeros((t - 1, n)),
+            change=np.zeros((t, m)),
+            sweep=allocate(t, n, m),
+        )
+
+
+class Options(NamedTuple):
+    """Settings of the method.
+
+    Attributes:
+        at_rest: Whether the last velocity is zero.
+        iterations: Most iterations.
+        tolerance: Wanted accuracy of the objective, relative.
+        feasible: Largest violation of dynamics, rows and rest.
+        gap: Complementarity of a row at the start.
+        least: Least slack of a row at the start.
+    """
+
+    at_rest: bool
+    iterations: int = 150
+    tolerance: float = 1e-4
+    feasible: float = 4e-7
+    gap: float = 1.0
+    least: float = 0.3
+
+
+@compiled(reordered=True)
+def evaluate(steps, prices, all_blocks, size, y, work):
+    """Fill the model at y; returns the objective."""
+    work.hessian[:] = 0.0
+    work.gradient[:] = 0.0
+    value = dynamics.linearise(steps, size, y, work.hessian, work.gradient, work.following, work.defect)
+    value += rows.add_prices(prices, y, work.hessian, work.gradient)
+    value += rows.fill_contacts(all_blocks.contacts, y, work.hessian, work.gradient)
+    value += rows.fill_legs(all_blocks.legs, y, work.hessian, work.gradient)
+    value += rows.fill_distances(all_blocks.distances, y, work.hessian, work.gradient)
+    value += rows.fill_final(all_blocks.final, y, work.hessian, work.gradient)
+    rows.fill_torques(all_blocks.torques, y)
+    rows.fill_heights(all_blocks.heights, y)
+    rows.fill_bounds(all_blocks.bounds, y)
+    return value
+
+
+@compiled(reordered=True)
+def direction(all_blocks, size, goal, corrected, work):
+    """Newton step towards complementarities of `goal`; also fills the changes of slacks and multipliers."""
+    work.condensed[:] = work.gradient
+    for block in all_blocks:
+        blocks.add_gradient(block, goal, corrected, work.condensed)
+    newton.solve(size, work.following, work.defect, work.condensed, work.sweep, work.change)
+    for block in all_blocks:
+        blocks.set_changes(block, goal, corrected, work.change)
+
+
+@compiled(reordered=True)
+def longest_steps(all_blocks, keep):
+    """Longest primal and dual steps, at most 1, that keep the part `1 - keep` of every slack and multiplier."""
+    primal, dual = 1.0, 1.0
+    for block in all_blocks:
+        primal = min(primal, keep * blocks.longest(block.slack, block.slack_change))
+        dual = min(dual, keep * blocks.longest(block.multiplier, block.multiplier_change))
+    return primal, dual
+
+
+@compiled(reordered=True)
+def residual(all_blocks, y, rest, work):
+    """Largest violation of dynamics, rows, and rest at the end if wanted."""
+    worst = np.abs(work.defect).max()
+    for block in all_blocks:
+        worst = max(worst, blocks.largest_residual(block))
+    if rest:
+        for a in range(3):
+            worst = max(worst, abs(y[-1, 3 + a]))
+    return worst
+
+
+@compiled(kept=True, reordered=True)
+def minimise(steps, prices, all_blocks, size, y, work, options):
+    """Minimise from the motion y (T, m), which is overwritten but for its first state.
+
+    Returns whether it converged, the iterations, and the objective of the program.
+    """
+    last = y.shape[0] - 1
+    count = 0
+    for block in all_blocks:
+        count += block.value.size
+    force = np.zeros(3)  # multiplier of the final rest
+    rows.prepare_contacts(all_blocks.contacts)
+    value = evaluate(steps, prices, all_blocks, size, y, work)
+    for block in all_blocks:
+        blocks.start(block, options.least, options.gap)
+    for iteration in range(options.iterations):
+        value = evaluate(steps, prices, all_blocks, size, y, work)
+        worst, gap = residual(all_blocks, y, options.at_rest, work), 0.0
+        for block in all_blocks:
+            gap += blocks.complementarity(block)
+            blocks.add_curvature(block, work.hessian)
+        if not (value < np.inf and gap < np.inf):
+            return False, iteration, value
+        if options.at_rest:
+            for a in range(3, 6):
+                work.gradient[last, a] += force[a - 3] + REST_STIFFNESS * y[last, a]
+                work.hessian[last, a, a] += REST_STIFFNESS
+        newton.factor(size, work.hessian, work.following, work.sweep)
+
+        direction(all_blocks, size, 0.0, False, work)
+        accepted, decrease = options.tolerance * (abs(value) + SMALL), 0.0
+        for t in range(last + 1):
+            for k in range(size[t]):
+                decrease += work.gradient[t, k] * work.change[t, k]
+        if worst < options.feasible and gap < accepted and abs(decrease) < accepted:
+            return True, iteration, value
+        primal, dual = longest_steps(all_blocks, 1.0)
+        after = 0.0
+        for block in all_blocks:
+            after += blocks.product_after(block, primal, dual)
+        goal = max(min(1.0, (after / gap) ** 3) * gap, 0.1 * accepted) / count
+
+        direction(all_blocks, size, goal, True, work)
+        primal, dual = longest_steps(all_blocks, max(0.99, 1.0 - gap / count))
+        if options.at_rest:
+            for a in range(3):
+                force[a] += primal * REST_STIFFNESS * (y[last, 3 + a] + work.change[last, 3 + a])
+        for t in range(last + 1):
+            for k in range(size[t]):
+                y[t, k] += primal * work.change[t, k]
+        for block in all_blocks:
+            blocks.move(block, primal, dual)
+    return False, options.iterations, value
