@@ -7,6 +7,7 @@ import hashlib
 from pathlib import Path
 
 from toolkit.errors import InputError
+from toolkit.prediction.networks import digest
 
 _RANGE = 2**30  # leaves room for the seeds that are counted up from the first one
 
@@ -24,14 +25,10 @@ def fresh_seed(networks: Path, purpose: str) -> int:
     Raises:
         InputError: The folder holds no networks.
     """
-    files = sorted(networks.glob("*.safetensors"))
-    if not files:
+    if not any(networks.glob("*.safetensors")):
         raise InputError(f"{networks}: holds no networks to make a seed from; give --seed-offset")
-    digest = hashlib.sha256(purpose.encode())
-    for path in files:
-        digest.update(path.name.encode())
-        digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return int.from_bytes(digest.digest()[:8], "big") % _RANGE
+    mixed = hashlib.sha256(f"{purpose} {digest(networks)}".encode()).digest()
+    return int.from_bytes(mixed[:8], "big") % _RANGE
 
 
 def add_seed_option(parser: argparse.ArgumentParser) -> None:

@@ -21,7 +21,7 @@ class SetScore:
     Attributes:
         infeasible: Share of infeasible transitions.
         accuracy: Share of the transitions whose feasibility is predicted correctly.
-        mean_objective: Mean objective of the feasible ones.
+        mean_objective: Mean objective of those whose outcome is known.
         objective_error: Mean absolute error of the objective.
         relative_error: The same over the mean objective.
         com_error: m; mean distance between the predicted and the true final CoM.
@@ -83,9 +83,9 @@ class Scores:
 
 
 def _errors(network: TransitionNetwork, samples: Samples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Errors of each feasible transition: of the objective over the set's mean, CoM (m), velocity (m/s)."""
-    targets = samples.targets[samples.feasible]
-    outputs = network.predict(samples.features[samples.feasible])
+    """Errors of transitions with a known outcome: of the objective over the set's mean, CoM (m), velocity (m/s)."""
+    targets = samples.targets[samples.known]
+    outputs = network.predict(samples.features[samples.known])
     relative = np.abs(outputs[:, 0] - targets[:, 0]) / targets[:, 0].mean()
     com, velocity = (np.linalg.norm((outputs - targets)[:, part], axis=1) for part in (slice(1, 4), slice(4, 7)))
     return relative, com, velocity

@@ -24,7 +24,7 @@ from validation.options import TrialSettings
 from validation.plan_trial import WarmUp, warm_up
 from validation.random_contacts import sample_walk
 from validation.run_trial import make_planner, robot_of
-from validation.sequence_solvers import DISTINCT, Solution, solve
+from validation.sequence_solvers import Solution, solve
 from validation.tables import failure_section, markdown_table, median, number, write_results
 from validation.trial_file import TrialFile
 
@@ -218,15 +218,12 @@ def by_contacts(records: Sequence[Record]) -> list[dict[str, Any]]:
 def goals_of(rows: Sequence[dict[str, Any]], records: Sequence[Record], fit: float | None) -> list[Goal]:
     """Never worse than the reference, fast, and linear."""
     whole = rows[-1]
-    if not DISTINCT:
-        found = [Goal("solver against reference", "two solvers", "one and the same", goals.NOT_CHECKED)]
-    else:
-        feasible = whole["reference_feasible"]
-        share = None if whole["same_or_better"] is None else 100 * whole["same_or_better"]
-        found = [
-            goals.every("feasible where the reference is", feasible - whole["missed"], feasible),
-            goals.at_least("same or better objective", share, 100 * AGREES, "%", 4),
-        ]
+    feasible = whole["reference_feasible"]
+    share = None if whole["same_or_better"] is None else 100 * whole["same_or_better"]
+    found = [
+        goals.every("feasible where the reference is", feasible - whole["missed"], feasible),
+        goals.at_least("same or better objective", share, 100 * AGREES, "%", 4),
+    ]
     for contacts, limit in LIMITS.items():
         times = [
             record["compared"]["fixed"]["solver"]["seconds"]
@@ -270,7 +267,7 @@ def main(argv: list[str] | None = None) -> int:
         kind_of(kind)
     console = make_console()
     settings, first = options.settings_of(args), options.first_seed(args, "sequences")
-    store = TrialFile(args.out / "trials.jsonl", settings.deciding() | {"distinct": DISTINCT})
+    store = TrialFile(args.out / "trials.jsonl", settings.deciding())
     jobs = [Job(case.name, search_trial, (settings, case)) for case in make_cases(args.kinds, args.trials, first)]
     jobs += [Job(f"walk-{first + index}", walk_trial, (settings, first + index)) for index in range(args.walks)]
     jobs += [
@@ -295,7 +292,7 @@ def main(argv: list[str] | None = None) -> int:
         "sequences",
         title="Whole sequences: solver against reference",
         sections=[
-            ("By origin", f"{table(rows)}\n\n{NOTE if DISTINCT else SAME_NOTE}"),
+            ("By origin", f"{table(rows)}\n\n{NOTE}"),
             ("By number of contacts", f"{table(lengths)}\n\n{note}"),
             ("Failures", failure_section(records)),
         ],
@@ -313,7 +310,6 @@ NOTE = (
     "part of the friction that the solver's motion needs is at most 0.01 above the reference's. Reference / solver: of "
     "the times."
 )
-SAME_NOTE = f"{NOTE} Solver and reference are one and the same program here."
 
 if __name__ == "__main__":
     cli.run(main)

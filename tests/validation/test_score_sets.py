@@ -23,8 +23,9 @@ def samples(error: float, com: float, wrong: int) -> Samples:
     targets[:, 0] += error
     targets[:, 1] += com
     labels = features[:, 0] > 0.0
+    targets[~labels] = np.nan
     labels[:wrong] = False
-    return Samples(features, labels, targets, np.zeros((100, 0)))
+    return Samples(features, labels, targets, np.zeros((100, 3)), np.zeros(100, np.int32))
 
 
 def test_median_and_worst_are_over_the_sets(network):
