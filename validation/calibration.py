@@ -36,7 +36,8 @@ KINDS = tuple(DRAWN)
 PLANNERS = ("learned", "kinematic", "quasi-static")
 OURS = PLANNERS[0]
 EXPANSIONS, TRIALS = 10_000, 15
-SEARCHES, MORE_EXPANSIONS = 4, 1_000  # searches of each planner; expansions of all but our planner's first one
+SEARCHES, OTHER_SEARCHES = 6, 2  # of our planner in each world, and of each other one
+MORE_EXPANSIONS = 1_000  # of all searches but our first one
 FEWEST = 20  # sequences of a world
 COLUMNS = (
     "seed",
@@ -227,14 +228,14 @@ def main(argv: list[str] | None = None) -> int:
         type=cli.positive(int),
         default=SEARCHES,
         metavar="N",
-        help="searches of each planner in each world; only our first one's favourite counts (default: %(default)s)",
+        help="searches with the networks in each world; only the first one's favourite counts (default: %(default)s)",
     )
     parser.add_argument(
         "--more-expansions",
         type=cli.positive(int),
         default=MORE_EXPANSIONS,
         metavar="N",
-        help="expansions of all searches but our first one, which have to find many sequences (default: %(default)s)",
+        help="expansions of all searches but the first one with the networks (default: %(default)s)",
     )
     parser.add_argument(
         "--beside", type=cli.path, metavar="FILE", help="calibration.json of another state, shown beside this one"
@@ -257,7 +258,7 @@ def main(argv: list[str] | None = None) -> int:
         (case, planner, number)
         for case in make_cases(args.kinds, args.trials, first)
         for planner in PLANNERS
-        for number in range(args.searches)
+        for number in range(args.searches if planner == OURS else OTHER_SEARCHES)
     ]
     less = with_expansions(settings, args.more_expansions)
     store = TrialFile(args.out / "trials.jsonl", settings.deciding() | {"more_expansions": args.more_expansions})

@@ -36,7 +36,7 @@ a motion, the ratio of the objectives, the times by number of contacts, and how 
 KINDS = tuple(DRAWN)
 WALK, GROWTH = "random walk", "growth"
 PLANNERS = ("learned", "kinematic")  # who searches, in turn
-EXPANSIONS, TRIALS, WALKS = 300, 20, 60
+EXPANSIONS, TRIALS, WALKS = 600, 20, 60
 LENGTHS = (20, 31, 60, 100, 200, 300)
 BINS = (10, 20, 31, 60, 100, 200, 300)  # contacts, upper ends
 SAME = 1.01  # objectives with a smaller ratio are the same
@@ -68,14 +68,14 @@ def search_trial(settings: TrialSettings, case: Case) -> Record:
 def walk_trial(settings: TrialSettings, seed: int) -> Record:
     """A record: a random walk of any timing, friction and tilt, which may have no motion."""
     robot, rng = robot_of(settings.robot, settings.robots), np.random.default_rng([seed, 1])
-    timing = Timing(float(rng.uniform(0.3, 1.0)), float(rng.uniform(0.5, 1.0)))
+    timing = Timing(float(rng.uniform(0.1, 1.0)), float(rng.uniform(0.3, 1.0)))
     sequence = sample_walk(
         robot,
         int(rng.integers(4, 32)),
         rng,
         timing=timing,
-        tilt=math.radians(rng.uniform(0.0, 25.0)),
-        friction=float(rng.uniform(0.4, 0.8)),
+        tilt=math.radians(rng.uniform(0.0, 35.0)),
+        friction=float(rng.uniform(0.3, 0.8)),
     )
     _ready(settings)
     return _finished({"kind": WALK}, sequence, {"fixed": _compared(settings, sequence, None)})
