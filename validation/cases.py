@@ -25,11 +25,13 @@ class Kind:
         generator: name in `toolkit.world.generators.KINDS`; "" for a file in worlds/.
         options: of the generator.
         random: whether a seed makes another world; else it only seeds the planner.
+        ranges: of options that the seed draws, uniformly.
     """
 
     generator: str = ""
     options: dict[str, float] = field(default_factory=dict)
     random: bool = False
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 KINDS = {
@@ -41,13 +43,24 @@ KINDS = {
     "steep_slope_3m": Kind("slope", {"length": 3.0}),
 }
 
+DRAWN = {
+    "rubble_field": KINDS["rubble_field"],
+    "rubble_corridor": KINDS["rubble_corridor"],
+    "any_slope": Kind("slope", random=True, ranges={"angle": (-18.0, 18.0), "length": (1.0, 3.0)}),
+    "any_steep_slope": Kind("slope", random=True, ranges={"angle": (28.0, 32.0), "length": (1.5, 3.0)}),
+    "any_stairs": Kind("stairs", random=True, ranges={"step_height": (0.06, 0.14), "tread": (0.28, 0.4)}),
+    "any_stones": Kind("stepping_stones", random=True, ranges={"stone": (0.33, 0.4), "gap": (0.04, 0.08)}),
+    "any_gap": Kind("gap", random=True, ranges={"width": (0.3, 0.55)}),
+}
+"""Kinds of which every seed makes another world."""
+
 
 @dataclass(frozen=True)
 class Case:
     """One world and one seed.
 
     Attributes:
-        kind: a key of `KINDS`, or the name of a file in worlds/ without its ending.
+        kind: a key of `KINDS` or `DRAWN`, or the name of a file in worlds/ without its ending.
         seed: of the world where it is random, and of everything that the run draws.
         options: of the generator, beyond those of the kind.
     """
@@ -67,8 +80,9 @@ class Case:
         kind = kind_of(self.kind)
         if not kind.generator:
             return (WORLDS / f"{self.kind}.xml").read_text(encoding="utf-8")
-        options = {**kind.options, **dict(self.options)}
-        return GENERATORS[kind.generator](np.random.default_rng(self.seed), **options)
+        rng = np.random.default_rng(self.seed)
+        drawn = {name: float(rng.uniform(*ends)) for name, ends in kind.ranges.items()}
+        return GENERATORS[kind.generator](rng, **{**kind.options, **drawn, **dict(self.options)})
 
     def world(self) -> World:
         """The world, loaded."""
@@ -81,11 +95,12 @@ def kind_of(name: str) -> Kind:
     Raises:
         InputError: there is none.
     """
-    if name in KINDS:
-        return KINDS[name]
+    known = {**KINDS, **DRAWN}
+    if name in known:
+        return known[name]
     files = sorted(path.stem for path in WORLDS.glob("*.xml"))
     if name not in files:
-        raise InputError(f"--kinds {name}: choose from {', '.join(dict.fromkeys([*KINDS, *files]))}")
+        raise InputError(f"--kinds {name}: choose from {', '.join(dict.fromkeys([*known, *files]))}")
     return Kind()
 
 

@@ -13,10 +13,13 @@ from toolkit.execution.config import ExecutionConfig
 from toolkit.pipeline import planner_kind
 from toolkit.prediction.networks import load_networks
 from toolkit.robot.loader import load_robot
+from validation.fresh_seeds import fresh_seed
+from validation.goals import NOT_MET, Goal
 from validation.jobs import PoolOptions
 from validation.machine import ROOT, code_fingerprint, folder_fingerprint
 
 EXIT_CODES = "exit codes: 0 every trial passed, 1 one failed (see the results), 2 bad input"
+GOAL_CODES = "exit codes: 0 every goal that was checked is met, 1 one is not (see the results), 2 bad input"
 
 
 def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> argparse.ArgumentParser:
@@ -40,7 +43,7 @@ def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> 
     # A trial's own number seeds everything in it: the option of a single run gives way to this one.
     made.add_argument("--seed-offset", "--seed", type=int, default=0, metavar="N", help="first seed (default: 0)")
     made.add_argument(
-        "--workers", type=_count, default=cli.cores(), help="processes, one thread each; 0: this one (default: cores)"
+        "--workers", type=count, default=cli.cores(), help="processes, one thread each; 0: this one (default: cores)"
     )
     made.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
     made.add_argument(
@@ -60,7 +63,7 @@ def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> 
     return made
 
 
-def _count(text: str) -> int:
+def count(text: str) -> int:
     """An argparse type: a whole number from 0 on."""
     value = int(text)
     if value < 0:
@@ -124,6 +127,22 @@ def settings_of(args: argparse.Namespace) -> TrialSettings:
     replanning = getattr(args, "replanning", True)  # not every experiment executes
     planning = cli.PlanningOptions.of(args)
     return TrialSettings(folder.name, folder.parent, planner, planning, args.out.resolve(), replanning=replanning)
+
+
+def first_seed(args: argparse.Namespace, purpose: str) -> int:
+    """The seed that the options ask for, else the one that is made from the robot's networks.
+
+    Raises:
+        InputError: the robot has no networks.
+    """
+    if args.seed_offset is not None:
+        return args.seed_offset
+    return fresh_seed(load_robot(args.robot, args.robots).folder / "networks", purpose)
+
+
+def goal_code(found: Sequence[Goal]) -> int:
+    """Exit code of an experiment that has goals; see `GOAL_CODES`."""
+    return int(any(goal.result == NOT_MET for goal in found))
 
 
 def pool_of(args: argparse.Namespace) -> PoolOptions:

@@ -48,6 +48,15 @@ def values(records: Iterable[Record], *path: str) -> list[float]:
     return found
 
 
+def columns(rows: Sequence[Record], names: Iterable[str]) -> dict[str, list[Any]]:
+    """Figures of many rows as one list each, numbers to six digits, None where there is none; takes little room."""
+    return {name: [_short(row.get(name)) for row in rows] for name in names}
+
+
+def _short(value: Any) -> Any:
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
 def median(numbers: Sequence[float]) -> float | None:
     """Median, None of nothing."""
     return float(np.median(numbers)) if len(numbers) else None

@@ -297,7 +297,7 @@ def make_run(steps: int = 4) -> MadeUpRun:
     count = len(sequence.transitions)
     predicted = np.array([stance.mean_feet.position + [0, 0, 0.9] for stance in sequence.stances])
     solutions = tuple(
-        Solution(sequence, cost, bound, seconds, predicted, 0 * predicted, np.ones(count))
+        Solution(sequence, cost, bound, seconds, predicted, 0 * predicted, np.ones(count), cost)
         for cost, bound, seconds in ((9.0, np.inf, 0.1), (7.0, 1.4, 0.6))
     )
     expanded = np.column_stack([np.linspace(0, 1, 50), 0.1 * np.sin(np.arange(50)), np.zeros(50)])

@@ -35,7 +35,7 @@ def test_a_whole_run_is_written(run, tmp_path):
     assert (refused["number"], refused["feasible"], refused["true_cost"]) == (0, False, None)
     assert "it stretches" in refused["reason"] and not refused["chosen"]
     assert chosen["chosen"] and chosen["feasible"] and chosen["source"] == "search" and "slip" in chosen["reason"]
-    assert chosen["true_cost"] == dynamics["true_cost"] and chosen["predicted_cost"] == run.solution.cost
+    assert chosen["true_cost"] == dynamics["true_cost"] and chosen["predicted_cost"] == run.solution.predicted
     assert (chosen["transitions"], chosen["palm_contacts"]) == (6, 1)
     assert again["seed"] == 3 and again["stages"]["surfaces"]["seconds"] == 0.1
     assert read_plan(tmp_path / "plan.json").duration == run.plan.sequence.duration

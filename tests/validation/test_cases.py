@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from toolkit.errors import InputError
-from validation.cases import AUTHORED_TRIALS, KINDS, WORLDS, Case, kind_of, make_cases
+from validation.cases import AUTHORED_TRIALS, DRAWN, KINDS, WORLDS, Case, kind_of, make_cases
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", sorted({*KINDS, *DRAWN}))
 def test_every_kind_makes_a_world(kind):
     case = Case(kind, 3)
     world = case.world()
     assert world.name == case.name
     assert case.mjcf() == Case(kind, 3).mjcf()
-    assert (case.mjcf() != Case(kind, 4).mjcf()) == KINDS[kind].random
+    assert (case.mjcf() != Case(kind, 4).mjcf()) == kind_of(kind).random
 
 
 def test_options_of_a_case_reach_the_generator():

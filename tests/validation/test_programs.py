@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from validation import execution, options, planning, robustness
+from validation import ablation, budgets, calibration, execution, options, planning, robustness, sequences
 
 
 @pytest.fixture
@@ -19,7 +19,11 @@ def result(folders: list[str], name: str) -> dict:
     return json.loads((folder / f"{name}.json").read_text())
 
 
-@pytest.mark.parametrize("module", [execution, planning, robustness], ids=lambda module: module.__name__)
+@pytest.mark.parametrize(
+    "module",
+    [ablation, budgets, calibration, execution, planning, robustness, sequences],
+    ids=lambda module: module.__name__,
+)
 def test_an_unknown_kind_of_world_is_refused_before_anything_runs(module, folders):
     from toolkit.errors import InputError
 
@@ -84,3 +88,59 @@ def test_robustness_executes_under_each_disturbance(folders):
     rows = result(folders, "robustness")["table"]
     assert [row["disturbance"] for row in rows] == [robustness.NONE, *robustness.DISTURBANCES]
     assert rows[0]["survived"] == 1
+
+
+@pytest.mark.slow
+def test_calibration_prices_every_sequence_and_stands_beside_an_earlier_one(folders, tmp_path):
+    command = ["--kinds", "any_gap", "--trials", "1", "--expansions", "100", "--more-expansions", "60"]
+    command += ["--searches", "2", "--fewest", "2", "--seed-offset", "5"]
+    calibration.main([*command, *folders])
+    first = result(folders, "calibration")
+    (row,) = first["table"]
+    assert row["worlds"] == row["counted"] == 1
+    assert row["returned"] >= 1
+    assert row["states"] > 0
+    assert row["h_violations"] == 0
+    before = Path(folders[-1]) / "calibration.json"
+    before.rename(tmp_path / "before.json")
+    calibration.main([*command, "--beside", str(tmp_path / "before.json"), *folders])
+    assert "The same, measured" in (Path(folders[-1]) / "calibration.md").read_text()
+    again = result(folders, "calibration")["sequences"]
+    assert again == first["sequences"]
+    assert sum(len(group["true_cost"]) for group in again if group["planner"] == "learned") >= row["returned"]
+
+
+@pytest.mark.slow
+def test_ablation_gives_planners_the_same_effort(folders):
+    command = ["--kinds", "any_slope", "--other-trials", "1", "--expansions", "150", "--planners", "learned"]
+    command += ["quasi-static", "--optimisations", "2", "--seconds", "1", "--execute"]
+    ablation.main([*command, "--local-search", "3", *folders])
+    found = result(folders, "ablation")
+    assert [row["planner"] for row in found["table"]] == 5 * ["learned"] + 5 * ["quasi-static"]
+    assert all(row["feasible"] == 1 for row in found["table"] if row["variant"] != ablation.BY_TIME)
+    raw, improved = found["table"][:2]
+    assert improved["true cost"] <= raw["true cost"]
+    assert raw["executed"] is not None
+    (pair,) = [row for row in found["ratios"] if (row["over"], row["variant"]) == ("quasi-static", ablation.RAW)]
+    assert pair["worlds"] == 1
+    assert pair["true cost"] > 0.0
+    assert [len(group["true_cost"]) for group in found["plans"]] == [1] * len(found["plans"])
+
+
+@pytest.mark.slow
+def test_budgets_compare_searches_of_the_same_world(folders):
+    budgets.main(["--kinds", "flat", "--trials", "1", "--expansions", "20", "100", *folders])
+    small, large = result(folders, "budgets")["table"]
+    assert (small["budget"], large["budget"]) == (20, 100)
+    assert large["choice"] <= small["choice"]
+    assert large["first_feasible_seconds"] > 0.0
+
+
+@pytest.mark.slow
+def test_sequences_come_from_searches_and_at_random(folders):
+    command = ["--kinds", "flat", "--trials", "1", "--walks", "1", "--lengths", "2", "4", "--growth-trials", "1"]
+    sequences.main([*command, "--expansions", "50", *folders])
+    found = result(folders, "sequences")
+    assert [row["title"].split(",")[0] for row in found["by_kind"]] == ["flat", "flat", "random walk", "all"]
+    assert found["by_kind"][-1]["reference_feasible"] >= 2
+    assert found["exponent"] is not None

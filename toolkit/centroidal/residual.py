@@ -91,7 +91,7 @@ def confirmed(motion: CentroidalMotion) -> CentroidalMotion:
 
 def objective(motion: CentroidalMotion, weights: Weights) -> float:
     """Objective of a motion with other weights than those with which it was optimised; inf where it is undefined."""
-    return float(_evaluated(replace(motion, problem=replace(motion.problem, weights=weights)))[1].sum())
+    return float(step_costs(replace(motion, problem=replace(motion.problem, weights=weights))).sum())
 
 
 def friction_margin(motion: CentroidalMotion) -> float:

@@ -243,7 +243,7 @@ def _sequence(result: PipelineResult, candidate: Candidate) -> dict[str, Any]:
         "seconds": candidate.seconds,
         "transitions": len(candidate.solution.sequence.transitions),
         "palm_contacts": candidate.palm_contacts,
-        "predicted_cost": candidate.solution.cost,
+        "predicted_cost": candidate.solution.predicted,
         "true_cost": candidate.cost.total if candidate.feasible else None,
         "feasible": candidate.feasible,
         "reason": result.reason_against(candidate),

@@ -79,7 +79,7 @@ def sequence_rows(result: PipelineResult) -> list[tuple[str, ...]]:
             str(candidate.source),
             str(len(candidate.solution.sequence.transitions)),
             str(candidate.palm_contacts),
-            f"{candidate.solution.cost:.1f}",
+            f"{candidate.solution.predicted:.1f}" if math.isfinite(candidate.solution.predicted) else "–",
             f"{candidate.cost.total:.1f}" if candidate.feasible else "–",
             "; ".join(filter(None, ("chosen" * result.is_chosen(candidate), result.reason_against(candidate)))),
         )

@@ -54,7 +54,8 @@ class Arrival:
             self._tally.rejected[Reason.DYNAMICS] += 1
             return None
         predicted = sum(payload[0] for payload in judged) + edge.payload[0]
-        return edge._replace(cost=edge.cost + self._cost.dynamics * (objective - predicted))
+        missing = self._cost.dynamics * (objective - predicted)
+        return edge._replace(cost=edge.cost + missing, payload=(*edge.payload, missing))
 
     def _comes_to_rest(self, passed: list[bytes], transitions: list) -> bool:
         """Whether the last transition, or the last few of them together, end at rest."""

@@ -20,12 +20,13 @@ class Solution:
 
     Attributes:
         sequence: Start stance and transitions.
-        cost: Sum of the edge costs.
+        cost: Cost of the sequence: the true one where the search has optimised it, else the predicted one.
         bound: Upper bound on cost / optimal cost that was known when it was found; inf where unknown.
         seconds: Time from the start of the search until it was found.
         com: (len(transitions) + 1, 3) m; predicted CoM at the start and after each transition.
         com_velocity: Same shape, m/s; predicted velocity of the CoM.
         objective: (len(transitions),) predicted dynamics objective of each transition; NaN where none is predicted.
+        predicted: Sum of the edge costs as the search predicted them; NaN where no search has.
     """
 
     sequence: ContactSequence
@@ -35,6 +36,7 @@ class Solution:
     com: np.ndarray
     com_velocity: np.ndarray
     objective: np.ndarray
+    predicted: float = np.nan
 
     @classmethod
     def of(cls, reader: StateReader, path: Path[bytes]) -> Solution:
@@ -43,6 +45,7 @@ class Solution:
         payloads = [payload for payload in path.payloads if payload is not None]
         rows = unpack(states)
         transitions = tuple(reader.transition(*step) for step in zip(states[1:], payloads, strict=True))
+        corrections = sum(sum(payload[2:]) for payload in payloads)
         return cls(
             sequence=ContactSequence(reader.stance(rows[0, CONTACTS]), transitions),
             cost=path.cost,
@@ -51,6 +54,7 @@ class Solution:
             com=rows[:, COM] / 1000.0,
             com_velocity=rows[:, VELOCITY] / 1000.0,
             objective=np.array([payload[0] for payload in payloads]),
+            predicted=path.cost - corrections,
         )
 
 

@@ -1,0 +1,260 @@
+"""What the networks, the choice by truth and the local search buy: `python -m validation.ablation`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from toolkit import cli
+from toolkit.report.console import make_console
+from toolkit.world.timing import Timing
+from validation import goals, options
+from validation.ablation_trial import BEST, BY_TIME, LOCAL, RAW, Effort, ablation_trial
+from validation.cases import kind_of, make_cases
+from validation.fresh_seeds import add_seed_option
+from validation.goals import Goal
+from validation.jobs import Job, Record, run_jobs
+from validation.searched import PLANNERS, completed
+from validation.tables import columns, failure_section, markdown_table, median, number, values, write_results
+from validation.trial_file import TrialFile
+
+DESCRIPTION = """\
+One table of what the networks buy: learned, optimiser as judge, kinematic and quasi-static planners, each as its search
+has it and with the truly cheapest of equally many optimisations, or of equal seconds, each with and without the local
+search. All worlds are fresh, the timing is the same for all, and plans are compared by their true cost, world by world.
+"""
+FIELD, CORRIDOR = "rubble_field", "rubble_corridor"
+KINDS = (FIELD, CORRIDOR, "any_stairs", "any_stones", "any_gap", "any_slope")
+TIMING = Timing(0.6, 0.8)
+OURS, KINEMATIC, BASELINE = "learned", "kinematic", "quasi-static"
+QUANTITIES: dict[str, tuple[str, ...]] = {
+    "true cost": ("true_cost",),
+    "J": ("objective",),
+    "J, paper's weights": ("paper_objective",),
+    "seconds of walking": ("walking_seconds",),
+    "transitions": ("transitions",),
+    "lin. momentum rate": ("figures", "linear_momentum_rate"),
+    "ang. momentum rate": ("figures", "angular_momentum_rate"),
+    "CoP to edge": ("figures", "cop_distance"),
+    "CoP to edge, feet": ("figures", "foot_cop_distance"),
+}
+KEPT = ("seed", *(path[-1] for path in QUANTITIES.values()), "palm_contacts", "optimiser_seconds", "executed", "held")
+COST, PAPER_J, SECONDS = "true cost", "J, paper's weights", "seconds of walking"
+MOST = {(FIELD, RAW): 1.0, (CORRIDOR, RAW): 0.8, (FIELD, BEST): 0.95, (CORRIDOR, BEST): 0.75}
+"""Most that the true cost may be over the quasi-static planner's, median of the worlds' ratios."""
+PAPER_RATIO = {FIELD: 0.95, CORRIDOR: 0.70}  # of J
+OVER_KINEMATIC, LONGER = 0.92, 1.15
+
+
+def summarise(kind: str, planner: str, variant: str, records: Sequence[Record]) -> dict[str, Any]:
+    """One row: a variant of a planner in a kind of world."""
+    chosen = [record["variants"][variant] for record in records if variant in record["variants"]]
+    simulated = [item for item in chosen if "executed" in item]
+    return {
+        "kind": kind,
+        "planner": planner,
+        "variant": variant,
+        "trials": len(records),
+        "found": sum(record["found"] for record in records),
+        "feasible": len(chosen),
+        "executed": sum(item["executed"] for item in simulated) if simulated else None,
+        "palm_contacts": median(values(chosen, "palm_contacts")),
+        "first_feasible_seconds": median(values(records, "first_feasible_seconds")),
+        "optimised": median(values(records, "optimised")),
+        "spent": median(values(records, "spent")),
+        "local_seconds": median(values(chosen, "optimiser_seconds")) if variant in LOCAL.values() else None,
+        **{name: median(values(chosen, *path)) for name, path in QUANTITIES.items()},
+    }
+
+
+def ratios(kind: str, variant: str, records: Sequence[Record], ours: str, other: str) -> dict[str, Any]:
+    """Medians over the worlds of a kind of one planner's figures over another's, where both have a plan."""
+    chosen = {
+        (record["planner"], record["seed"]): record["variants"][variant]
+        for record in records
+        if variant in record["variants"]
+    }
+    pairs = [
+        (item, chosen[other, seed])
+        for (planner, seed), item in chosen.items()
+        if planner == ours and (other, seed) in chosen
+    ]
+    found = {"kind": kind, "variant": variant, "planner": ours, "over": other, "worlds": len(pairs)}
+    for name, path in QUANTITIES.items():
+        both = [(values([mine], *path), values([theirs], *path)) for mine, theirs in pairs]
+        found[name] = median([mine[0] / theirs[0] for mine, theirs in both if mine and theirs and theirs[0]])
+    return found
+
+
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """The table of all planners."""
+    header = ("world", "planner", "variant", "found", "feasible", "PASS", "true cost", "J", "J, paper's weights")
+    header += ("transitions", "palms", "first feasible sequence [ms]", "seconds of walking", "optimised", "spent [s]")
+    header += ("local search [s]",)
+    cells = (
+        (
+            row["kind"],
+            row["planner"],
+            row["variant"],
+            f"{row['found']}/{row['trials']}",
+            f"{row['feasible']}/{row['trials']}",
+            "-" if row["executed"] is None else f"{row['executed']}/{row['feasible']}",
+            *(number(row[name], ".0f") for name in ("true cost", "J", "J, paper's weights", "transitions")),
+            number(row["palm_contacts"], ".0f"),
+            number(_ms(row["first_feasible_seconds"]), ".0f"),
+            number(row["seconds of walking"], ".1f"),
+            number(row["optimised"], ".0f"),
+            number(row["spent"], ".1f"),
+            number(row["local_seconds"], ".1f"),
+        )
+        for row in rows
+    )
+    return markdown_table(header, cells)
+
+
+def ratio_table(rows: Sequence[dict[str, Any]]) -> str:
+    """Ratios of planners, world by world."""
+    header = ("world", "variant", "planner", "over", "worlds", *QUANTITIES)
+    cells = (
+        (
+            *(str(row[name]) for name in ("kind", "variant", "planner", "over", "worlds")),
+            *(number(row[name], ".3f") for name in QUANTITIES),
+        )
+        for row in rows
+    )
+    return markdown_table(header, cells)
+
+
+def goals_of(found: Sequence[dict[str, Any]]) -> list[Goal]:
+    """What is asked of the learned planner beside the two without networks."""
+    wanted = []
+    row = {(item["kind"], item["variant"], item["over"]): item for item in found if item["planner"] == OURS}
+    for (kind, variant), limit in MOST.items():
+        pair = row.get((kind, variant, BASELINE), {})
+        wanted.append(goals.at_most(f"{kind}, {variant}: true cost over quasi-static", pair.get(COST), limit))
+    for kind in (FIELD, CORRIDOR):
+        pair = row.get((kind, RAW, KINEMATIC), {})
+        wanted.append(goals.at_most(f"{kind}, {RAW}: true cost over kinematic", pair.get(COST), OVER_KINEMATIC))
+        pair = row.get((kind, BEST, BASELINE), {})
+        text = f"{kind}, {BEST}, over quasi-static"
+        wanted.append(goals.at_most(f"{text}: {PAPER_J}, as in the paper", pair.get(PAPER_J), PAPER_RATIO[kind]))
+        if kind == FIELD:
+            wanted.append(goals.at_most(f"{text}: {SECONDS}", pair.get(SECONDS), LONGER))
+        for name in ("lin. momentum rate", "ang. momentum rate"):
+            wanted.append(goals.at_most(f"{text}: {name}", pair.get(name), 1.0))
+        for name in ("CoP to edge", "CoP to edge, feet"):
+            wanted.append(goals.at_least(f"{text}: {name}", pair.get(name), 1.0))
+    return wanted
+
+
+def _kept(records: Sequence[Record]) -> list[dict[str, Any]]:
+    """Every plan of every variant, as lists by kind of world, planner and variant."""
+    groups: dict[tuple[str, str, str], list[Record]] = {}
+    for record in records:
+        for variant, plan in record["variants"].items():
+            row = {"seed": record["seed"], **plan, **plan["figures"]}
+            groups.setdefault((record["kind"], record["planner"], variant), []).append(row)
+    return [
+        {"kind": kind, "planner": planner, "variant": variant, **columns(rows, KEPT)}
+        for (kind, planner, variant), rows in groups.items()
+    ]
+
+
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else 1e3 * seconds
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the experiment; returns the exit code."""
+    parser = options.parser("ablation", DESCRIPTION, KINDS, 50)
+    parser.set_defaults(timing=(TIMING,), time_limit=600.0, planner=OURS)
+    add_seed_option(parser)
+    effort = Effort()
+    parser.add_argument("--planners", nargs="+", choices=PLANNERS, default=list(PLANNERS), help="default: all four")
+    parser.add_argument(
+        "--other-trials",
+        type=cli.positive(int),
+        default=10,
+        metavar="N",
+        help="trials of each kind of world but fields and corridors (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--optimisations",
+        type=cli.positive(int),
+        default=effort.optimisations,
+        metavar="N",
+        help="sequences that a planner may have optimised (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--seconds",
+        type=cli.positive(float),
+        default=effort.seconds,
+        metavar="S",
+        help="of searches and optimisations that a planner may spend (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--local-search",
+        type=options.count,
+        default=effort.motions,
+        metavar="N",
+        help="motions that a local search may optimise beyond that; 0: no local search (default: %(default)s)",
+    )
+    parser.add_argument("--execute", action="store_true", help="simulate the chosen plans as well, which takes long")
+    parser.epilog = options.GOAL_CODES
+    args = parser.parse_args(argv)
+    for kind in args.kinds:
+        kind_of(kind)
+    console = make_console()
+    settings, first = options.settings_of(args), options.first_seed(args, "ablation")
+    effort = Effort(args.optimisations, args.seconds, args.local_search)
+    worlds = [
+        case
+        for kind in args.kinds
+        for case in make_cases([kind], args.trials if kind in (FIELD, CORRIDOR) else args.other_trials, first)
+    ]
+    cases = [(case, planner) for case in worlds for planner in args.planners]
+    chosen = {"optimisations": args.optimisations, "seconds": args.seconds, "local_search": args.local_search}
+    chosen |= {"execute": args.execute}
+    store = TrialFile(args.out / "trials.jsonl", settings.deciding() | chosen)
+    jobs = [
+        Job(f"{planner}-{case.name}", ablation_trial, (settings, case, planner, effort, args.execute))
+        for case, planner in cases
+    ]
+    records = completed(run_jobs(jobs, store, options.pool_of(args), console, "plans"), cases, {"variants": {}})
+    rows, compared = [], []
+    for kind in args.kinds:
+        same = [record for record in records if record["kind"] == kind]
+        for planner in args.planners:
+            own = [record for record in same if record["planner"] == planner]
+            rows += [summarise(kind, planner, variant, own) for variant in effort.variants]
+        for other in (BASELINE, KINEMATIC):
+            for ours in (planner for planner in args.planners if planner not in (other, BASELINE)):
+                compared += [ratios(kind, variant, same, ours, other) for variant in effort.variants]
+    found = goals_of(compared)
+    path = write_results(
+        args.results,
+        "ablation",
+        title="What the networks buy",
+        sections=[
+            ("Planners", f"{table(rows)}\n\n{NOTE}"),
+            ("Over other planners, median of the worlds' ratios", ratio_table(compared)),
+            ("Failures", failure_section(records)),
+        ],
+        content={"table": rows, "ratios": compared, "plans": _kept(records)},
+        goals=found,
+        settings={**settings.described(), **chosen, "trials": args.trials, "seed_offset": first},
+    )
+    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
+    return options.goal_code(found)
+
+
+NOTE = (
+    f"Medians over the worlds with a plan. The {RAW} is the feasible sequence that the first search holds for the "
+    "cheapest. A planner that has effort left searches again with another seed. First feasible sequence: search and "
+    "optimisations in turn until the optimiser calls a sequence feasible, without the heuristic. "
+    f"In the variant '{BY_TIME}' every sequence is optimised as soon as it is found. Neither 'optimised' nor 'spent' "
+    "counts the local search, which may optimise the same number of motions for every planner."
+)
+
+if __name__ == "__main__":
+    cli.run(main)
