@@ -33,6 +33,7 @@ CALM = Weights(angular_momentum=20.0, angular_momentum_rate=1.0)
 """The paper's weights except for the angular momentum: with the paper's, no body can follow fast swings."""
 WANTED_BODY = BodyMargins(length=0.015, ankle=0.1, hip=0.05, height=0.02, torque=0.85)
 CONVERGED = "converged"
+STILL = 1e-9  # m; a smaller displacement of a landing point is none
 
 
 @dataclass(frozen=True)
@@ -192,7 +193,9 @@ def _landed(program: Program, y: np.ndarray) -> np.ndarray | None:
         return None
     position, step = p.position.copy(), np.arange(p.steps)
     for foot in FEET:
-        moved = np.einsum("tij,tj->ti", p.rotation[:, foot, :, :2], y[:-1, layout.pair(foot)])
+        shift = y[:-1, layout.pair(foot)]
+        shift = np.where(np.abs(shift) > STILL, shift, 0.0)
+        moved = np.einsum("tij,tj->ti", p.rotation[:, foot, :, :2], shift)
         on = p.active[:, foot]
         position[on, foot] += moved[on]
         held = np.maximum.accumulate(np.where(on, step, -1))  # a foot in the air has the contact that it left
