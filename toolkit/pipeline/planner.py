@@ -60,7 +60,7 @@ def make_planner(
         if len(config.timings) < 2:  # this planner counts steps; each of them takes as long as any other
             config = replace(config, cost=replace(config.cost, time=0.0))
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
-    # Imported here: without a cache the fast solver takes seconds to compile, and only these kinds need it.
+    # Imported here: without a cache the solver takes seconds to compile, and only these kinds need it.
     from toolkit.prediction.optimiser import OptimiserEvaluator
 
     optimiser = OptimiserEvaluator(robot)
