@@ -132,7 +132,7 @@ def test_digest_of_a_compiled_function_is_that_of_its_source():
 @pytest.mark.parametrize(
     "kernel, callee",
     [
-        ("toolkit.centroidal.fast:_solved", "toolkit.centroidal.kernels.elimination:cholesky"),
+        ("toolkit.centroidal.stages.method:minimise", "toolkit.centroidal.stages.newton:factor"),
         ("toolkit.replanning.kernel:solve", "toolkit.replanning.sweep:_multiply"),
     ],
 )
@@ -182,9 +182,10 @@ import json
 import numpy as np
 from tests.replanning.test_kernel import random_program
 from toolkit.replanning import kernel
-from toolkit.centroidal import fast
+from toolkit.centroidal.stages.method import minimise
 from tests.conftest import sole
-from toolkit.centroidal.build import initial_com, transition_problem
+from toolkit.centroidal.build import initial_com
+from toolkit.centroidal.sequence import optimise_transition
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.geometry.limb import FEET, Limb
@@ -196,8 +197,8 @@ kernel.solve(program, np.zeros((len(program.weight), 6)), np.zeros(4), 20, 1e-6)
 robot = load_robot(find_robots()[0])
 start = Stance(tuple(sole(robot, limb) for limb in FEET))
 step = ContactTransition(Limb.LEFT_FOOT, sole(robot, Limb.LEFT_FOOT, 0.1), Timing(0.4, 0.6))
-fast.solve(transition_problem(robot, start, initial_com(robot, start), np.zeros(3), step))
-kernels = (kernel.solve, fast._solved)
+optimise_transition(robot, start, initial_com(robot, start), np.zeros(3), step)
+kernels = (kernel.solve, minimise)
 print(json.dumps({"results": [], "compiled": [sum(item.stats.cache_misses.values()) for item in kernels]}))
 """
 
@@ -242,9 +243,9 @@ def test_an_edit_below_a_kernel_turns_the_next_run_around(copy):
 def test_an_edit_below_a_solver_turns_the_next_run_around(copy):
     assert copy.run(SOLVERS)["compiled"] == [1, 1]
     assert copy.run(SOLVERS)["compiled"] == [0, 0]
-    for path, function in (
-        ("centroidal/kernels/elimination", "cholesky(a, n)"),
-        ("replanning/sweep", "_multiply(a, b, out)"),
+    for path, function, name in (
+        ("centroidal/stages/newton", "factor(size, hessian, following, sweep)", "following"),
+        ("replanning/sweep", "_multiply(a, b, out)", "a"),
     ):
-        copy.edit(f"toolkit/{path}.py", f"def {function}:\n", f"def {function}:\n    a = a + 0.0\n")
+        copy.edit(f"toolkit/{path}.py", f"def {function}:\n", f"def {function}:\n    {name} = {name} + 0.0\n")
     assert copy.run(SOLVERS)["compiled"] == [1, 1]

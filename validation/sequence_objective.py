@@ -10,8 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from scipy.stats import pearsonr, spearmanr, theilslopes
 
-from toolkit.centroidal import fast
-from toolkit.centroidal.build import initial_com, sequence_problem
+from toolkit.centroidal.build import initial_com
+from toolkit.centroidal.sequence import optimise
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.errors import PlanningError
 from toolkit.pipeline import make_planner
@@ -86,7 +86,7 @@ def relation(robot: RobotModel, *, count: int, seed: int, expansions: int = 200)
                 break
             schedule = ContactSchedule.of(solution.sequence, final_rest=FINAL_REST)
             start = initial_com(robot, solution.sequence.start)
-            motion = fast.solve(sequence_problem(robot, schedule, start, np.zeros(3)))
+            motion = optimise(robot, schedule, start, np.zeros(3))
             if not motion.feasible:
                 infeasible += 1
                 continue

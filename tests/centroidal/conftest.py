@@ -8,6 +8,7 @@ import pytest
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
+from toolkit.physics.leg import LIMITS, TORQUE_ROLES
 from toolkit.robot.model import ArmGeometry, LegGeometry, LimbModel
 
 
@@ -24,8 +25,8 @@ def _leg(side):
         shin=0.4,
         min_length=0.45,
         max_length=0.785,
-        ranges={},
-        torques={},
+        ranges={limit.quantity: (-2.0, 2.0) for limit in LIMITS if limit.quantity != "length"},
+        torques=dict.fromkeys(TORQUE_ROLES, 1000.0),
     )
 
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toolkit.centroidal.fast import solve
 
 from toolkit.centroidal import residual
 from toolkit.centroidal.arrays import MotionArrays, ProblemArrays
 from toolkit.centroidal.build import initial_com, transition_problem
 from toolkit.centroidal.problem import STANDARD_GRAVITY, Margins
+from toolkit.centroidal.sequence import optimise_transition
 from toolkit.contacts.category import Category
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact
@@ -37,10 +37,10 @@ def motions(robot):
     for category in Category:
         while sum(item[0] == category for item in found) < 3:
             sample = sample_transition(robot, category, rng, SamplingConfig(speed_spread=0.3))
-            problem = transition_problem(robot, sample.stance, sample.com, sample.com_velocity, sample.transition)
-            motion = solve(problem)
+            given = sample.stance, sample.com, sample.com_velocity, sample.transition
+            motion = optimise_transition(robot, *given)
             if motion.feasible:
-                found.append((category, motion))
+                found.append((category, replace(motion, problem=motion.solved, kept=None)))
     return [motion for _, motion in found]
 
 

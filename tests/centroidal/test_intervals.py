@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toolkit.centroidal.fast import solve
 
 from tests.centroidal.walks import walk
-from toolkit.centroidal.build import initial_com, sequence_problem
+from toolkit.centroidal.build import initial_com
 from toolkit.centroidal.intervals import intervals
 from toolkit.centroidal.residual import step_costs
+from toolkit.centroidal.sequence import optimise
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import InputError
@@ -18,9 +18,9 @@ TIMINGS = [(1.0, 1.0), (0.13, 0.41), (0.6, 0.8)]
 
 
 def walking(robot, timing, steps=4):
-    """Schedule and motion of a walk, without limits of legs."""
+    """Schedule and motion of a walk."""
     start, schedule = walk(robot, steps, 0.3, timing)
-    motion = solve(sequence_problem(robot, schedule, initial_com(robot, start), np.zeros(3)))
+    motion = optimise(robot, schedule, initial_com(robot, start), np.zeros(3))
     assert motion.feasible
     return schedule, motion
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from toolkit.centroidal import fast, residual
-from toolkit.centroidal.build import ProblemConfig, initial_com, transition_problem
+from toolkit.centroidal import residual
+from toolkit.centroidal.build import initial_com, transition_problem
 from toolkit.centroidal.problem import CentroidalMotion, Margins
 from toolkit.centroidal.residual import Residuals, check, confirmed
+from toolkit.centroidal.sequence import optimise_transition
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
@@ -163,10 +164,7 @@ def test_the_objective_is_the_sum_of_its_terms(standing):
 def test_feasible_solutions_pass_only_with_their_own_problem(robot, feet):
     contact = Contact(Limb.LEFT_FOOT, Pose.from_yaw(np.array([0.3, 0.1, 0.0]), 0.0), 0.5)
     transition = ContactTransition(Limb.LEFT_FOOT, contact)
-    problem = transition_problem(robot, feet, initial_com(robot, feet), np.zeros(3), transition)
-    motion = fast.solve(problem)
-    assert motion.feasible
-    slippery = transition_problem(
-        robot, feet, initial_com(robot, feet), np.zeros(3), transition, config=ProblemConfig(margins=Margins(0.001))
-    )
-    assert not confirmed(replace(motion, problem=slippery)).feasible
+    motion = optimise_transition(robot, feet, initial_com(robot, feet), np.zeros(3), transition)
+    assert motion.feasible and confirmed(motion).feasible
+    slippery = replace(motion.problem, margins=Margins(0.001))
+    assert not confirmed(replace(motion, problem=slippery, kept=None)).feasible

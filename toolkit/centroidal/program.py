@@ -371,10 +371,11 @@ class Program:
         step, limb = np.nonzero(p.active)
         knot, wrench = np.arange(p.steps + 1), layout.wrench[step, limb]
         most = p.max_normal_force[limb] / self._weight
+        finite = np.isfinite(most)
         lower = [(step, wrench + 2), (step, wrench + 6), (step, wrench + 7), (knot[:-1], layout.slack[:-1, 0])]
         lower.append((knot, layout.slack[:, 1]))
         parts = [(at, variable[:, None], np.tile([1.0, 0.0], (len(at), 1))) for at, variable in lower]
-        parts.append((step, wrench[:, None] + 2, np.column_stack([np.full(len(step), -1.0), most])))
+        parts.append((step[finite], wrench[finite, None] + 2, np.stack([-np.ones(finite.sum()), most[finite]], 1)))
         for item in self._landings:
             for axis, (least, largest) in enumerate(zip(item.lower, item.upper, strict=True)):
                 if largest - least >= NARROW:

@@ -21,7 +21,7 @@ from toolkit.report.files import check_entries, read_check, read_json, write_jso
 from toolkit.world.world import World
 
 SCHEMA = 3
-PACKAGES = ("mujoco", "placo", "pin", "casadi", "daqp", "numpy", "scipy", "numba", "rerun-sdk")
+PACKAGES = ("mujoco", "placo", "pin", "daqp", "numpy", "scipy", "numba", "rerun-sdk")
 
 SURFACES = ("count", "foot", "palm", "seconds")
 PLANNING = (

@@ -196,7 +196,9 @@ def minimise(steps, prices, all_blocks, size, y, work, options):
         goal = max(min(1.0, (after / gap) ** 3) * gap, 0.1 * accepted) / count
 
         direction(all_blocks, size, goal, True, work)
-        primal, dual = longest_steps(all_blocks, max(0.99, 1.0 - gap / count))
+        keep = max(0.99, 1.0 - gap / count)
+        primal, dual = longest_steps(all_blocks, keep)
+        primal = min(primal, keep * rows.longest_in_cones(all_blocks.contacts, y, work.change))
         if options.at_rest:
             for a in range(3):
                 force[a] += primal * REST_STIFFNESS * (y[last, 3 + a] + work.change[last, 3 + a])

@@ -24,6 +24,7 @@ TINY = 1e-12  # m^2; keeps the derivatives of roots finite
 NUDGE = 1e-7  # m; of the differences
 EVEN = 0.1  # part of a slack's price that is on its square, so that slacks are shared evenly
 UNLOADED = 0.01  # weights added to a normal force under a CoP: an unloaded contact has none
+UNHELD = 1e-7  # weights added to what friction can hold, which divides
 CONE, FIRST_YAW = 0, 7
 CONTACT_ROWS = FIRST_YAW + 2 * len(SIGNS)
 LEG_ROWS, TORQUE_ROWS, DISTANCE_ROWS, FINAL_ROWS = 2 * len(PLANNED), 10, 2, 6
@@ -102,7 +103,7 @@ def fill_contacts(block, y, hessian, gradient):
             block.value[i, a] = value
         fx, fy, fz = v[0], v[1], v[2]
         mu, wanted, least = p[_MU], p[_WANTED], p[_LEAST]
-        held = mu * (wanted * fz + (least - wanted) * v[6] + v[8]) + 1e-7
+        held = mu * (wanted * fz + (least - wanted) * v[6] + v[8]) + UNHELD
         d_held[2], d_held[6], d_held[8] = mu * wanted, mu * (least - wanted), mu
         lateral = fx * fx + fy * fy
         block.value[i, CONE] = SHARPNESS * (held - lateral / held)  # smooth at rest, unlike the square root
@@ -122,6 +123,24 @@ def fill_contacts(block, y, hessian, gradient):
         total += contact_objective(p, v, row, local, force)
         scatter(local, force, index, hessian[block.stage[i]], gradient[block.stage[i]])
     return total
+
+
+@compiled(reordered=True)
+def longest_in_cones(block, y, change):
+    """Longest step, at most 1.01, that keeps what the friction of every contact can hold positive.
+
+    The rows of cones mean something only there, and rows that do not hold yet do not ensure it.
+    """
+    step = 1.01
+    for i in range(block.stage.shape[0]):
+        p, t, index = block.parameters[i], block.stage[i], block.variables[i]
+        mu, wanted, least = p[_MU], p[_WANTED], p[_LEAST]
+        now, then = y[t], change[t]
+        held = mu * (wanted * now[index[2]] + (least - wanted) * now[index[6]] + now[index[8]]) + UNHELD
+        gain = mu * (wanted * then[index[2]] + (least - wanted) * then[index[6]] + then[index[8]])
+        if gain < 0.0:
+            step = min(step, -held / gain)
+    return step
 
 
 @compiled(reordered=True)
