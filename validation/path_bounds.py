@@ -68,7 +68,7 @@ class BoundCheck:
         self._weights = strategy_of(config, KinematicEvaluator(planner.robot), way.length, slides=way.slides).cost
         table, timings = ground.moves(way.wide).table, config.timings or (planner.world.timing,)
         self._goal = planner.world.goal
-        self._cost = EdgeCost(self._weights, table, timings, self._goal, way.distance, way.longest)
+        self._cost = EdgeCost(self._weights, table, timings, self._goal, way.distance, way.longest, planner.robot.mass)
 
     def __call__(self, tested: Tested) -> PathBounds:
         """The h and the cost to go along a sequence of the planner."""

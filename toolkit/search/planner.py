@@ -144,7 +144,8 @@ class ContactPlanner:
         limbs = [limb for limb in PALMS if palms and limb in self.robot.arms]
         candidates = CandidateGenerator(moves, limbs, timings, exclusions, tally.rejected)
         reader, reach = StateReader(table, timings), ReachCheck(moves, limbs, timings)
-        cost = EdgeCost(strategy.cost, table, timings, self.world.goal, way.distance, way.longest)
+        mass = 0.0 if self._finish is None else self.robot.mass
+        cost = EdgeCost(strategy.cost, table, timings, self.world.goal, way.distance, way.longest, mass)
         haste = None
         if strategy.hasty is not None:
             haste = Haste(table, self.robot.com_height, way.forced, cost.per_metre)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from toolkit.centroidal.sequence import CALM
 from toolkit.geometry.limb import Limb
 from toolkit.search.costs.heuristic import Distance
 from toolkit.search.moves.candidates import Candidates
@@ -20,6 +21,9 @@ from toolkit.world.timing import Timing
 from toolkit.world.world import Goal
 
 _LEAST_RESERVE = 0.02  # part of the friction; contacts that slide cost no more than those that barely hold
+_SURE = 0.98  # part of the least momentum's cost that is counted: the objective takes it at the ends of steps
+_LEAN = 0.3  # m; by so much less than the mean of the feet the CoM may move
+_RESTS = 1.4  # s; at both ends of a plan, in which it may move too
 _ARRIVAL = 0.01  # m; plans end this far inside the goal, as robots land a little beside their plans
 
 
@@ -97,7 +101,7 @@ class TransitionCost:
 
     def least_of_edge(self, candidates: Candidates) -> np.ndarray:
         """(n,) least cost of transitions, which every one of them has."""
-        return candidates.way + self._config.step
+        return candidates.way + self._config.step + self.time * self._durations.min()
 
     def at_goal(self, centre: np.ndarray) -> np.ndarray:
         """(n,) bool; whether a plan may end with the mean of the feet at (n, 3) m."""
@@ -131,6 +135,7 @@ class EdgeCost(TransitionCost):
         config, table, timings, goal: See `TransitionCost`.
         distance: Distance to the goal.
         longest: The farthest, in m, that the mean of the feet moves in one transition.
+        mass: kg; of the robot whose motions the objectives are of. 0 where they are not those of motions.
     """
 
     def __init__(
@@ -141,19 +146,32 @@ class EdgeCost(TransitionCost):
         goal: Goal,
         distance: Distance,
         longest: float,
+        mass: float = 0.0,
     ):
         super().__init__(config, table, timings, goal)
         self._distance, self._longest = distance, longest
+        self._momentum = _SURE * self.dynamics * CALM.linear_momentum / 0.2 * mass**2
+        self._slowest = float(self._durations.max())
+        # Of one transition, as long as the slowest and as cheap as the shortest one.
+        self._step = config.step + self.time * float(self._durations.min())
 
     def to_go(self, centre: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-        """(n,) least cost to the goal for the mean of the feet (n, 3) m with headings (n,) rad, by Eq. 5 of the paper.
+        """(n,) least cost to the goal for the mean of the feet (n, 3) m with headings (n,) rad.
 
-        It counts at least one transition where the goal is not reached.
+        Beside the way and the transitions of Eq. 5 of the paper, it counts what moving so far costs at least: the
+        integral of the squared momentum over a time T is at least (m d)^2 / T for a way d. More transitions take more
+        time and so less momentum; the cheapest number of them counts, at least one where the goal is not reached.
         """
         distance = self._distance(centre, yaw)
-        return distance + self._config.step * np.maximum(distance / self._longest, ~self.at_goal(centre))
+        count = np.maximum(distance / self._longest, ~self.at_goal(centre))
+        with np.errstate(invalid="ignore"):  # no way leads there
+            moved = np.maximum(distance - _LEAN, 0.0)
+            slack = _RESTS + self._slowest * count
+            time = np.maximum(slack, moved * np.sqrt(self._momentum * self._slowest / max(self._step, 1e-9)))
+            least = self._step * (count + (time - slack) / self._slowest) + self._momentum * moved**2 / time
+            return np.where(np.isfinite(distance), distance + least, np.inf)
 
     @property
     def per_metre(self) -> float:
-        """Increase of `to_go` per m of way."""
-        return 1.0 + self._config.step / self._longest
+        """Increase of the way's and the transitions' part of `to_go` per m of way."""
+        return 1.0 + self._step / self._longest
