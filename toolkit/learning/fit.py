@@ -30,6 +30,8 @@ from toolkit.prediction.network import (
     training_summary,
 )
 
+BLURRED = 2  # copies of each sample whose CoM state is disturbed
+COM_BLUR, VELOCITY_BLUR = (0.015, 0.015, 0.008), (0.04, 0.04, 0.02)  # m and m/s; usual errors of predicted states
 MINIMUM = 50  # least number of samples with each label
 OBJECTIVE_LIMIT = 5e4  # the regressor does not learn from transitions with a larger objective
 
@@ -110,9 +112,12 @@ def train_networks(
         classifier = Scaling(mean, std, np.zeros(1), np.ones(1)).fold(net)
 
     kept = np.flatnonzero(samples.known & (samples.targets[:, 0] < OBJECTIVE_LIMIT))
+    kept = np.repeat(kept, 1 + BLURRED)
+    features = features[kept]
+    _blur(features, np.arange(len(kept)) % (1 + BLURRED) > 0, np.random.default_rng(config.seed))
     targets = samples.targets[kept].astype(np.float64)
     targets[:, 0] = compressed(targets[:, 0])
-    targets[:, 1:4] -= features[kept, COM]
+    targets[:, 1:4] -= features[:, COM]
     out_mean = np.concatenate([[0.0], targets[:, 1:].mean(0)])
     scaling = Scaling(mean, std, out_mean, np.maximum(targets.std(0), 1e-4))
     regressor = perceptron(size, TARGETS)
@@ -120,7 +125,7 @@ def train_networks(
         scaling.unfold(start, regressor)
     task = Regression(
         tensor(samples.features[kept, TIMING]),
-        inputs[torch.from_numpy(kept).to(config.device)],
+        tensor((features - mean) / std),
         tensor((targets - out_mean) / scaling.out_std),
     )
     held_out = _held_out(samples.select(kept))
@@ -128,6 +133,16 @@ def train_networks(
         regressor, task, config, lambda *state: progress("regressor", *state), held_out, orthogonal=True
     )
     return TrainedNetworks(classifier, scaling.fold(regressor), curves)
+
+
+def _blur(features: np.ndarray, rows: np.ndarray, rng: np.random.Generator) -> None:
+    """Disturb the CoM states of some rows of features (n, d) as predictions of a search are wrong.
+
+    In a search, a transition begins in the state that is predicted after the one before. What is learned of disturbed
+    states with the labels of the true ones does not amplify such errors.
+    """
+    spread = rng.uniform(0.0, 2.0, (rows.sum(), 1)) * np.concatenate([COM_BLUR, VELOCITY_BLUR])
+    features[rows, COM.start : COM.stop + 3] += spread * rng.normal(size=(rows.sum(), 6))
 
 
 def _held_out(samples: Samples) -> np.ndarray:
