@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -100,9 +101,11 @@ class ContactPlanner:
         strategy = strategy_of(self.config, self._suited(start, com, tally), way.length, slides=way.slides)
         parts = self._parts(way, strategy, tally, exclusions, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
-        searches = [(ContactProblem(parts, state), strategy.patient)]
+        unit = parts.cost.per_metre
+        searches = [(ContactProblem(parts, state), replace(strategy.patient, unit=unit))]
         if strategy.hasty is not None:  # a sequence that begins with the right foot often mirrors one that does not
-            searches.insert(0, (ContactProblem(parts, moved_last(state, Limb.RIGHT_FOOT)), strategy.hasty))
+            hasty = replace(strategy.hasty, unit=unit)
+            searches.insert(0, (ContactProblem(parts, moved_last(state, Limb.RIGHT_FOOT)), hasty))
         judge = None
         if self._finish is not None:
             judge = Arrival(self._finish, self._at_rest if way.slides else None, parts.reader, parts.cost, tally)
@@ -149,7 +152,7 @@ class ContactPlanner:
         haste = None
         if strategy.hasty is not None:
             haste = Haste(table, self.robot.com_height, way.forced, cost.per_metre)
-        delay = Delay(Drift(self.robot, table, timings), haste)
+        delay = Delay(Drift(self.robot, table, timings), haste, cost.per_metre)
         at_once, waiting = (
             None if judge is None else Judging(judge, reader, reach, tally, deadline)
             for judge in (strategy.at_once, strategy.waiting)

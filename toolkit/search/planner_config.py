@@ -37,7 +37,7 @@ class PlannerConfig:
     timings: tuple[Timing, ...] = ()
     rest_friction: float | None = None
     cost: CostConfig = field(default_factory=CostConfig)
-    acceptable_cost: float = 400.0
+    acceptable_cost: float = 500.0
     search: AnaStarConfig = field(default_factory=lambda: AnaStarConfig(max_expansions=20_000))
 
     def __post_init__(self):

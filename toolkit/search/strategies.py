@@ -11,6 +11,9 @@ from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.planner_config import PlannerConfig
 
 
+_LAYER = 0.13  # m of way; random expansions are as likely at every distance from the goal
+
+
 @dataclass(frozen=True)
 class Strategy:
     """The strategy of one search.
@@ -51,7 +54,7 @@ def strategy_of(config: PlannerConfig, evaluator: TransitionEvaluator, length: f
 
 def ordinary(config: PlannerConfig, evaluator: TransitionEvaluator, length: float) -> Strategy:
     """Judge all transitions out of a state together, and let the cost so far count from the start."""
-    patient = replace(config.search, initial_cost=_acceptable(config, length))
+    patient = replace(config.search, initial_cost=_acceptable(config, length), layer=min(config.search.layer, _LAYER))
     return Strategy(config.cost, evaluator, None, patient)
 
 
@@ -74,16 +77,16 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
     limit = config.search.max_expansions
     patient = replace(
         config.search,
-        layer=1.5,
+        layer=0.2,
         epsilon=0.15,
-        crowding=0.6,
+        crowding=0.08,
         max_expansions=None if limit is None else 3 * limit,
     )
     hasty = replace(
         patient,
-        layer=1.0,
+        layer=0.13,
         epsilon=0.3,
-        crowding=0.1,
+        crowding=0.013,
         max_expansions=600 if limit is None else 3 * limit // 5,
         first_only=True,
     )

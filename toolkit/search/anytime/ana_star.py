@@ -30,7 +30,7 @@ from toolkit.search.anytime.graph import Edge, Judge, Path, Progress, SearchProb
 from toolkit.search.anytime.open_list import OpenList
 
 _TINY = 1e-9  # divisor in place of h = 0
-_REFUSAL = 3.0  # added to h, for the order of expansion, where the judge refused a goal
+_REFUSAL = 0.4  # units; added to h, for the order of expansion, where the judge refused a goal
 _MAX_STATES = 700_000  # a search that knows so many states ends, to bound its memory
 _REPORT_INTERVAL = 0.1  # s between calls of the observer, solutions apart
 
@@ -41,23 +41,26 @@ class AnaStarConfig:
 
     Attributes:
         epsilon: Probability of expanding a random open state.
-        layer: Width of the intervals of h. A random draw takes the best state of a random interval; inf: any state.
+        layer: Width of the intervals of h, in units. A random draw takes the best state of a random interval; inf: any
+            state.
         initial_cost: Stands for G before there is a solution, for the order of expansion only; nothing is pruned by it.
             inf expands the least h (depth first, fastest); a smaller value weighs the cost so far as well.
-        crowding: Added to h for the order of expansion, per state already expanded in the same crowd. While there is
-            no solution it grows by the same amount with every `patience` expansions.
+        crowding: Added to h for the order of expansion, in units, per state already expanded in the same crowd. While
+            there is no solution it grows by the same amount with every `patience` expansions.
         patience: See `crowding`.
         max_expansions: Limit on the expansions; None: no limit.
         first_only: Whether the first solution ends the search.
+        unit: A cost that matters little beside that of a whole path, such as the least cost of 1 m of way.
     """
 
     epsilon: float = 0.1
     layer: float = math.inf
     initial_cost: float = math.inf
-    crowding: float = 0.3
+    crowding: float = 0.04
     patience: int = 200
     max_expansions: int | None = None
     first_only: bool = False
+    unit: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ class AnaStar(Generic[State]):
         self._parent: list[int] = []
         self._crowd: list[Hashable] = []
         self._expanded_in: dict[Hashable, int] = {}
-        self._open = OpenList(self._g, self._h, self._config.layer)
+        self._open = OpenList(self._g, self._h, self._config.layer * self._config.unit)
         self._crowding = self._config.crowding
         self._forbidden: set[tuple[State, State]] = set()
 
@@ -213,7 +216,7 @@ class AnaStar(Generic[State]):
         """A number that falls as e(s) rises."""
         g, h = self._g[node], self._h[node] + self._edge[node].delay
         if self._config.crowding > 0:
-            h += self._crowding * self._expanded_in.get(self._crowd[node], 0)
+            h += self._crowding * self._config.unit * self._expanded_in.get(self._crowd[node], 0)
         target = self._best if self._best < math.inf else self._config.initial_cost
         if target == math.inf:
             return h
@@ -268,7 +271,7 @@ class AnaStar(Generic[State]):
         """Open a goal at which the judge would not end, as a state on the way to another one."""
         h = float(self._problem.heuristic([edge.state])[0])
         crowd = self._problem.crowd([edge.state])[0]
-        later = edge._replace(delay=edge.delay + _REFUSAL)
+        later = edge._replace(delay=edge.delay + _REFUSAL * self._config.unit)
         self._improve(later, self._g[node] + edge.cost, h, node, crowd)
 
     def _lower_bound(self) -> float:

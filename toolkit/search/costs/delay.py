@@ -23,13 +23,13 @@ from toolkit.search.moves.candidates import Candidates
 from toolkit.search.moves.drift import Drift
 from toolkit.search.states.contact_table import ContactTable
 
-# Weights of haste, in the h of 1 m of way.
+# All weights are in the h of 1 m of way. Those of haste:
 _CAPTURE = 1.0  # per m that the capture point lies ahead of the foremost foot
 _EARLY = 0.7  # per m of v^2 / 2 a; with 1 or more nothing would be gained by going on
 _TURN = 0.5  # per rad between the feet's headings
-# Costs of transitions that are not judged yet.
-_MISS = 30.0  # per m by which a transition would have to bend the motion
-_DOUBT = 3.0  # where the evaluator rejected a transition and its stand-in has not judged it yet
+# Those of transitions that are not judged yet:
+_MISS = 4.0  # per m by which a transition would have to bend the motion
+_DOUBT = 0.4  # where the evaluator rejected a transition and its stand-in has not judged it yet
 
 
 class Haste:
@@ -67,10 +67,11 @@ class Delay:
     Args:
         drift: Drift of the CoM.
         haste: Delays of motions that run ahead of their feet; None: these do not wait.
+        per_metre: The search's h of 1 m of way.
     """
 
-    def __init__(self, drift: Drift, haste: Haste | None):
-        self._drift, self._haste = drift, haste
+    def __init__(self, drift: Drift, haste: Haste | None, per_metre: float):
+        self._drift, self._haste, self._per_metre = drift, haste, per_metre
 
     def of_states(self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """(n,) delays of states with contact numbers (n, 4), CoM (n, 3) m and velocity (n, 3) m/s."""
@@ -85,4 +86,5 @@ class Delay:
         """
         miss = self._drift.miss(contacts, com, velocity, candidates)
         doubt = _DOUBT if doubted else 0.0
-        return doubt + _MISS * miss + self.of_states(contacts[None], com[None], velocity[None])
+        waits = self._per_metre * (doubt + _MISS * miss)
+        return waits + self.of_states(contacts[None], com[None], velocity[None])

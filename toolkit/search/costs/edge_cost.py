@@ -163,15 +163,20 @@ class EdgeCost(TransitionCost):
         time and so less momentum; the cheapest number of them counts, at least one where the goal is not reached.
         """
         distance = self._distance(centre, yaw)
-        count = np.maximum(distance / self._longest, ~self.at_goal(centre))
-        with np.errstate(invalid="ignore"):  # no way leads there
-            moved = np.maximum(distance - _LEAN, 0.0)
-            slack = _RESTS + self._slowest * count
-            time = np.maximum(slack, moved * np.sqrt(self._momentum * self._slowest / max(self._step, 1e-9)))
-            least = self._step * (count + (time - slack) / self._slowest) + self._momentum * moved**2 / time
-            return np.where(np.isfinite(distance), distance + least, np.inf)
+        reachable = np.isfinite(distance)
+        least = self._least(np.where(reachable, distance, 0.0), ~self.at_goal(centre))
+        return np.where(reachable, least, np.inf)
 
     @property
     def per_metre(self) -> float:
-        """Increase of the way's and the transitions' part of `to_go` per m of way."""
-        return 1.0 + self._step / self._longest
+        """Increase of `to_go` per m of a long way."""
+        near, far = self._least(np.array([10.0, 20.0]), np.ones(2, bool))
+        return (far - near) / 10.0
+
+    def _least(self, distance: np.ndarray, away: np.ndarray) -> np.ndarray:
+        """(n,) least cost of ways (n,) in m; `away` (n,) says where at least one transition is missing."""
+        count = np.maximum(distance / self._longest, away)
+        moved = np.maximum(distance - _LEAN, 0.0)
+        slack = _RESTS + self._slowest * count
+        time = np.maximum(slack, moved * np.sqrt(self._momentum * self._slowest / max(self._step, 1e-9)))
+        return distance + self._step * (count + (time - slack) / self._slowest) + self._momentum * moved**2 / time
