@@ -33,7 +33,9 @@ def judged(motion: CentroidalMotion, robot: RobotModel, slack: np.ndarray) -> Ce
     if not verdict.feasible:
         verdict = confirmed(replace(motion, kept=Margins()))
         offers = _wider(motion) if verdict.feasible else []
-        verdict = next((item for item in (confirmed(replace(motion, kept=m)) for m in offers) if item.feasible), verdict)
+        verdict = next(
+            (item for item in (confirmed(replace(motion, kept=m)) for m in offers) if item.feasible), verdict
+        )
     body = body_residuals(verdict, robot)
     if verdict.feasible and body.largest <= BODY_TOLERANCE:
         return verdict

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from toolkit.compiled import compiled
 from toolkit.replanning import elimination
 from toolkit.replanning.elimination import cholesky, solve_lower, solve_upper
-from toolkit.compiled import compiled
 
 GIVEN = 12  # number of states that are given at the start; the ones after them are free
 
