@@ -7,7 +7,7 @@ import pytest
 
 from toolkit.centroidal import residual
 from toolkit.centroidal.build import initial_com, transition_problem
-from toolkit.centroidal.problem import CentroidalMotion, Margins
+from toolkit.centroidal.problem import CentroidalMotion, Margins, Weights
 from toolkit.centroidal.residual import Residuals, check, confirmed
 from toolkit.centroidal.sequence import optimise_transition
 from toolkit.contacts.sequence import ContactTransition
@@ -159,6 +159,9 @@ def test_the_objective_is_the_sum_of_its_terms(standing):
             cost += w.torque * motion.yaw_torque[t, i] ** 2 + w.cop * z @ z
         total += p.dt[t] / 0.2 * cost
     np.testing.assert_allclose(confirmed(motion).objective, total, rtol=1e-12)
+    assert residual.objective(motion, w) == confirmed(motion).objective
+    assert residual.objective(motion, Weights(*[0.0] * 8)) == 0.0
+    assert residual.objective(replace(motion, com=motion.com * np.nan), w) == np.inf
 
 
 def test_feasible_solutions_pass_only_with_their_own_problem(robot, feet):

@@ -192,7 +192,7 @@ def model_at(program, y, multiplier):
     prepare_contacts(program.blocks.contacts)
     for block in program.blocks:
         block.multiplier[:] = multiplier
-    value = evaluate(program.steps, program.prices, program.blocks, layout.size, y, work)
+    value = evaluate(program.steps, program.prices, program.blocks, layout.size, y, 0.0, work)
     return work, value
 
 

@@ -1,4 +1,4 @@
-"""The parts of the stage solver against dense algebra: the Newton sweep, the blocks' condensation, whole Newton steps."""
+"""The parts of the stage solver against dense algebra: sweeps, the condensation of rows, whole Newton steps."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ from toolkit.centroidal.sequence import SequenceConfig, guess
 from toolkit.centroidal.stages import blocks, newton
 from toolkit.centroidal.stages.blocks import Block
 from toolkit.centroidal.stages.method import Work, direction, evaluate, longest_steps
-from toolkit.centroidal.stages.rows import CONE, SHARPNESS, longest_in_cones, prepare_contacts
+from toolkit.centroidal.stages.rows import CONE, SHARPNESS, prepare_contacts
 from toolkit.contacts.category import Category
 from validation.random_contacts import sample_transition
 
@@ -142,7 +142,7 @@ def transition(robot):
     prepare_contacts(program.blocks.contacts)
     for block in program.blocks:
         block.multiplier[:] = rng.uniform(0.1, 2.0, block.multiplier.shape)
-    evaluate(program.steps, program.prices, program.blocks, size, y, work)
+    evaluate(program.steps, program.prices, program.blocks, size, y, 0.01, work)
     for block in program.blocks:
         block.slack[:] = np.maximum(block.value, 0.1)
     return SimpleNamespace(program=program, y=y, work=work, inside=inside)
@@ -171,12 +171,10 @@ def test_a_newton_step_of_a_transition_is_that_of_the_dense_system(transition):
         np.concatenate([getattr(block, name).ravel() for block in program.blocks])
         for name in ("slack", "multiplier", "value")
     )
-    n, zero = len(s), np.zeros((len(whole), len(s)))
     # Unknowns: the variables, then dz, whose ds = (goal - z s - s dz) / z stands in the rows J d + g = s + ds.
     system = np.block([[whole, -jacobian.T], [jacobian, np.diag(s / z)]])
     right = np.concatenate([work.gradient[inside] - jacobian.T @ z, g - goal / z])
-    equal = np.hstack([np.concatenate(rows), np.zeros((len(rows) * states, n))])
-    assert zero.shape == jacobian.T.shape
+    equal = np.hstack([np.concatenate(rows), np.zeros((len(rows) * states, len(s)))])
     expected = newton_step(system, right, equal, np.concatenate(value))
 
     for block in program.blocks:
@@ -190,22 +188,6 @@ def test_a_newton_step_of_a_transition_is_that_of_the_dense_system(transition):
     np.testing.assert_allclose(changes, expected[len(whole) :], atol=1e-6 * np.abs(changes).max())
 
 
-def test_steps_stay_where_friction_holds_something(transition):
-    """Beyond, the rows of cones have another branch, which would be taken for a solution."""
-    block, y = transition.program.blocks.contacts, transition.y
-    rng = np.random.default_rng(4)
-    for _ in range(5):
-        change = rng.normal(size=y.shape)
-        step = longest_in_cones(block, y, change)
-        held = []
-        for part in (0.0, step, 1.001 * step):
-            moved = y + part * change
-            v = moved[block.stage[:, None], block.variables]
-            mu, wanted, least = block.parameters[:, 0], block.parameters[:, 3], block.parameters[:, 7]
-            held.append((mu * (wanted * v[:, 2] + (least - wanted) * v[:, 6] + v[:, 8])).min())
-        assert held[0] > 0.0 and held[1] > -1e-6 and (held[2] < 0.0 or step == pytest.approx(1.01))
-
-
 def test_a_cone_s_row_is_zero_on_its_boundary_and_falls_outside(transition):
     program, work = transition.program, transition.work
     block, y = program.blocks.contacts, transition.y.copy()
@@ -214,7 +196,25 @@ def test_a_cone_s_row_is_zero_on_its_boundary_and_falls_outside(transition):
     most = block.parameters[0, 0] * block.parameters[0, 3] * y[at, index[2]]
     for part, sign in ((0.5, 1), (1.0, 0), (1.5, -1)):
         y[at, index[:2]] = part * most * np.array([0.6, -0.8])
-        evaluate(program.steps, program.prices, program.blocks, program.layout.size, y, work)
+        evaluate(program.steps, program.prices, program.blocks, program.layout.size, y, 0.0, work)
         value = block.value[0, CONE] / SHARPNESS
         assert np.sign(np.round(value, 6)) == sign
         assert value == pytest.approx((1 - part**2) * most, abs=1e-6)
+
+
+def test_a_cone_that_holds_less_than_the_floor_has_one_branch(transition):
+    """What friction can hold may be negative while the linear rows do not hold: the row then refuses any force."""
+    program, work = transition.program, transition.work
+    block, y, floor = program.blocks.contacts, transition.y.copy(), 0.01
+    at, index = block.stage[0], block.variables[0]
+    y[at, index[[6, 7, 8]]] = 0.0
+    values, slopes = [], []
+    for load in (-0.1, -1e-3, 0.0, 1e-3):
+        y[at, index[:3]] = 0.003, 0.004, load
+        evaluate(program.steps, program.prices, program.blocks, program.layout.size, y, floor, work)
+        held = block.parameters[0, 0] * block.parameters[0, 3] * load
+        values.append(block.value[0, CONE] / SHARPNESS - held)
+        slopes.append(block.slope[0, CONE, :3].copy())
+    np.testing.assert_allclose(values, -(0.005**2) / floor, atol=2e-7)
+    np.testing.assert_allclose(np.ptp(slopes, axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(slopes[0][:2] / SHARPNESS, [-0.6, -0.8], atol=1e-12)

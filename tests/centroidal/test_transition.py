@@ -24,6 +24,7 @@ from toolkit.world.timing import Timing
 from validation.random_contacts import TransitionSample, sample_transition, sample_walk
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
+TIMING = Timing(1.0, 1.0)
 
 
 def solve(robot, sample, **options):
@@ -51,7 +52,7 @@ def stand(robot, stance, seconds=2.0, config=None):
     return optimise(robot, schedule, initial_com(robot, stance), np.zeros(3), config=config or SequenceConfig())
 
 
-def step(x, *, yaw=0.0, friction=0.5, timing=Timing()):
+def step(x, *, yaw=0.0, friction=0.5, timing=TIMING):
     """A step of the left foot."""
     contact = Contact(Limb.LEFT_FOOT, Pose.from_yaw(np.array([x, 0.1, 0.0]), yaw), friction)
     return ContactTransition(Limb.LEFT_FOOT, contact, timing)

@@ -1,6 +1,6 @@
 """The centroidal momentum problem of a contact sequence, as plain arrays.
 
-Both solvers, the residual check and the training data use these arrays. Time is cut into N intervals
+The solver, its reference, the residual check and the training data use these arrays. Time is cut into N intervals
 ("steps") with constant contact wrenches; knots 0..N bound them. Since the wrench is constant on an interval, the
 paper's Eq. 3 integrates without discretisation error: see `toolkit.physics.momentum`. A contact transmits a force f
 at its centre of pressure z and a torque tau_n about the normal there; `toolkit.physics.wrench` gives their bounds.

@@ -85,13 +85,17 @@ def confirmed(motion: CentroidalMotion) -> CentroidalMotion:
     """The motion with `feasible` and `objective` set from this module: the only place where `feasible` becomes True."""
     residuals, costs = _evaluated(motion)
     status = motion.status if residuals.within() else f"{motion.status}; residual: {residuals.worst}"
-    value = float(costs.sum()) if residuals.largest < np.inf else np.inf
-    return replace(motion, feasible=residuals.within(), objective=value, status=status)
+    return replace(motion, feasible=residuals.within(), objective=_total(residuals, costs), status=status)
 
 
 def objective(motion: CentroidalMotion, weights: Weights) -> float:
     """Objective of a motion with other weights than those with which it was optimised; inf where it is undefined."""
-    return float(step_costs(replace(motion, problem=replace(motion.problem, weights=weights))).sum())
+    return _total(*_evaluated(replace(motion, problem=replace(motion.problem, weights=weights))))
+
+
+def _total(residuals: Residuals, costs: np.ndarray) -> float:
+    """Sum of the costs of the steps; inf where the motion is undefined."""
+    return float(costs.sum()) if residuals.largest < np.inf else np.inf
 
 
 def friction_margin(motion: CentroidalMotion) -> float:

@@ -1,1 +1,1 @@
-"""The stage-structured solver of centroidal problems: pieces, the Newton step, and the interior-point method."""
+"""The stage-structured solver of centroidal problems: what steps and rows say, Newton steps, and the method."""

@@ -142,7 +142,7 @@ def set_changes(block, goal, corrected, change):
 
 @compiled(reordered=True)
 def longest(values, changes):
-    """Longest step, at most 1 / 0.995, that keeps values positive."""
+    """Longest step, at most 1.01, that keeps values (n, m) from falling below zero."""
     step = 1.01
     for i in range(values.shape[0]):
         for a in range(values.shape[1]):

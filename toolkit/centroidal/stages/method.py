@@ -20,6 +20,11 @@ from toolkit.compiled import compiled
 
 SMALL = 1e-3
 """Objective below which accuracy is absolute."""
+FLOOR = 1e-3
+"""Weights; what friction is taken to hold at least under lateral forces, while constraints are violated by 1 or more.
+
+It falls with the largest violation.
+"""
 REST_STIFFNESS = 1e5
 """Stiffness of the proximal term for the final rest; a multiplier makes the rest exact."""
 
@@ -104,13 +109,13 @@ class Options(NamedTuple):
 
 
 @compiled(reordered=True)
-def evaluate(steps, prices, all_blocks, size, y, work):
-    """Fill the model at y; returns the objective."""
+def evaluate(steps, prices, all_blocks, size, y, floor, work):
+    """Fill the model at y; returns the objective. `floor` is explained in `rows.fill_contacts`."""
     work.hessian[:] = 0.0
     work.gradient[:] = 0.0
     value = dynamics.linearise(steps, size, y, work.hessian, work.gradient, work.following, work.defect)
     value += rows.add_prices(prices, y, work.hessian, work.gradient)
-    value += rows.fill_contacts(all_blocks.contacts, y, work.hessian, work.gradient)
+    value += rows.fill_contacts(all_blocks.contacts, y, floor, work.hessian, work.gradient)
     value += rows.fill_legs(all_blocks.legs, y, work.hessian, work.gradient)
     value += rows.fill_distances(all_blocks.distances, y, work.hessian, work.gradient)
     value += rows.fill_final(all_blocks.final, y, work.hessian, work.gradient)
@@ -157,7 +162,17 @@ def residual(all_blocks, y, rest, work):
 def minimise(steps, prices, all_blocks, size, y, work, options):
     """Minimise from the motion y (T, m), which is overwritten but for its first state.
 
-    Returns whether it converged, the iterations, and the objective of the program.
+    Args:
+        steps: Dynamics and momentum objective (`Steps`) of T - 1 steps.
+        prices: `Prices` of single variables.
+        all_blocks: `Blocks`; their work arrays are overwritten.
+        size: (T,) number of variables of each stage; numbers of y beyond them are not read.
+        y: (T, m) guess, then the motion.
+        work: Room (`Work`) for T stages of m variables.
+        options: `Options`.
+
+    Returns:
+        Whether it converged, the iterations, and the objective of the program.
     """
     last = y.shape[0] - 1
     count = 0
@@ -165,11 +180,12 @@ def minimise(steps, prices, all_blocks, size, y, work, options):
         count += block.value.size
     force = np.zeros(3)  # multiplier of the final rest
     rows.prepare_contacts(all_blocks.contacts)
-    value = evaluate(steps, prices, all_blocks, size, y, work)
+    worst = 1.0
+    value = evaluate(steps, prices, all_blocks, size, y, FLOOR, work)
     for block in all_blocks:
         blocks.start(block, options.least, options.gap)
     for iteration in range(options.iterations):
-        value = evaluate(steps, prices, all_blocks, size, y, work)
+        value = evaluate(steps, prices, all_blocks, size, y, FLOOR * min(worst, 1.0), work)
         worst, gap = residual(all_blocks, y, options.at_rest, work), 0.0
         for block in all_blocks:
             gap += blocks.complementarity(block)
@@ -196,9 +212,7 @@ def minimise(steps, prices, all_blocks, size, y, work, options):
         goal = max(min(1.0, (after / gap) ** 3) * gap, 0.1 * accepted) / count
 
         direction(all_blocks, size, goal, True, work)
-        keep = max(0.99, 1.0 - gap / count)
-        primal, dual = longest_steps(all_blocks, keep)
-        primal = min(primal, keep * rows.longest_in_cones(all_blocks.contacts, y, work.change))
+        primal, dual = longest_steps(all_blocks, max(0.99, 1.0 - gap / count))
         if options.at_rest:
             for a in range(3):
                 force[a] += primal * REST_STIFFNESS * (y[last, 3 + a] + work.change[last, 3 + a])

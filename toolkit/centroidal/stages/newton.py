@@ -24,7 +24,7 @@ class Sweep(NamedTuple):
         gain: (T, m, n) L^-1 H_ux.
         value: (T, n, n) Hessians of the cost to go.
         offset: (T, m) L^-1 q_u of the last right-hand side.
-        slope: (T, n) gradients of the cost to go: the multipliers of the dynamics where the state does not change.
+        slope: (T, n) gradients of the cost to go of the last right-hand side, where the state does not change.
     """
 
     lower: np.ndarray
@@ -114,7 +114,10 @@ def factor(size, hessian, following, sweep):
 
 @compiled(reordered=True)
 def solve(size, following, defect, gradient, sweep, change):
-    """Newton step for gradients (T, m), which are overwritten, and defects (T-1, n); fills `change` (T, m)."""
+    """Newton step for gradients (T, m), which are overwritten, and defects (T - 1, n), after `factor`.
+
+    Fills `change` (T, m); the first state does not change.
+    """
     stages, n = sweep.slope.shape
     ahead = np.empty(n)
     for t in range(stages - 1, -1, -1):

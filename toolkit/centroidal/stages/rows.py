@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.compiled import compiled
-from toolkit.physics.leg import PLANNED, LegPosture, joint_torques, posture_between
+from toolkit.physics.leg import PLANNED, LegPosture, joint_torques, posture_between, turned
 from toolkit.physics.wrench import SIGNS, pressure_rows, yaw_row
 
 SHARPNESS, STRETCH = 10.0, 5.0
@@ -24,7 +24,6 @@ TINY = 1e-12  # m^2; keeps the derivatives of roots finite
 NUDGE = 1e-7  # m; of the differences
 EVEN = 0.1  # part of a slack's price that is on its square, so that slacks are shared evenly
 UNLOADED = 0.01  # weights added to a normal force under a CoP: an unloaded contact has none
-UNHELD = 1e-7  # weights added to what friction can hold, which divides
 CONE, FIRST_YAW = 0, 7
 CONTACT_ROWS = FIRST_YAW + 2 * len(SIGNS)
 LEG_ROWS, TORQUE_ROWS, DISTANCE_ROWS, FINAL_ROWS = 2 * len(PLANNED), 10, 2, 6
@@ -87,8 +86,13 @@ def prepare_contacts(block):
 
 
 @compiled(reordered=True)
-def fill_contacts(block, y, hessian, gradient):
-    """Friction cone, patch and yaw moment (Caron et al., ICRA 2015) of contacts, and their objective."""
+def fill_contacts(block, y, floor, hessian, gradient):
+    """Friction cone, patch and yaw moment (Caron et al., ICRA 2015) of contacts, and their objective.
+
+    A lateral force f may be as large as what friction can hold, h. The row is h - f^2 / h, which is concave where h is
+    positive, and has a second branch where it is not. Before the linear rows hold, h may have any sign: below `floor`,
+    in weights, the row is h - f^2 / floor.
+    """
     v, d_held, row = np.empty(9), np.zeros(9), np.empty(9)
     local, force = np.empty((9, 9)), np.empty(9)
     total = 0.0
@@ -103,44 +107,28 @@ def fill_contacts(block, y, hessian, gradient):
             block.value[i, a] = value
         fx, fy, fz = v[0], v[1], v[2]
         mu, wanted, least = p[_MU], p[_WANTED], p[_LEAST]
-        held = mu * (wanted * fz + (least - wanted) * v[6] + v[8]) + UNHELD
+        held = mu * (wanted * fz + (least - wanted) * v[6] + v[8]) + 1e-7
         d_held[2], d_held[6], d_held[8] = mu * wanted, mu * (least - wanted), mu
-        lateral = fx * fx + fy * fy
-        block.value[i, CONE] = SHARPNESS * (held - lateral / held)  # smooth at rest, unlike the square root
+        over, moving = (held, 1.0) if held > floor else (floor, 0.0)
+        tilt_x, tilt_y = fx / over, fy / over
+        tilt = moving * (tilt_x * tilt_x + tilt_y * tilt_y)
+        block.value[i, CONE] = SHARPNESS * (held - fx * tilt_x - fy * tilt_y)  # smooth at rest, unlike the square root
         for k in range(9):
-            slope[CONE, k] = SHARPNESS * (1.0 + lateral / (held * held)) * d_held[k]
-        slope[CONE, 0] = -2 * SHARPNESS * fx / held
-        slope[CONE, 1] = -2 * SHARPNESS * fy / held
+            slope[CONE, k] = SHARPNESS * (1.0 + tilt) * d_held[k]
+        slope[CONE, 0] = -2 * SHARPNESS * tilt_x
+        slope[CONE, 1] = -2 * SHARPNESS * tilt_y
 
         local[:] = 0.0
         force[:] = 0.0
-        bent = 2 * SHARPNESS * block.multiplier[i, CONE] / held
+        bent = 2 * SHARPNESS * block.multiplier[i, CONE] / over
         for axis in range(2):
             for k in range(9):
-                row[k] = -v[axis] / held * d_held[k]
+                row[k] = -moving * v[axis] / over * d_held[k]
             row[axis] += 1.0
             add_local(0.5 * bent, 0.0, row, local, force)
         total += contact_objective(p, v, row, local, force)
         scatter(local, force, index, hessian[block.stage[i]], gradient[block.stage[i]])
     return total
-
-
-@compiled(reordered=True)
-def longest_in_cones(block, y, change):
-    """Longest step, at most 1.01, that keeps what the friction of every contact can hold positive.
-
-    The rows of cones mean something only there, and rows that do not hold yet do not ensure it.
-    """
-    step = 1.01
-    for i in range(block.stage.shape[0]):
-        p, t, index = block.parameters[i], block.stage[i], block.variables[i]
-        mu, wanted, least = p[_MU], p[_WANTED], p[_LEAST]
-        now, then = y[t], change[t]
-        held = mu * (wanted * now[index[2]] + (least - wanted) * now[index[6]] + now[index[8]]) + UNHELD
-        gain = mu * (wanted * then[index[2]] + (least - wanted) * then[index[6]] + then[index[8]])
-        if gain < 0.0:
-            step = min(step, -held / gain)
-    return step
 
 
 @compiled(reordered=True)
@@ -371,7 +359,7 @@ def fill_torques(block, y):
             by_moment = joint_torques(now, sole, turn, (0.0, 0.0, 0.0), axis, TINY)
             for q in range(5):
                 slopes[q, 3 + k], slopes[q, 6 + k] = by_force[q] / limits[q], by_moment[q] / limits[q]
-        force, moment = in_world(turn, wrench), in_world(turn, wrench[3:])
+        force, moment = turned(turn, wrench), turned(turn, wrench[3:])
         here = joint_torques(now, sole, turn, force, moment, TINY)
         for a in range(3):
             hip[a] += NUDGE
@@ -393,16 +381,6 @@ def fill_torques(block, y):
                 for k in range(offset.shape[0]):
                     along = slopes[q, 0] * turn[0, k] + slopes[q, 1] * turn[1, k] + slopes[q, 2] * turn[2, k]
                     out[13 + k] = -sign * along
-
-
-@compiled(reordered=True)
-def in_world(turn, v):
-    """A vector of a contact's frame in the world."""
-    return (
-        turn[0, 0] * v[0] + turn[0, 1] * v[1] + turn[0, 2] * v[2],
-        turn[1, 0] * v[0] + turn[1, 1] * v[1] + turn[1, 2] * v[2],
-        turn[2, 0] * v[0] + turn[2, 1] * v[1] + turn[2, 2] * v[2],
-    )
 
 
 @compiled(reordered=True)

@@ -1,8 +1,8 @@
 """The dynamics and the momentum objective of the steps, with their derivatives.
 
 The state is x = (r, v, kappa, a): CoM in m, its velocity, the angular momentum about the CoM per mass in m^2/s, and the
-CoM's acceleration in the step before; then, where contacts may move, the displacements of `PAIRS` contacts. Wrenches
-are in weights, about the middle of the patch, in the contact frame. The laws are those of `toolkit.physics.momentum`.
+CoM's acceleration in the step before; then, where contacts may move, the displacements of contacts. Wrenches are in
+weights, about the middle of the patch, in the contact frame. The laws are those of `toolkit.physics.momentum`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from toolkit.centroidal.problem import STANDARD_GRAVITY as G
 from toolkit.compiled import compiled
+from toolkit.physics.leg import turned
 from toolkit.physics.momentum import cross, mean_com
 
 R, V, SPIN, ACCELERATION = 0, 3, 6, 9
@@ -56,8 +57,7 @@ def rates(steps, t, y, acceleration, spin_rate):
     fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(steps.first[t], steps.first[t + 1]):
         turn, p, w = steps.rotation[j], steps.position[j], y[steps.wrench[j] :]
-        force = local_to_world(turn, w[0], w[1], w[2])
-        moment = local_to_world(turn, w[3], w[4], w[5])
+        force, moment = turned(turn, w), turned(turn, w[3:])
         ax, ay, az = p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]
         if steps.pair[j] >= 0:
             d = y[steps.pair[j] :]
@@ -70,16 +70,6 @@ def rates(steps, t, y, acceleration, spin_rate):
     acceleration[0], acceleration[1], acceleration[2] = G * fx, G * fy, G * (fz - 1.0)
     spin_rate[0], spin_rate[1], spin_rate[2] = G * mx, G * my, G * mz
     return G * fx, G * fy, G * fz
-
-
-@compiled(reordered=True)
-def local_to_world(turn, x, y, z):
-    """The vector (x, y, z) of a contact's frame in the world."""
-    return (
-        turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z,
-        turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z,
-        turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z,
-    )
 
 
 @compiled(reordered=True)
@@ -181,19 +171,19 @@ def fill_dynamics(steps, t, y, force, out):
             ax += turn[0, 0] * d[0] + turn[0, 1] * d[1]
             ay += turn[1, 0] * d[0] + turn[1, 1] * d[1]
             az += turn[2, 0] * d[0] + turn[2, 1] * d[1]
-            world = local_to_world(turn, w[0], w[1], w[2])
+            world = turned(turn, w)
             for k in range(2):
-                turned = cross((turn[0, k], turn[1, k], turn[2, k]), world)
+                about = cross((turn[0, k], turn[1, k], turn[2, k]), world)
                 for a in range(3):
-                    out[SPIN + a, pair + k] += h * G * turned[a]
+                    out[SPIN + a, pair + k] += h * G * about[a]
         for k in range(3):
             axis = turn[0, k], turn[1, k], turn[2, k]
-            turned = cross((ax, ay, az), axis)
+            about = cross((ax, ay, az), axis)
             for a in range(3):
                 out[R + a, first + k] = h * h / 2 * G * axis[a]
                 out[V + a, first + k] = h * G * axis[a]
                 out[ACCELERATION + a, first + k] = G * axis[a]
-                out[SPIN + a, first + k] = h * G * turned[a]
+                out[SPIN + a, first + k] = h * G * about[a]
                 out[SPIN + a, first + 3 + k] = h * G * axis[a]
     for a in range(steps.source.shape[1]):
         out[STATE + a, steps.source[t, a]] = 1.0
