@@ -142,9 +142,10 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
         rng = np.random.default_rng(args.seed)
         scores: dict[Category, Score] = {}
         for category, network in networks.items():
-            if category not in chosen or not len(chosen[category]):
+            if category not in data or not data[category].known.any():
                 raise DatasetError(f"{args.data}: too few transitions of category {int(category)}; collect more")
-            scores[category] = score(network, balanced(chosen[category], args.count, rng))
+            if chosen[category].known.any():
+                scores[category] = score(network, balanced(chosen[category], args.count, rng))
         console.print(f"{title}:")
         console.print(score_table(scores))
     network = next(iter(networks.values()))
