@@ -19,7 +19,7 @@ _CORE_ANGLE = np.radians(8.0)  # local planes of a core are within this angle of
 _REGROWN = 3  # times that a core is grown again from its better plane
 _LEAST_CORE = 3  # places
 _SAME_ANGLE = np.radians(9.0)  # planes within this angle may be one
-_WORSE, _EXACT = 0.3, 1e-3  # share of the variance of the noise, and m, by which one plane may fit worse than two
+_WORSE, _EXACT = 0.2, 1e-3  # share of the variance of the noise, and m, by which one plane may fit worse than two
 _WIDTHS = (0.0, 0.0, 0.5, 0.75, 1.0, 1.0)  # least width of planes in the rounds, as a share of the configured one
 
 
@@ -32,6 +32,7 @@ class PlaneConfig:
         radius: Radius of the neighbourhoods of the local planes, m.
         tolerance: Largest distance of a core's places from its plane, m.
         width: Planes on which no circle of this diameter fits are left out, m.
+        smoothing: Radius over which the distances from a plane are averaged, m.
         kernel: Standard deviation of the kernel that smoothes the density of points on a plane, m.
     """
 
@@ -39,7 +40,20 @@ class PlaneConfig:
     radius: float
     tolerance: float
     width: float
+    smoothing: float
     kernel: float
+
+    @classmethod
+    def of(cls, noise: float, spacing: float, radius: float) -> PlaneConfig:
+        """What suits a scan with some noise and points some distance apart, all in m."""
+        return cls(
+            noise=noise,
+            radius=radius,
+            tolerance=max(4e-3, 0.5 * noise),
+            width=max(0.06, 2 * spacing, 12 * noise),
+            smoothing=max(2 * spacing, 6.5 * noise),
+            kernel=max(1.25 * spacing, 2 * noise),
+        )
 
     @property
     def near(self) -> float:
@@ -79,7 +93,7 @@ def find_planes(samples: Samples, local: LocalPlanes, config: PlaneConfig) -> li
     narrow, as those that bridge the seam of two others, leave their points to the rest in a few rounds.
     """
     planes = _cores(samples, local, config)
-    around = _neighbours(samples.thin, max(0.07, 2 * samples.spacing))
+    around = _neighbours(samples.thin, config.smoothing)
     for share in _WIDTHS:
         planes = [_fitted(samples, plane) for plane in _assigned(samples, planes, around, config)]
         planes = _unified(samples, planes, config)
@@ -209,7 +223,7 @@ def _joint(samples: Samples, larger: Plane, plane: Plane, config: PlaneConfig) -
     both = (np.concatenate([a, b]) for a, b in ((larger.reach, plane.reach), (larger.points, plane.points)))
     reach, points = (np.unique(indices) for indices in both)
     joint = _fitted(samples, replace(larger, reach=reach, points=points))
-    worse = _square(samples, plane.points, joint) - _square(samples, plane.points, plane)
+    worse = max(_square(samples, one.points, joint) - _square(samples, one.points, one) for one in (larger, plane))
     return joint if worse < _WORSE * config.noise**2 + _EXACT**2 else None
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+_CLOSED = 0.02  # the sides of a closed mesh cancel each other up to this share
 _MOST_POINTS = 150_000  # thinned points; the spacing grows with the scene
 
 
@@ -62,6 +64,16 @@ class Samples:
         thin = np.column_stack([np.bincount(owner, points[:, axis], count) for axis in range(3)]) / number[:, None]
         return cls(points, area, turned, spacing, owner, thin, np.bincount(owner, area, count))
 
+    @classmethod
+    def joined(cls, parts: Sequence[Samples], spacing: float) -> Samples:
+        """The samples of several scans of one place; `spacing` m holds where there are none."""
+        if not parts:
+            return cls.of(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), spacing)
+        points, area, turned = (
+            np.concatenate(column) for column in zip(*((s.points, s.area, s.turned) for s in parts), strict=True)
+        )
+        return cls.of(points, area, turned, max(part.spacing for part in parts))
+
 
 def cells_of(points: np.ndarray, size: float) -> tuple[np.ndarray, int]:
     """Cubic cell (n,) of each point, numbered from 0, and the number of cells that hold one."""
@@ -83,6 +95,7 @@ def samples_of(scan: Scan, spacing: float) -> Samples:
         return Samples.of(scan.vertices, np.full(len(scan.vertices), each), np.zeros_like(scan.vertices), spacing)
     corners = scan.vertices[scan.triangles]
     turned = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    turned *= _outward(corners, turned)
     area = np.linalg.norm(turned, axis=1)
     spacing = max(spacing, float(np.sqrt(area.sum() / _MOST_POINTS)))
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
@@ -96,6 +109,15 @@ def samples_of(scan: Scan, spacing: float) -> Samples:
         areas.append(np.repeat(area[chosen] / len(shares), len(shares)))
         sides.append(np.repeat(turned[chosen] / len(shares), len(shares), axis=0))
     return Samples.of(np.concatenate(points), np.concatenate(areas), np.concatenate(sides), spacing)
+
+
+def _outward(corners: np.ndarray, turned: np.ndarray) -> float:
+    """1 or -1: the sign with which triangles (k, 3, 3) of a closed mesh face outward, and those of a sheet up."""
+    total, area = turned.sum(axis=0), np.linalg.norm(turned, axis=1).sum()
+    middle = corners.reshape(-1, 3).mean(axis=0)
+    volume = float(np.einsum("kx,kx->", corners.mean(axis=1) - middle, turned))
+    closed = np.linalg.norm(total) < _CLOSED * area
+    return -1.0 if (volume if closed else total[2]) < 0 else 1.0
 
 
 def cloud_area(points: np.ndarray, spacing: float) -> float:
