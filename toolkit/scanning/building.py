@@ -17,6 +17,7 @@ from toolkit.scanning.samples import Samples, Scan, samples_of
 from toolkit.world.authoring import THICKNESS, WorldText
 from toolkit.world.convex import convex_partition
 
+_SPACING = 0.02  # m; distance of samples, as far as the scene is small enough
 _OPPOSITE = -0.9  # cosine of the angle between the normals of the two sides of a wall
 _LEAST = 3e-3  # m^2; smaller patches cannot be touched
 _GAP = 1e-3  # m; between the backs of the two sides of a wall
@@ -49,14 +50,11 @@ class Scene:
         return (taken + self.reading.explained * (self.area - taken)) / self.area if self.area > 0 else 0.0
 
 
-def read_scene(
-    scans: Sequence[Scan], cell: float, progress: Callable[[float], None] = lambda share: None
-) -> Scene:
+def read_scene(scans: Sequence[Scan], progress: Callable[[float], None] = lambda share: None) -> Scene:
     """Find out what scans of one place show.
 
     Args:
         scans: The scans, in one frame.
-        cell: Wanted distance of samples, m.
         progress: Called with the share that is done, in [0, 1].
 
     Raises:
@@ -64,8 +62,8 @@ def read_scene(
     """
     exact = [take_exact(scan) for scan in scans]
     progress(0.2)
-    samples = [samples_of(part.rest, cell) for part in exact if len(part.rest.vertices)]
-    rough = Samples.joined(samples, cell)
+    samples = [samples_of(part.rest, _SPACING) for part in exact if len(part.rest.vertices)]
+    rough = Samples.joined(samples, _SPACING)
     area = float(sum(part.area for part in exact) + rough.area.sum())
     if area <= 0.0:
         raise InputError("nothing in the scan has an area; give a mesh, or more than a few points")

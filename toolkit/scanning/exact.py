@@ -9,9 +9,9 @@ import trimesh
 
 from toolkit.scanning.patches import Patch
 from toolkit.scanning.samples import Scan
-from toolkit.world.decomposition import FACET_ANGLE, FACET_DISTANCE
 from toolkit.world.facets import facet_of, flat_groups
 
+_ANGLE, _DISTANCE = np.radians(1.0), 3e-4  # rad, m; by which facets are not flat; curved ground is not exact
 _FACET = 3e-3  # m^2; facets of this area can be touched
 _SHARE = 0.9  # of a mesh's area that such facets cover where there is no noise
 _MOST_FACETS = 1500
@@ -41,7 +41,9 @@ def take_exact(scan: Scan) -> Exact:
     if len(scan.triangles) == 0:
         return nothing
     mesh = trimesh.Trimesh(scan.vertices, scan.triangles, process=True)
-    groups = flat_groups(mesh, angle=FACET_ANGLE, distance=FACET_DISTANCE, least_area=_FACET)
+    if not _may_be_flat(mesh):
+        return nothing
+    groups = flat_groups(mesh, angle=_ANGLE, distance=_DISTANCE, least_area=_FACET)
     flat = np.zeros(len(mesh.faces), bool)
     flat[[index for group in groups for index in group]] = True
     if mesh.area_faces[flat].sum() < _SHARE * mesh.area or len(groups) > _MOST_FACETS:
@@ -61,3 +63,12 @@ def take_exact(scan: Scan) -> Exact:
     rest = Scan(np.asarray(mesh.vertices), np.asarray(mesh.faces)[left])
     patches = [Patch(facet.frame, facet.polygon) for facet in facets]
     return Exact(solids, patches, float(mesh.area_faces[~left].sum()), rest)
+
+
+def _may_be_flat(mesh: trimesh.Trimesh) -> bool:
+    """Whether enough triangles are large, or have a neighbour in their plane, for a mesh without noise."""
+    flat = mesh.area_faces >= _FACET
+    normals, pairs = mesh.face_normals, mesh.face_adjacency
+    alike = np.einsum("kx,kx->k", normals[pairs[:, 0]], normals[pairs[:, 1]]) > np.cos(_ANGLE)
+    flat[pairs[alike].ravel()] = True
+    return bool(mesh.area_faces[flat].sum() >= _SHARE * mesh.area)

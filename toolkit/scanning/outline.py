@@ -52,11 +52,12 @@ def _is_hole(ring: np.ndarray, radius: float) -> bool:
 
 
 def tidy(region: Polygon, tolerance: float, width: float) -> list[Polygon]:
-    """A region without necks and spikes narrower than `width` m, with few corners, as one or more polygons.
+    """A region without necks, spikes and notches narrower than `width` m, with few corners, as one or more polygons.
 
     Corners that stand out less than `tolerance` m are left out.
     """
-    opened = region.buffer(-width / 2).buffer(width / 2, join_style="mitre", mitre_limit=2.0)
+    closed = region.buffer(width / 2, join_style="mitre", mitre_limit=1.5).buffer(-width, join_style="mitre")
+    opened = closed.buffer(width / 2, join_style="mitre", mitre_limit=2.0)
     result = []
     for part in shapely.get_parts(opened):
         simple = shapely.make_valid(part.simplify(tolerance))

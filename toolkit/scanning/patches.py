@@ -32,12 +32,6 @@ class Patch:
     frame: Pose
     polygon: Polygon
 
-    def above(self, points: np.ndarray, beside: float) -> np.ndarray:
-        """Height (n,) in m of points (n, 3) over the patch's plane, inf further than `beside` m from the outline."""
-        local = self.frame.inverse() @ points
-        near = shapely.dwithin(self.polygon, shapely.points(local[:, :2]), beside)
-        return np.where(near, local[:, 2], np.inf)
-
 
 @dataclass(frozen=True)
 class Reading:
@@ -82,9 +76,10 @@ def read_samples(samples: Samples) -> Reading:
         for region in outline(points, samples.area[own], config.kernel, _HOLE):
             patches += [Patch(plane.frame, piece) for piece in tidy(region, config.kernel / 2, config.width / 2)]
     patches.sort(key=lambda patch: -patch.polygon.area)
-    rest = _rest(samples.thin, patches, config)
-    total = samples.weight.sum()
-    explained = 1.0 - float(samples.weight[rest].sum() / total) if total > 0 else 0.0
+    height, beside = _from_patches(samples.thin, patches, config)
+    on_patch = (height <= config.near) & (beside <= config.kernel)
+    rest = (height > config.near + noise) | (beside > 2.5 * config.kernel)
+    explained = float(samples.weight[on_patch].sum() / max(samples.weight.sum(), 1e-12))
     return Reading(patches, noise, explained, samples.thin[rest], samples.spacing)
 
 
@@ -104,14 +99,22 @@ def _facing(samples: Samples, planes: list[Plane]) -> list[Plane]:
     return result
 
 
-def _rest(points: np.ndarray, patches: list[Patch], config: PlaneConfig) -> np.ndarray:
-    """Whether points (n, 3) lie on no patch, nor so close to one that noise may have moved them, (n,) bool."""
-    rest = np.ones(len(points), bool)
+def _from_patches(points: np.ndarray, patches: list[Patch], config: PlaneConfig) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (n,) of points (n, 3) from the plane of the nearest patch, and along it from the outline, m.
+
+    Both are inf for points that are not near a patch.
+    """
+    height, beside = np.full(len(points), np.inf), np.full(len(points), np.inf)
     tree = cKDTree(points)
     for patch in patches:
+        shapely.prepare(patch.polygon)
         ring = shapely.get_coordinates(patch.polygon)
         radius = np.linalg.norm(ring, axis=1).max() + config.width
         near = np.array(tree.query_ball_point(patch.frame.position, radius), int)
-        near = near[rest[near]]
-        rest[near] = np.abs(patch.above(points[near], 2.5 * config.kernel)) > config.near + config.noise
-    return rest
+        local = patch.frame.inverse() @ points[near]
+        off = np.abs(local[:, 2])
+        near, local, off = (column[off <= config.near + config.noise] for column in (near, local, off))
+        away = shapely.distance(patch.polygon, shapely.points(local[:, :2]))
+        better = away + off < height[near] + beside[near]
+        height[near[better]], beside[near[better]] = off[better], away[better]
+    return height, beside

@@ -12,7 +12,7 @@ from scipy.spatial.distance import cdist
 from toolkit.errors import InputError
 from toolkit.world.surface import Surface
 
-_ROOM = (0.3, 0.2, 0.12)  # m; wanted distance from the edge of a surface, the first that leaves a place
+_ROOM = (0.3, 0.2, 0.12)  # m; wanted distance from the edge of a surface, the first for which it has a place
 _LEVEL = np.cos(np.radians(15.0))  # the robot starts and ends on what is no steeper, where there is such ground
 _MOST = 400  # places that are compared
 
@@ -75,13 +75,11 @@ def _open_places(ground: list[Surface]) -> np.ndarray:
     """Points (n, 3) on ground as level and as far from edges as can be had, m."""
     level = [surface for surface in ground if surface.normal[2] > _LEVEL] or ground
     places: list[np.ndarray] = []
-    for room in (*_ROOM, 0.0):
-        for surface in level:
-            inner = surface.region.buffer(-room)
-            corners = shapely.get_coordinates(inner if room else surface.region.representative_point())
-            places += [surface.pose @ np.array([*corner, 0.0]) for corner in corners]
-        if places:
-            break
+    for surface in level:
+        inner = next((inner for room in _ROOM if not (inner := surface.region.buffer(-room)).is_empty), None)
+        corners = [] if inner is None else shapely.get_coordinates(inner)
+        places += [surface.pose @ np.array([*corner, 0.0]) for corner in corners]
+    places = places or [surface.nearest_point(surface.pose.position) for surface in level]
     return np.array(places)[:: len(places) // _MOST + 1]
 
 
