@@ -68,7 +68,11 @@ def arguments() -> argparse.ArgumentParser:
         help="metres between the heights of a map (needed for png and npy)",
     )
     parser.add_argument(
-        "--origin", type=_place(3, 3), default=(0.0, 0.0, 0.0), metavar="X,Y,Z", help="point in m that becomes the origin"
+        "--origin",
+        type=_place(3, 3),
+        default=(0.0, 0.0, 0.0),
+        metavar="X,Y,Z",
+        help="point in m that becomes the origin",
     )
     parser.add_argument("--out", type=cli.path, metavar="DIR", help="folder to write into (default: scans/NAME)")
     return parser
@@ -83,7 +87,9 @@ def _place(least: int, most: int):
         except ValueError:
             values = ()
         if not least <= len(values) <= most or not all(math.isfinite(value) for value in values):
-            raise argparse.ArgumentTypeError(f"{text!r} is not {least}{f' or {most}' * (most > least)} numbers with commas")
+            raise argparse.ArgumentTypeError(
+                f"{text!r} is not {least}{f' or {most}' * (most > least)} numbers with commas"
+            )
         return values
 
     return place

@@ -31,7 +31,9 @@ def scan_table(made: ScannedWorld) -> Table:
     table.add_row("input", f"{triangles} triangles, {points} points without")
     table.add_row("from, to", f"{_place(low)} to {_place(high)} m")
     if len(scene.reading.patches) or len(scene.blobs):
-        table.add_row("noise, samples", f"{1e3 * scene.reading.noise:.1f} mm, {1e3 * scene.reading.spacing:.0f} mm apart")
+        table.add_row(
+            "noise, samples", f"{1e3 * scene.reading.noise:.1f} mm, {1e3 * scene.reading.spacing:.0f} mm apart"
+        )
     table.add_row("made of it", f"{len(scene.patches)} flat patches, {solids} solids, {len(scene.blobs)} obstacles")
     table.add_row("explained", f"{scene.explained:.1%} of the input's area lies on patches or solids")
     for name, group in (("for feet", feet), ("for palms", palms)):

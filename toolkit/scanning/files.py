@@ -71,7 +71,9 @@ def _quietly(path: Path, read: Callable[[Path, ReadOptions], Scan], options: Rea
         raise
     except ModuleNotFoundError as error:
         package = (error.name or "").split(".")[0]
-        raise InputError(f"{path}: needs the package {package}; pip install 'humanoid-contact-toolkit[scan]'") from error
+        raise InputError(
+            f"{path}: needs the package {package}; pip install 'humanoid-contact-toolkit[scan]'"
+        ) from error
     except Exception as error:  # each library has its own
         what = " ".join(str(error).split())[:120] or type(error).__name__
         raise InputError(f"{path}: is damaged, or not what its ending says ({what})") from error

@@ -12,7 +12,7 @@ from scipy.spatial.distance import cdist
 from toolkit.errors import InputError
 from toolkit.world.surface import Surface
 
-_ROOM = (0.3, 0.2, 0.12)  # m; wanted distance from the edge of a surface, the first for which it has a place
+_ROOM, _LEAST_ROOM = 0.3, 0.12  # m; wanted and least distance from the edge of a surface
 _LEVEL = np.cos(np.radians(15.0))  # the robot starts and ends on what is no steeper, where there is such ground
 _MOST = 400  # places that are compared
 
@@ -76,8 +76,12 @@ def _open_places(ground: list[Surface]) -> np.ndarray:
     level = [surface for surface in ground if surface.normal[2] > _LEVEL] or ground
     places: list[np.ndarray] = []
     for surface in level:
-        inner = next((inner for room in _ROOM if not (inner := surface.region.buffer(-room)).is_empty), None)
-        corners = [] if inner is None else shapely.get_coordinates(inner)
+        inner = surface.region.buffer(-_ROOM)
+        if inner.is_empty:
+            radius = shapely.maximum_inscribed_circle(surface.region)  # from its centre to the edge
+            corners = shapely.get_coordinates(radius)[:1] if radius.length > _LEAST_ROOM else []
+        else:
+            corners = shapely.get_coordinates(inner)
         places += [surface.pose @ np.array([*corner, 0.0]) for corner in corners]
     places = places or [surface.nearest_point(surface.pose.position) for surface in level]
     return np.array(places)[:: len(places) // _MOST + 1]
@@ -88,7 +92,9 @@ def _on_ground(ground: list[Surface], point: Sequence[float], option: str) -> np
     heights = np.array([surface.height(np.array([point]))[0] for surface in ground])
     if np.isfinite(heights).any():
         return np.array([*point, np.nanmin(heights)])
-    corners = np.concatenate([(s.pose @ np.column_stack([s.boundary[0], np.zeros(len(s.boundary[0]))])) for s in ground])
+    corners = np.concatenate(
+        [(s.pose @ np.column_stack([s.boundary[0], np.zeros(len(s.boundary[0]))])) for s in ground]
+    )
     near = corners[int(np.linalg.norm(corners[:, :2] - point, axis=1).argmin())]
     low, high = corners.min(axis=0), corners.max(axis=0)
     raise InputError(

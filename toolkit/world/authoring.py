@@ -132,6 +132,8 @@ class WorldText:
         if self.abyss is not None:
             pos = f"0 0 {numbers([self.abyss])}"
             head += f'    <geom class="visual" type="plane" size="0 0 1" pos="{pos}" material="abyss"/>\n'
-        return head + "".join(self._lines) + _TAIL.format(
-            start=numbers(start), goal=numbers(goal), heading=numbers([self.heading])
+        return (
+            head
+            + "".join(self._lines)
+            + _TAIL.format(start=numbers(start), goal=numbers(goal), heading=numbers([self.heading]))
         )
