@@ -39,7 +39,8 @@ def arguments() -> argparse.ArgumentParser:
         "--start",
         type=_place(2, 3),
         metavar="X,Y[,YAW]",
-        help="start in m, and heading in degrees (default: one end of the longest way on level ground, towards the goal)",
+        help="start in m, and heading in degrees; --start=-1,0 where it begins with a minus (default: one end of the "
+        "longest way between places on level ground, facing the goal)",
     )
     parser.add_argument(
         "--goal", type=_place(2, 2), metavar="X,Y", help="goal in m (default: as far from the start as can be)"
@@ -49,8 +50,8 @@ def arguments() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--timing",
-        type=cli.timing,
-        default=cli.timing("0.6,0.8"),
+        type=_timing,
+        default=(0.6, 0.8),
         metavar="SHIFT,SWING",
         help="seconds of shifting the CoM and of moving the limb (default: 0.6,0.8)",
     )
@@ -95,6 +96,14 @@ def _place(least: int, most: int):
     return place
 
 
+def _timing(text: str) -> tuple[float, float]:
+    """An argparse type: times of shift and swing in s."""
+    found = cli.timing(text)
+    if len(found) != 1:
+        raise argparse.ArgumentTypeError(f"{text} is for planners; give SHIFT,SWING in seconds")
+    return found[0].shift, found[0].swing
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code.
 
@@ -116,14 +125,13 @@ def main(argv: list[str] | None = None) -> int:
     name = args.files[0].stem
     folder = args.out or Path("scans") / name
     start = args.start if args.start is None else (*args.start[:2], *(math.radians(yaw) for yaw in args.start[2:]))
-    timing = (args.timing[0].shift, args.timing[0].swing)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("scan", total=1.0)
         options = ReadOptions(args.scale, args.up, args.cell, args.origin)
         scans = [read_scan(path, options) for path in args.files]
         bar.update(task, completed=0.1)
         scene = read_scene(scans, progress=lambda share: bar.update(task, completed=0.1 + 0.5 * share))
-        config = ScanConfig(args.friction, timing, start, args.goal)
+        config = ScanConfig(args.friction, args.timing, start, args.goal)
         made = make_world(scene, folder / f"{name}.xml", "made of a scan by python -m toolkit.scan", config)
     from toolkit.report.scan import scan_table, write_scan_recording
 

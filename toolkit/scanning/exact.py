@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 import trimesh
 
 from toolkit.scanning.patches import Patch
@@ -16,6 +17,7 @@ _FACET = 3e-3  # m^2; facets of this area can be touched
 _SHARE = 0.9  # of a mesh's area that such facets cover where there is no noise
 _MOST_FACETS = 1500
 _MOST_SOLIDS = 300
+_MOST_CORNERS = 40  # of a facet in the mean; jagged outlines are those of a scan
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ def take_exact(scan: Scan) -> Exact:
     up = np.bincount(labels, mesh.area_faces * mesh.face_normals[:, 2])[labels] >= 0
     sheets = trimesh.Trimesh(mesh.vertices, np.where(up[:, None], mesh.faces, mesh.faces[:, ::-1]), process=False)
     facets = [facet_of(sheets, group) for group in groups if left[group].all()]
+    if sum(shapely.get_num_coordinates(facet.polygon) for facet in facets) > _MOST_CORNERS * (len(facets) + 1):
+        return nothing
     left[[index for facet in facets for index in facet.triangles]] = False
     rest = Scan(np.asarray(mesh.vertices), np.asarray(mesh.faces)[left])
     patches = [Patch(facet.frame, facet.polygon) for facet in facets]

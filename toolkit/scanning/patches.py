@@ -59,7 +59,7 @@ def read_samples(samples: Samples) -> Reading:
     radius = max(_RADIUS, 3 * samples.spacing)
     local = local_planes(samples, radius)
     noise = max(local.noise, 1e-3)
-    finer = float(np.clip(8 * noise, 3 * samples.spacing, radius))
+    finer = float(np.clip(16 * noise, 4 * samples.spacing, radius))
     if finer < 0.8 * radius:
         local, radius = local_planes(samples, finer), finer
     config = PlaneConfig.of(noise, samples.spacing, radius)

@@ -19,7 +19,7 @@ _CORE_ANGLE = np.radians(8.0)  # local planes of a core are within this angle of
 _REGROWN = 3  # times that a core is grown again from its better plane
 _LEAST_CORE = 3  # places
 _SAME_ANGLE = np.radians(9.0)  # planes within this angle may be one
-_WORSE, _EXACT = 0.2, 1e-3  # share of the variance of the noise, and m, by which one plane may fit worse than two
+_WORSE, _EXACT = 0.2, 2e-3  # share of the variance of the noise, and m, by which one plane may fit worse than two
 _WIDTHS = (0.0, 0.0, 0.5, 0.75, 1.0, 1.0)  # least width of planes in the rounds, as a share of the configured one
 
 
@@ -51,7 +51,7 @@ class PlaneConfig:
             radius=radius,
             tolerance=max(4e-3, 0.5 * noise),
             width=max(0.06, 2 * spacing, 12 * noise),
-            smoothing=max(2 * spacing, 6.5 * noise),
+            smoothing=max(3.5 * spacing, min(6.5 * noise, 0.09)),
             kernel=max(1.25 * spacing, 2 * noise),
         )
 

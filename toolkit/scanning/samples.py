@@ -7,8 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.errors import InputError
+
 _CLOSED = 0.02  # the sides of a closed mesh cancel each other up to this share
 _MOST_POINTS = 150_000  # thinned points; the spacing grows with the scene
+_MOST_PIECES = 2_000_000  # pieces of triangles
+_WIDEST = 0.08  # m; places for feet cannot be made out of samples further apart
 
 
 @dataclass(frozen=True)
@@ -53,13 +57,22 @@ class Samples:
 
     @classmethod
     def of(cls, points: np.ndarray, area: np.ndarray, turned: np.ndarray, spacing: float) -> Samples:
-        """Samples from points, with the thin points computed."""
+        """Samples from points, with the thin points computed.
+
+        Raises:
+            InputError: They would lie too far apart, because the scene is so large.
+        """
         if len(points) == 0:
             return cls(points, area, turned, spacing, np.zeros(0, int), np.zeros((0, 3)), np.zeros(0))
         owner, count = cells_of(points, spacing)
         if count > _MOST_POINTS:
-            spacing *= np.sqrt(count / _MOST_POINTS)
+            spacing *= float(np.sqrt(count / _MOST_POINTS))
             owner, count = cells_of(points, spacing)
+        if spacing > _WIDEST:
+            raise InputError(
+                f"the scan covers about {area.sum():.0f} m^2, too much to find places for feet in; cut out the part that "
+                "the robot walks through, or see --scale"
+            )
         number = np.bincount(owner, minlength=count)
         thin = np.column_stack([np.bincount(owner, points[:, axis], count) for axis in range(3)]) / number[:, None]
         return cls(points, area, turned, spacing, owner, thin, np.bincount(owner, area, count))
@@ -97,9 +110,11 @@ def samples_of(scan: Scan, spacing: float) -> Samples:
     turned = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     turned *= _outward(corners, turned)
     area = np.linalg.norm(turned, axis=1)
-    spacing = max(spacing, float(np.sqrt(area.sum() / _MOST_POINTS)))
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.clip(np.ceil(edge / (2 * spacing)), 1, None).astype(int)
+    parts = _parts(edge, spacing)
+    while (parts.astype(float) ** 2).sum() > max(_MOST_PIECES, 1.5 * len(parts)):
+        spacing *= 1.3
+        parts = _parts(edge, spacing)
     points, areas, sides = [], [], []
     for count in np.unique(parts).tolist():
         chosen = parts == count
@@ -124,6 +139,11 @@ def cloud_area(points: np.ndarray, spacing: float) -> float:
     """Area in m^2 that a point of a cloud stands for in the mean: that of its columns seen along the best axis."""
     covered = max(len(np.unique(np.floor(np.delete(points, axis, 1) / spacing), axis=0)) for axis in range(3))
     return covered * spacing**2 / max(len(points), 1)
+
+
+def _parts(edge: np.ndarray, spacing: float) -> np.ndarray:
+    """Parts (k,) into which the sides of triangles are cut, by their longest edges (k,)."""
+    return np.maximum(np.ceil(edge / (2 * spacing)), 1).astype(int)
 
 
 def _barycentres(count: int) -> np.ndarray:
