@@ -47,7 +47,7 @@ class Scene:
     def explained(self) -> float:
         """Share of the input's area that lies on flat patches or in solids."""
         taken = sum(part.area for part in self.exact)
-        return (taken + self.reading.explained * (self.area - taken)) / self.area if self.area > 0 else 0.0
+        return (taken + self.reading.explained * (self.area - taken)) / self.area
 
 
 def read_scene(scans: Sequence[Scan], progress: Callable[[float], None] = lambda share: None) -> Scene:
@@ -112,5 +112,5 @@ def _depth(patch: Patch, patches: list[Patch]) -> float:
             ring = np.asarray(other.polygon.exterior.coords)
             seen = (local @ np.column_stack([ring, np.zeros(len(ring))]))[:, :2]
             if patch.polygon.intersects(shapely.make_valid(Polygon(seen))):
-                depth = min(depth, (between - _GAP) / 2)
+                depth = min(depth, float(between - _GAP) / 2)
     return depth

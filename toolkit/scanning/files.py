@@ -94,16 +94,16 @@ def _mesh(path: Path, options: ReadOptions) -> Scan:
     first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     triangles = [np.asarray(mesh.faces) + begin for mesh, begin in zip(meshes, first[:-1], strict=True)]
     vertices = np.concatenate([np.asarray(mesh.vertices, float) for mesh in meshes])
-    triangles = np.concatenate(triangles)
-    if len(triangles) and not (0 <= triangles.min() and triangles.max() < len(vertices)):
+    corners = np.concatenate(triangles)
+    if len(corners) and not (0 <= corners.min() and corners.max() < len(vertices)):
         raise ValueError("a triangle has a corner that does not exist")
-    return Scan(vertices, triangles)
+    return Scan(vertices, corners)
 
 
 def _pcd(path: Path, options: ReadOptions) -> Scan:
     """The points of a PCD file."""
     del options
-    from pypcd4 import PointCloud
+    from pypcd4 import PointCloud  # pyright: ignore[reportMissingImports]
 
     return Scan(PointCloud.from_path(path).numpy(("x", "y", "z")).astype(float), np.zeros((0, 3), int))
 
@@ -140,7 +140,7 @@ def _upright(scan: Scan, kind: str, options: ReadOptions) -> Scan:
         if (options.up or ("y" if kind in _UP_IS_Y else "z")) == "y":
             vertices = vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     vertices = vertices - np.asarray(options.origin)
-    good = np.isfinite(vertices).all(axis=1)
+    good = np.logical_and.reduce(np.isfinite(vertices), axis=1)
     if len(scan.triangles) == 0:
         return Scan(vertices[good], scan.triangles)
     triangles = scan.triangles[good[scan.triangles].all(axis=1)]

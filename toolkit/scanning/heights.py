@@ -71,7 +71,7 @@ def png_heights(path: Path) -> Heights:
 
 def geotiff_heights(path: Path) -> Heights:
     """The first band of a GeoTIFF; cells are in metres where its coordinates are."""
-    import rasterio
+    import rasterio  # pyright: ignore[reportMissingImports]
 
     with rasterio.open(path) as file:
         if file.width * file.height > _MOST_HEIGHTS:

@@ -74,11 +74,12 @@ def read_samples(samples: Samples) -> Reading:
         own = order[first:last]
         points = (plane.frame.inverse() @ samples.points[own])[:, :2]
         for region in outline(points, samples.area[own], config.kernel, _HOLE):
-            patches += [Patch(plane.frame, piece) for piece in tidy(region, config.kernel / 2, config.width / 2)]
+            pieces = tidy(region, config.kernel / 2, config.width / 2, noise)
+            patches += [Patch(plane.frame, piece) for piece in pieces]
     patches.sort(key=lambda patch: -patch.polygon.area)
     height, beside = _from_patches(samples.thin, patches, config)
-    on_patch = (height <= config.near) & (beside <= config.kernel)
-    rest = (height > config.near + noise) | (beside > 2.5 * config.kernel)
+    on_patch = (height <= config.near) & (beside <= config.kernel + noise)
+    rest = (height > config.near + noise) | (beside > 2.5 * config.kernel + noise)
     explained = float(samples.weight[on_patch].sum() / max(samples.weight.sum(), 1e-12))
     return Reading(patches, noise, explained, samples.thin[rest], samples.spacing)
 
@@ -114,7 +115,7 @@ def _from_patches(points: np.ndarray, patches: list[Patch], config: PlaneConfig)
         local = patch.frame.inverse() @ points[near]
         off = np.abs(local[:, 2])
         near, local, off = (column[off <= config.near + config.noise] for column in (near, local, off))
-        away = shapely.distance(patch.polygon, shapely.points(local[:, :2]))
+        away = np.asarray(shapely.distance(patch.polygon, shapely.points(local[:, :2])))
         better = away + off < height[near] + beside[near]
         height[near[better]], beside[near[better]] = off[better], away[better]
     return height, beside

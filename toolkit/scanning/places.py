@@ -51,16 +51,16 @@ def choose_places(
     if not ground:
         raise InputError("no flat place of at least 0.01 m^2 for a foot was found; see the options --up and --scale")
     candidates = _open_places(ground)
-    first = None if start is None else _on_ground(ground, start[:2], "--start")
-    last = None if goal is None else _on_ground(ground, goal[:2], "--goal")
-    if first is None and last is None:
+    if goal is not None:
+        last = _on_ground(ground, goal[:2], "--goal")
+        first = _furthest(candidates, last) if start is None else _on_ground(ground, start[:2], "--start")
+    elif start is not None:
+        first = _on_ground(ground, start[:2], "--start")
+        last = _furthest(candidates, first)
+    else:
         distance = cdist(candidates[:, :2], candidates[:, :2])
         ends = candidates[list(np.unravel_index(int(distance.argmax()), distance.shape))]
         first, last = ends[np.lexsort((ends[:, 1], ends[:, 0]))]
-    elif first is None:
-        first = _furthest(candidates, last)
-    elif last is None:
-        last = _furthest(candidates, first)
     way = last - first
     heading = start[2] if start is not None and len(start) > 2 else float(np.arctan2(way[1], way[0]))
     return Places(first, last, heading)

@@ -70,8 +70,8 @@ class Samples:
             owner, count = cells_of(points, spacing)
         if spacing > _WIDEST:
             raise InputError(
-                f"the scan covers about {area.sum():.0f} m^2, too much to find places for feet in; cut out the part that "
-                "the robot walks through, or see --scale"
+                f"the scan covers about {area.sum():.0f} m^2, too much to find places for feet in; cut out the part "
+                "that the robot walks through, or see --scale"
             )
         number = np.bincount(owner, minlength=count)
         thin = np.column_stack([np.bincount(owner, points[:, axis], count) for axis in range(3)]) / number[:, None]
