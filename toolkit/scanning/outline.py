@@ -9,6 +9,7 @@ from scipy.ndimage import gaussian_filter
 from shapely.geometry import Polygon
 
 _WIDE = 4.0  # widths of the kernel: radius over which the usual density is taken
+_EDGE = 0.575  # share of the usual density at an edge; what is usual is taken over a disc that the edge cuts, too
 _MOST_CELLS = 4_000_000
 _ROUND_ERROR = 0.97  # a convex hull takes the place of an outline that fills so much of it
 
@@ -17,7 +18,7 @@ def outline(points: np.ndarray, weight: np.ndarray, kernel: float, hole: float) 
     """Regions of a plane that points cover, largest first, m.
 
     The density is smoothed by a Gaussian kernel and compared with what is usual around it. At a straight edge the
-    smoothed density is a half, however blurred the edge is.
+    smoothed density is a half of that inside, however blurred the edge is.
 
     Args:
         points: Points (n, 2) float in the plane, m.
@@ -39,7 +40,7 @@ def outline(points: np.ndarray, weight: np.ndarray, kernel: float, hole: float) 
     x, y = (low[axis] + step * np.arange(cells[axis]) for axis in range(2))
     contours = contour_generator(y, x, share, fill_type=FillType.OuterOffset)
     shapes = []
-    for ring, first in zip(*contours.filled(0.5, np.inf), strict=True):
+    for ring, first in zip(*contours.filled(_EDGE, np.inf), strict=True):
         parts = [ring[a:b, ::-1] for a, b in zip(first[:-1], first[1:], strict=True)]
         shape = shapely.make_valid(Polygon(parts[0], [part for part in parts[1:] if _is_hole(part, hole)]))
         shapes += [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]

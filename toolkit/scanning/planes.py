@@ -106,7 +106,9 @@ def find_planes(samples: Samples, local: LocalPlanes, config: PlaneConfig) -> li
 def _cores(samples: Samples, local: LocalPlanes, config: PlaneConfig) -> list[Plane]:
     """Planes of connected groups of local planes that agree, flattest first."""
     flat = np.flatnonzero(local.spread < 1.35 * config.noise + 0.5 * config.tolerance)
-    places, normals, weight = local.places[flat], local.normals[flat], local.weight[flat]
+    places, normals, weight, sided = (
+        column[flat] for column in (local.places, local.normals, local.weight, local.sided)
+    )
     graph = _neighbours(places, 0.8 * config.radius)
     tree = cKDTree(samples.thin)
     free, tried = np.ones(len(flat), bool), np.zeros(len(flat), bool)
@@ -117,7 +119,8 @@ def _cores(samples: Samples, local: LocalPlanes, config: PlaneConfig) -> list[Pl
         normal, centre = normals[seed], places[seed]
         group = np.array([seed])
         for _ in range(_REGROWN):
-            alike = free & (normals @ normal > np.cos(_CORE_ANGLE))
+            along = normals @ normal
+            alike = free & (np.where(sided, along, np.abs(along)) > np.cos(_CORE_ANGLE))
             alike &= np.abs((places - centre) @ normal) < config.tolerance
             group = _connected(graph, np.flatnonzero(alike), seed)
             if len(group) < _LEAST_CORE:
@@ -127,8 +130,8 @@ def _cores(samples: Samples, local: LocalPlanes, config: PlaneConfig) -> list[Pl
         if len(group) >= _LEAST_CORE:
             free[group] = False
             near = np.concatenate(tree.query_ball_point(places[group], config.radius).tolist())
-            sided = bool(local.sided[flat[group]].mean() > 0.5)
-            planes.append(Plane(normal, centre, sided, np.unique(near).astype(int), np.zeros(0, int)))
+            known = bool(sided[group].mean() > 0.5)
+            planes.append(Plane(normal, centre, known, np.unique(near).astype(int), np.zeros(0, int)))
     return planes
 
 
@@ -211,7 +214,8 @@ def _unified(samples: Samples, planes: list[Plane], config: PlaneConfig) -> list
 
 def _joint(samples: Samples, larger: Plane, plane: Plane, config: PlaneConfig) -> Plane | None:
     """One plane for the points of two; None where they do not touch or need two planes."""
-    if plane.normal @ larger.normal < np.cos(_SAME_ANGLE):
+    along = plane.normal @ larger.normal
+    if (along if plane.sided and larger.sided else abs(along)) < np.cos(_SAME_ANGLE):
         return None
     between = plane.centre - larger.centre
     if min(abs(between @ larger.normal), abs(between @ plane.normal)) > config.near:

@@ -12,7 +12,7 @@ from toolkit.scanning.samples import cells_of
 BLOCK = 0.1  # m; edge of the blocks whose points become one ellipsoid
 _MOST_BLOCKS = 1500  # blocks are larger where there would be more
 _LEAST_POINTS = 0.15  # share of the points of a flat block that a block must have; less is a speck
-_FILL = 2.2  # standard deviations from the centre of an even spread to its corners
+_FILL = 2.4  # standard deviations from the centre of an even spread to its corners
 _THINNEST = 0.01  # m; half the least thickness
 
 

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from toolkit.errors import InputError
 
 _CLOSED = 0.02  # the sides of a closed mesh cancel each other up to this share
 _MOST_POINTS = 150_000  # thinned points; the spacing grows with the scene
+_MOST_ASKED = 5_000  # points whose neighbours are asked for
 _MOST_PIECES = 2_000_000  # pieces of triangles
 _WIDEST = 0.08  # m; places for feet cannot be made out of samples further apart
 
@@ -60,7 +62,7 @@ class Samples:
         """Samples from points, with the thin points computed.
 
         Raises:
-            InputError: They would lie too far apart, because the scene is so large.
+            InputError: They lie too far apart, or would because the scene is so large.
         """
         if len(points) == 0:
             return cls(points, area, turned, spacing, np.zeros(0, int), np.zeros((0, 3)), np.zeros(0))
@@ -70,8 +72,8 @@ class Samples:
             owner, count = cells_of(points, spacing)
         if spacing > _WIDEST:
             raise InputError(
-                f"the scan covers about {area.sum():.0f} m^2, too much to find places for feet in; cut out the part "
-                "that the robot walks through, or see --scale"
+                f"samples of the scan are {spacing:.2g} m apart, too far to find places for feet; give a denser scan, "
+                "cut out the part that the robot walks through, or see --scale"
             )
         number = np.bincount(owner, minlength=count)
         thin = np.column_stack([np.bincount(owner, points[:, axis], count) for axis in range(3)]) / number[:, None]
@@ -104,7 +106,8 @@ def samples_of(scan: Scan, spacing: float) -> Samples:
     stand for the same area.
     """
     if len(scan.triangles) == 0:
-        each = cloud_area(scan.vertices, spacing)
+        spacing = max(spacing, _distance(scan.vertices))
+        each = _column_area(scan.vertices, spacing)
         return Samples.of(scan.vertices, np.full(len(scan.vertices), each), np.zeros_like(scan.vertices), spacing)
     corners = scan.vertices[scan.triangles]
     turned = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -135,7 +138,14 @@ def _outward(corners: np.ndarray, turned: np.ndarray) -> float:
     return -1.0 if (volume if closed else total[2]) < 0 else 1.0
 
 
-def cloud_area(points: np.ndarray, spacing: float) -> float:
+def _distance(points: np.ndarray) -> float:
+    """Usual distance of a point of a cloud from the fourth nearest, m: on a grid, the distance of its lines."""
+    some = points[:: len(points) // _MOST_ASKED + 1]
+    distance, _ = cKDTree(points).query(some, min(5, len(points)))
+    return float(np.median(distance[:, -1]))
+
+
+def _column_area(points: np.ndarray, spacing: float) -> float:
     """Area in m^2 that a point of a cloud stands for in the mean: that of its columns seen along the best axis."""
     covered = max(len(np.unique(np.floor(np.delete(points, axis, 1) / spacing), axis=0)) for axis in range(3))
     return covered * spacing**2 / max(len(points), 1)
