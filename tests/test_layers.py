@@ -14,6 +14,7 @@ LAYERS = [
     "geometry",
     "robot",
     "world",
+    "scanning",
     "contacts",
     "physics",
     "centroidal",
