@@ -64,7 +64,8 @@ def take_exact(scan: Scan) -> Exact:
     if sum(shapely.get_num_coordinates(facet.polygon) for facet in facets) > _MOST_CORNERS * (len(facets) + 1):
         return nothing
     left[[index for facet in facets for index in facet.triangles]] = False
-    rest = Scan(np.asarray(mesh.vertices), np.asarray(mesh.faces)[left])
+    vertices = np.asarray(mesh.vertices) if left.any() else np.zeros((0, 3))  # points alone would be a cloud
+    rest = Scan(vertices, np.asarray(mesh.faces)[left])
     patches = [Patch(facet.frame, facet.polygon) for facet in facets]
     return Exact(solids, patches, float(mesh.area_faces[~left].sum()), rest)
 
