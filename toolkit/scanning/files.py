@@ -103,7 +103,7 @@ def _mesh(path: Path, options: ReadOptions) -> Scan:
 def _pcd(path: Path, options: ReadOptions) -> Scan:
     """The points of a PCD file."""
     del options
-    from pypcd4 import PointCloud  # pyright: ignore[reportMissingImports]
+    from pypcd4.pypcd4 import PointCloud  # pyright: ignore[reportMissingImports]
 
     return Scan(PointCloud.from_path(path).numpy(("x", "y", "z")).astype(float), np.zeros((0, 3), int))
 
