@@ -15,6 +15,7 @@ LAYERS = [
     "geometry",
     "robot",
     "world",
+    "scanning",
     "contacts",
     "physics",
     "centroidal",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -41,12 +42,15 @@ def surface_table(world: World) -> Table:
     return table
 
 
-def write_surface_recording(path: Path, world: World) -> None:
+def write_surface_recording(
+    path: Path, world: World, also: Callable[[rr.RecordingStream], None] = lambda stream: None
+) -> None:
     """Write a recording of a world's geoms with its surfaces, their outlines and normals, the start and the goal.
 
     Args:
         path: file to write; it appears whole or not at all.
         world: the world.
+        also: draws what is to be seen beside them.
 
     Raises:
         InputError: it cannot be written.
@@ -82,6 +86,7 @@ def write_surface_recording(path: Path, world: World) -> None:
             labels=["start"],
         )
         stream.log("world/start", heading, static=True)
+        also(stream)
 
 
 def _eye(world: World) -> rrb.EyeControls3D:

@@ -40,7 +40,7 @@ height="256"/>
     <light pos="{light}" dir="0.3 0.2 -1" directional="true" diffuse="0.55 0.55 0.55"/>
 """
 
-_TAIL = """    <site name="start" pos="{start}" euler="0 0 0" size="0.02" rgba="0.2 0.7 0.3 1"/>
+_TAIL = """    <site name="start" pos="{start}" euler="0 0 {heading}" size="0.02" rgba="0.2 0.7 0.3 1"/>
     <site name="goal" type="cylinder" pos="{goal}" size="0.2 0.005" rgba="0.95 0.65 0.1 0.5"/>
   </worldbody>
 </mujoco>
@@ -64,6 +64,7 @@ class WorldText:
         timing: Times of shift and swing, s.
         goal, start: Positions (3,) of the two sites, m.
         abyss: Height of a floor that is only drawn, m; None for no such floor.
+        heading: Yaw of the start, deg.
     """
 
     model: str
@@ -73,19 +74,17 @@ class WorldText:
     goal: tuple[float, float, float]
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     abyss: float | None = -1.0
+    heading: float = 0.0
     _lines: list[str] = field(default_factory=list, repr=False)
     _assets: list[str] = field(default_factory=list, repr=False)
 
     def box(self, name: str, size, pos, *, material: str = "platform", rotation: Rotation | None = None) -> None:
         """Add a box by its whole extents (3,) m and its centre (3,) m."""
-        turn = ""
-        if rotation is not None:
-            x, y, z, w = rotation.as_quat()
-            turn = f' quat="{numbers([w, x, y, z])}"'
-        self._lines.append(
-            f'    <geom name="{name}" type="box" size="{numbers(np.asarray(size) / 2)}" pos="{numbers(pos)}"{turn} '
-            f'material="{material}"/>\n'
-        )
+        self._geom(name, "box", size, pos, material, rotation)
+
+    def ellipsoid(self, name: str, size, pos, *, material: str = "stone", rotation: Rotation | None = None) -> None:
+        """Add an ellipsoid, which is an obstacle and never a surface, by its diameters (3,) m and its centre (3,) m."""
+        self._geom(name, "ellipsoid", size, pos, material, rotation)
 
     def tile(self, name: str, size, top, *, material: str = "stone", rotation: Rotation | None = None) -> None:
         """Add a thin box by the extents (2,) m and the centre (3,) m of its top; `rotation` is about that centre."""
@@ -97,11 +96,24 @@ class WorldText:
         """Add a level platform between two x, centred on y = 0, its top at `height`, m."""
         self.tile(name, (x[1] - x[0], width), ((x[0] + x[1]) / 2, 0.0, height), material="platform")
 
-    def mesh(self, name: str, vertices: np.ndarray, triangles: np.ndarray, *, material: str = "stone") -> None:
-        """Add a mesh with its vertices (n, 3) m and triangles (k, 3) written into the file."""
-        faces = " ".join(str(index) for index in np.ravel(triangles))
-        self._assets.append(f'    <mesh name="{name}" vertex="{numbers(vertices)}"\n      face="{faces}"/>\n')
+    def mesh(
+        self, name: str, vertices: np.ndarray, triangles: np.ndarray | None = None, *, material: str = "stone"
+    ) -> None:
+        """Add a mesh with its vertices (n, 3) m and triangles (k, 3), or their convex hull, written into the file."""
+        faces = "" if triangles is None else f'\n      face="{" ".join(str(index) for index in np.ravel(triangles))}"'
+        self._assets.append(f'    <mesh name="{name}" vertex="{numbers(vertices)}"{faces}/>\n')
         self._lines.append(f'    <geom name="{name}" type="mesh" mesh="{name}" material="{material}"/>\n')
+
+    def _geom(self, name: str, kind: str, size, pos, material: str, rotation: Rotation | None) -> None:
+        """Add a geom by its whole extents (3,) m and its centre (3,) m."""
+        turn = ""
+        if rotation is not None:
+            x, y, z, w = rotation.as_quat()
+            turn = f' quat="{numbers([w, x, y, z])}"'
+        self._lines.append(
+            f'    <geom name="{name}" type="{kind}" size="{numbers(np.asarray(size) / 2)}" pos="{numbers(pos)}"{turn} '
+            f'material="{material}"/>\n'
+        )
 
     def render(self) -> str:
         """The MJCF text."""
@@ -120,4 +132,8 @@ class WorldText:
         if self.abyss is not None:
             pos = f"0 0 {numbers([self.abyss])}"
             head += f'    <geom class="visual" type="plane" size="0 0 1" pos="{pos}" material="abyss"/>\n'
-        return head + "".join(self._lines) + _TAIL.format(start=numbers(start), goal=numbers(goal))
+        return (
+            head
+            + "".join(self._lines)
+            + _TAIL.format(start=numbers(start), goal=numbers(goal), heading=numbers([self.heading]))
+        )

@@ -30,7 +30,7 @@ class Facet:
     triangles: np.ndarray
 
 
-def _plane_frame(origin: np.ndarray, normal: np.ndarray) -> Pose:
+def plane_frame(origin: np.ndarray, normal: np.ndarray) -> Pose:
     """Frame with z along a unit normal (3,) and x along the projected x axis of the world (y if that is short)."""
     axis = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     x = axis - (axis @ normal) * normal
@@ -114,7 +114,7 @@ def facet_of(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
     corners, area = mesh.triangles[group], mesh.area_faces[group]
     weight = area / area.sum()
     normal = weight @ mesh.face_normals[group]
-    frame = _plane_frame(weight @ corners.mean(axis=1), normal / np.linalg.norm(normal))
+    frame = plane_frame(weight @ corners.mean(axis=1), normal / np.linalg.norm(normal))
     flat = frame.inverse() @ corners
     shape = _union(flat[..., :2]) if len(flat) > 1 else Polygon(flat[0, :, :2])
     if not isinstance(shape, Polygon):  # the pieces touch only in points, and the largest is kept
