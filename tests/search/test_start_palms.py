@@ -11,10 +11,11 @@ from toolkit.errors import InputError, WorldError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.quasi_static import quasi_static_planner
 
-QUICK = PlannerConfig(search=AnaStarConfig(max_expansions=100))
+QUICK = PlannerConfig(cost=CostConfig(time=0.0), search=AnaStarConfig(max_expansions=100))
 LEFT, RIGHT = Limb.LEFT_PALM, Limb.RIGHT_PALM
 
 

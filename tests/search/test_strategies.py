@@ -40,7 +40,7 @@ def test_an_ordinary_search_judges_at_once_and_doubts_nothing(quick):
     strategy = strategy_of(CONFIG, quick, 3.0, slides=False)
     assert (strategy.at_once, strategy.waiting, strategy.hasty) == (quick, None, None)
     assert strategy.cost == CONFIG.cost
-    assert strategy.patient == replace(CONFIG.search, initial_cost=3.0 * CONFIG.acceptable_cost)
+    assert strategy.patient == replace(CONFIG.search, initial_cost=3.0 * CONFIG.acceptable_cost, layer=0.13)
 
 
 @pytest.mark.parametrize("slides", [False, True])
@@ -120,4 +120,4 @@ def test_no_edge_costs_less_than_its_bound_and_the_heuristic_falls_no_faster_tha
     after = edge.to_go(candidates.centre, candidates.yaw)
     assert (after >= 0.0).all() and (after[~edge.at_goal(candidates.centre)] >= 3.0).all()
     assert (before <= least + after + 1e-9).all()
-    assert edge.per_metre == pytest.approx(1.0 + 3.0 / 0.4)
+    assert edge.per_metre == pytest.approx(1.0 + (3.0 + 20.0 * 1.0) / 0.4)

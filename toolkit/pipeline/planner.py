@@ -10,10 +10,11 @@ from typing import Protocol
 import numpy as np
 
 from toolkit.centroidal.plan import plan_motion
+from toolkit.contacts.failure import Failure
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.prediction.kinematic import KinematicEvaluator
-from toolkit.prediction.networks import NetworkEvaluator, load_networks
+from toolkit.prediction.networks import SLIDING, NetworkEvaluator, load_networks
 from toolkit.prediction.optimiser import OptimiserEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import Progress
@@ -66,14 +67,21 @@ def make_planner(
             config = replace(config, cost=replace(config.cost, time=0.0))
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
     optimiser = OptimiserEvaluator(robot)
-    judge = NetworkEvaluator(load_networks(robot), optimiser) if kind == "learned" else optimiser
+    judge = _networks(robot, optimiser) if kind == "learned" else optimiser
     at_rest = OptimiserEvaluator(robot, final_at_rest=True)
     return ContactPlanner(robot, world, judge, config, partial(_objective, robot, world), at_rest)
 
 
-def _objective(robot: RobotModel, world: World, sequence: ContactSequence) -> float | None:
-    """Objective of a sequence's motion as a run plans it by default; None where there is none."""
+def _networks(robot: RobotModel, stand_in: OptimiserEvaluator) -> NetworkEvaluator:
+    """The robot's networks, with those for sliding ground where it has them."""
+    folder = robot.folder / "networks" / SLIDING
+    sliding = NetworkEvaluator(load_networks(robot, folder), stand_in) if folder.is_dir() else None
+    return NetworkEvaluator(load_networks(robot), stand_in, sliding)
+
+
+def _objective(robot: RobotModel, world: World, sequence: ContactSequence) -> float | Failure:
+    """Objective of a sequence's motion as a run plans it by default, or why there is none."""
     run = PipelineConfig()
     rests = {"initial_rest": run.initial_rest, "final_rest": run.final_rest}
     motion = plan_motion(robot, world, sequence, **rests, landing=run.landing, config=run.sequence).motion
-    return motion.objective if motion.feasible else None
+    return motion.objective if motion.feasible else motion.failure or Failure(motion.outcome)

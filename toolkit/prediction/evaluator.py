@@ -39,11 +39,13 @@ class TransitionEvaluator(ABC):
         rejection: What it means that a transition is infeasible, for messages.
         stand_in: The judge of what this one was not trained for. It also judges on ground that holds no resting foot,
             where feasibility must be exact. None where there is no such judge.
+        sliding: The judge to take on ground that holds no resting foot; None for this one.
     """
 
     costly: bool = False
     rejection: str = "dynamics"
     stand_in: TransitionEvaluator | None = None
+    sliding: TransitionEvaluator | None = None
 
     @abstractmethod
     def evaluate(

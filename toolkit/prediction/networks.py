@@ -20,6 +20,13 @@ from toolkit.prediction.features import encode
 from toolkit.prediction.network import TransitionNetwork, load_network, network_path
 from toolkit.robot.model import RobotModel
 
+SLIDING = "sliding"
+"""Folder, within that of the networks, of those for ground that holds no resting foot.
+
+There, what comes next cannot save a transition, and the mean over whole motions tells too little of the speed. These
+networks know what a transition does alone.
+"""
+
 
 def load_networks(robot: RobotModel, folder: Path | None = None) -> dict[Category, TransitionNetwork]:
     """The networks of every category that the robot can perform.
@@ -53,10 +60,12 @@ class NetworkEvaluator(TransitionEvaluator):
     Attributes:
         networks: Networks by category.
         stand_in: Judges what the networks have not been trained for; None: the networks judge this as well.
+        sliding: See `TransitionEvaluator`.
     """
 
     networks: dict[Category, TransitionNetwork]
     stand_in: TransitionEvaluator | None = None
+    sliding: TransitionEvaluator | None = None
 
     def evaluate(
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]

@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from toolkit.contacts.failure import Failure
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.prediction.evaluator import TransitionEvaluator
-from toolkit.search.anytime.graph import Edge
+from toolkit.search.anytime.graph import Edge, Fault
 from toolkit.search.costs.edge_cost import EdgeCost
 from toolkit.search.judging import Tally
 from toolkit.search.moves.reasons import Reason
@@ -20,8 +21,8 @@ from toolkit.search.states.state import is_pending
 _WINDOWS = (1, 3, 6)  # transitions that are optimised together, in the order in which they are tried
 _REST = 0.6  # s on the final stance that are optimised with them
 
-Finish = Callable[[ContactSequence], float | None]
-"""Objective of the motion of a whole sequence from rest to rest; None where there is no such motion."""
+Finish = Callable[[ContactSequence], float | Failure]
+"""Objective of the motion of a whole sequence from rest to rest, or why there is no such motion."""
 
 
 class Arrival:
@@ -41,18 +42,22 @@ class Arrival:
     ):
         self._finish, self._screen, self._reader, self._cost, self._tally = finish, screen, reader, cost, tally
 
-    def __call__(self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]) -> Edge[bytes] | None:
+    def __call__(
+        self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]
+    ) -> Edge[bytes] | Fault | None:
         """See `toolkit.search.anytime.graph.Judge`."""
         judged = [payload for payload in payloads if payload is not None]
         passed = [state for state in states if not is_pending(state)]
         ends = [*passed[1:], edge.state]
         transitions = [self._reader.transition(*step) for step in zip(ends, [*judged, edge.payload], strict=True)]
-        objective = None
-        if self._comes_to_rest(passed, transitions):
-            objective = self._finish(ContactSequence(self._reader.origin(passed[0])[0], tuple(transitions)))
-        if objective is None:
+        if not self._comes_to_rest(passed, transitions):
             self._tally.rejected[Reason.DYNAMICS] += 1
             return None
+        objective = self._finish(ContactSequence(self._reader.origin(passed[0])[0], tuple(transitions)))
+        if isinstance(objective, Failure):
+            self._tally.rejected[Reason.DYNAMICS] += 1
+            at = objective.transition
+            return None if at is None or at + 1 >= len(passed) else Fault(list(states).index(passed[at + 1]))
         predicted = sum(payload[0] for payload in judged) + edge.payload[0]
         missing = self._cost.dynamics * (objective - predicted)
         return edge._replace(cost=edge.cost + missing, payload=(*edge.payload, missing))

@@ -42,6 +42,7 @@ def strategy_of(config: PlannerConfig, evaluator: TransitionEvaluator, length: f
     """
     config = replace(config, cost=config.cost.on_ground(slides=slides))
     if slides:
+        evaluator = evaluator.sliding or evaluator
         # Steep ground need not be avoided. Ways across it are rare and lie deep in the graph. Finding them takes less
         # width than leaving a cul-de-sac does, and so more patience.
         search = replace(config.search, patience=10 * config.search.patience)

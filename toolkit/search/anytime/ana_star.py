@@ -26,7 +26,7 @@ from typing import Any, Generic
 
 import numpy as np
 
-from toolkit.search.anytime.graph import Edge, Judge, Path, Progress, SearchProblem, State
+from toolkit.search.anytime.graph import Edge, Fault, Judge, Path, Progress, SearchProblem, State
 from toolkit.search.anytime.open_list import OpenList
 
 _TINY = 1e-9  # divisor in place of h = 0
@@ -117,6 +117,7 @@ class AnaStar(Generic[State]):
         self._open = OpenList(self._g, self._h, self._config.layer * self._config.unit)
         self._crowding = self._config.crowding
         self._forbidden: set[tuple[State, State]] = set()
+        self._broken: set[tuple[int, int]] = set()  # edges between nodes that no path may take
 
     def run(
         self, time_limit: float = math.inf, observer: Callable[[Progress[State]], None] | None = None
@@ -206,7 +207,7 @@ class AnaStar(Generic[State]):
             self._h.append(h)
             self._parent.append(parent)
             self._crowd.append(crowd)
-        elif g < self._g[node]:
+        elif g < self._g[node] and (parent, node) not in self._broken:
             self._g[node], self._parent[node], self._edge[node] = g, parent, edge
         else:
             return
@@ -224,10 +225,30 @@ class AnaStar(Generic[State]):
         return -margin / max(h, _TINY) if margin > 0 else -margin * h  # second case: only before a solution
 
     def _next(self) -> int:
-        """Close and return the node to expand."""
-        if self._config.epsilon > 0 and self._rng.random() < self._config.epsilon:
-            return self._open.take_random(self._rng, self._priority)
-        return self._open.take_best(self._priority)
+        """Close and return the node to expand; one to which no path leads any more where nothing else is open."""
+        while True:
+            if self._config.epsilon > 0 and self._rng.random() < self._config.epsilon:
+                node = self._open.take_random(self._rng, self._priority)
+            else:
+                node = self._open.take_best(self._priority)
+            if not self._open or not self._cut_off(node):
+                return node
+
+    def _cut_off(self, node: int) -> bool:
+        """Whether the path to a node takes a broken edge."""
+        if self._broken:
+            while node >= 0:
+                if (self._parent[node], node) in self._broken:
+                    return True
+                node = self._parent[node]
+        return False
+
+    def _break(self, node: int, states: list[State], number: int) -> None:
+        """Break the edge into the state with this number on the path of `states` to a node."""
+        for _ in range(len(states) - 1 - number):
+            node = self._parent[node]
+        self._broken.add((self._parent[node], node))
+        self._g[node] = math.inf  # other ways to it may be longer
 
     def _reach(self, node: int, edge: Edge[State], began: float, expansions: int) -> Path[State] | None:
         """Take an edge to a goal if it improves on the best solution and the judge agrees."""
@@ -239,7 +260,10 @@ class AnaStar(Generic[State]):
             if key in self._forbidden:
                 return None
             judged = self._judge(states, payloads, edge)
-            if judged is None:
+            if isinstance(judged, Fault) and 0 < judged.state < len(states):
+                self._break(node, states, judged.state)
+                return None
+            if judged is None or isinstance(judged, Fault):
                 self._forbidden.add(key)
                 self._refuse(node, edge)
                 return None

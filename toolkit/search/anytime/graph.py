@@ -55,8 +55,17 @@ class SearchProblem(Protocol[State]):
         ...
 
 
-Judge = Callable[[Sequence[State], Sequence[Any], Edge[State]], Edge[State] | None]
-"""Judges an edge to a goal; also gets the states before it and the payloads between them. See `AnaStar`."""
+class Fault(NamedTuple):
+    """Why a path to a goal is none: its edge into the state with this number, counted from the start of the path."""
+
+    state: int
+
+
+Judge = Callable[[Sequence[State], Sequence[Any], Edge[State]], Edge[State] | Fault | None]
+"""Judges an edge to a goal; also gets the states before it and the payloads between them. See `AnaStar`.
+
+It gives the edge with its true cost, None where the path may not end there, or the edge because of which it may not.
+"""
 
 
 @dataclass(frozen=True)
