@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from toolkit.exchange.record import read_run
-from toolkit.pipeline import PipelineConfig, PipelineResult, Trial
+from toolkit.pipeline import Candidate, PipelineConfig, PipelineResult, Source, Trial
 from toolkit.report.run import RunOptions, write_run
+from toolkit.search.costs.plan_cost import plan_cost
 from toolkit.search.result import SearchResult, Solution
 
 
@@ -15,8 +16,10 @@ def write_walk(folder, plan, execution):
     zero = np.zeros((count + 1, 3))
     solution = Solution(sequence, 1.0, 1.0, 0.1, zero, zero, np.zeros(count))
     search = SearchResult((solution,), 0.1, 0.0, 1, False, zero, "")
-    trial = Trial(solution, plan.whole, execution, execution.failure)
-    result = PipelineResult(plan.robot, plan.world, PipelineConfig(), search, trial, 1, "")
+    config, whole = PipelineConfig(), plan.whole
+    candidate = Candidate(0, Source.SEARCH, 0, 0.1, solution, whole, plan_cost(whole, config.cost), None)
+    trial = Trial(candidate, whole, execution, execution.failure)
+    result = PipelineResult(plan.robot, plan.world, config, search, trial, (candidate,), (trial,), "")
     write_run(folder, result, RunOptions(recording=False))
 
 
