@@ -19,7 +19,7 @@ from toolkit.world.loader import load_world
 @pytest.fixture(scope="module")
 def config():
     return CollectConfig(
-        robot=load_robot(None).name, seed=7, per_shard=1, most_worlds=6, expansions=(60, 120), kept=1, variants=2
+        robot=load_robot(None).name, seed=7, per_shard=1, most_worlds=30, expansions=(60, 120), kept=1, variants=4
     )
 
 

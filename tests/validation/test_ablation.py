@@ -14,7 +14,7 @@ FEASIBLE_SECONDS = 1.0
 
 def item(name: str, predicted: float, true: float, found: float = 0.0, feasible: bool = True):
     """A sequence that took a second to optimise."""
-    solution = SimpleNamespace(sequence=SimpleNamespace(identity=name), cost=predicted, seconds=found)
+    solution = SimpleNamespace(sequence=SimpleNamespace(identity=name), predicted=predicted, seconds=found)
     outcome = SimpleNamespace(feasible=feasible, cost=SimpleNamespace(total=true), seconds=FEASIBLE_SECONDS)
     return SimpleNamespace(solution=solution, outcome=outcome)
 

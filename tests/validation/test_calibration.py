@@ -120,7 +120,7 @@ def test_the_cost_to_go_at_the_start_is_the_cost_of_the_path_and_of_the_plan(sea
     check = BoundCheck(found.planner)
     for tested in found.tested:
         bounds = check(tested)
-        assert bounds.predicted[0] == pytest.approx(tested.solution.cost, rel=1e-6)
+        assert bounds.predicted[0] == pytest.approx(tested.solution.predicted, rel=1e-6)
         if tested.outcome.feasible:
             # The rest before the first transition is the plan's alone.
             rest = found.planner.config.cost.time * tested.outcome.plan.schedule.duration

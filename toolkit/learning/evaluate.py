@@ -67,8 +67,12 @@ def score(network: TransitionNetwork, samples: Samples) -> Score:
 
 
 def balanced(samples: Samples, count: int, rng: np.random.Generator) -> Samples:
-    """A random test set of `count` transitions; the rarer label is raised to a share of 25 % where it has less."""
+    """A random test set of `count` transitions; the rarer label is raised to a share of 25 % where it has less.
+
+    Of the feasible transitions, those whose outcome is known come first.
+    """
     order = rng.permutation(len(samples))
+    order = order[np.argsort(~(samples.known | ~samples.feasible)[order], kind="stable")]
     labels = samples.feasible[order]
     head = labels[:count]
     least = int(np.ceil(0.25 * count))
