@@ -19,6 +19,7 @@ from toolkit.world.convex import convex_partition
 
 _SPACING = 0.02  # m; distance of samples, as far as the scene is small enough
 _OPPOSITE = -0.9  # cosine of the angle between the normals of the two sides of a wall
+_LOWER = 2e-3  # m; what is there but cannot be touched ends so far below the surface: it covers, and is no part of it
 _LEAST = 3e-3  # m^2; smaller patches cannot be touched
 _GAP = 1e-3  # m; between the backs of the two sides of a wall
 
@@ -79,7 +80,7 @@ def world_text(scene: Scene, comment: str, friction: float, timing: tuple[float,
     """The world of a scene; its start and goal are still to be set.
 
     Every patch becomes convex plates as thick as the tiles of generated worlds, so thin that their edges are no
-    surfaces; closed exact meshes stay meshes.
+    surfaces, with its body under it; closed exact meshes stay meshes.
     """
     low = min(float(scan.bounds[0, 2]) for scan in scene.scans)
     world = WorldText("scan", comment, friction, timing, goal=(0.0, 0.0, 0.0), abyss=low - 2 * THICKNESS)
@@ -88,15 +89,20 @@ def world_text(scene: Scene, comment: str, friction: float, timing: tuple[float,
         world.mesh(f"solid_{number}", solid.vertices, solid.faces, material="platform")
     for number, patch in enumerate(scene.patches):
         depth = _depth(patch, scene.patches)
-        for piece, ring in enumerate(convex_partition(patch.polygon)):
-            if Polygon(ring).area < 1e-6:
-                continue
-            plate = np.concatenate([np.column_stack([ring, np.full(len(ring), z)]) for z in (0.0, -depth)])
-            name = f"patch_{number}" if piece == 0 else f"patch_{number}_{piece}"
-            world.mesh(name, patch.frame @ plate, material="platform" if abs(patch.frame.normal[2]) > 0.7 else "panel")
+        for name, outline, top in (("patch", patch.polygon, 0.0), ("under", patch.body, -_LOWER)):
+            _add_plates(world, f"{name}_{number}", patch, outline, top, min(-depth, top - _GAP))
     for number, blob in enumerate(scene.blobs):
         world.ellipsoid(f"rough_{number}", blob.diameters, blob.centre, rotation=blob.rotation)
     return world
+
+
+def _add_plates(world: WorldText, name: str, patch: Patch, outline: Polygon, top: float, bottom: float) -> None:
+    """Add convex plates that together have an outline in a patch's frame, between two heights over it in m."""
+    material = "platform" if abs(patch.frame.normal[2]) > 0.7 else "panel"
+    rings = [] if outline.is_empty else [ring for ring in convex_partition(outline) if Polygon(ring).area > 1e-6]
+    for piece, ring in enumerate(rings):
+        plate = np.concatenate([np.column_stack([ring, np.full(len(ring), z)]) for z in (top, bottom)])
+        world.mesh(name if piece == 0 else f"{name}_{piece}", patch.frame @ plate, material=material)
 
 
 def _depth(patch: Patch, patches: list[Patch]) -> float:

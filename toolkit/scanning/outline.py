@@ -52,10 +52,10 @@ def _is_hole(ring: np.ndarray, radius: float) -> bool:
     return len(ring) > 3 and not Polygon(ring).buffer(-radius).is_empty
 
 
-def tidy(region: Polygon, tolerance: float, width: float, margin: float) -> list[Polygon]:
+def tidy(region: Polygon, tolerance: float, width: float) -> list[Polygon]:
     """A region without necks, spikes and notches narrower than `width` m, with few corners, as one or more polygons.
 
-    Corners that stand out less than `tolerance` m are left out, and then a margin of `margin` m all around.
+    Corners that stand out less than `tolerance` m are left out.
     """
     closed = region.buffer(width / 2, join_style="mitre", mitre_limit=1.5).buffer(-width, join_style="mitre")
     opened = closed.buffer(width / 2, join_style="mitre", mitre_limit=2.0)
@@ -65,9 +65,8 @@ def tidy(region: Polygon, tolerance: float, width: float, margin: float) -> list
         for piece in shapely.get_parts(simple):
             if isinstance(piece, Polygon) and piece.area > width**2 / 2:
                 hull = piece.convex_hull
-                whole = hull.simplify(tolerance) if piece.area > _ROUND_ERROR * hull.area else piece
-                result += shapely.get_parts(whole.buffer(-margin, join_style="mitre")).tolist()
-    return [piece for piece in result if not piece.is_empty]
+                result.append(hull.simplify(tolerance) if piece.area > _ROUND_ERROR * hull.area else piece)
+    return result
 
 
 def is_wide(region: Polygon, width: float) -> bool:

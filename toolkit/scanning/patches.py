@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
@@ -16,6 +16,7 @@ from toolkit.scanning.planes import Plane, PlaneConfig, find_planes
 from toolkit.scanning.samples import Samples
 
 _RADIUS = 0.11  # m; neighbourhood in which noise of 2 cm is told from shape
+_MARGIN = 0.5  # of the noise; how far from its edge a patch can be touched
 _HOLE = 0.1  # m; smaller holes of a patch were not seen and are taken to be closed
 _LEVEL = np.cos(np.radians(80.0))  # what is flatter and has no known side faces up
 
@@ -26,11 +27,14 @@ class Patch:
 
     Attributes:
         frame: World_from_patch pose; z is the outward normal.
-        polygon: Outline in the frame's xy, m.
+        polygon: Outline in the frame's xy of what can be touched, m.
+        body: Outline of what is there, m: noise makes it uncertain whether its edge can be touched. Empty where there
+            is no more than the polygon.
     """
 
     frame: Pose
     polygon: Polygon
+    body: Polygon = field(default_factory=Polygon)
 
 
 @dataclass(frozen=True)
@@ -74,8 +78,11 @@ def read_samples(samples: Samples) -> Reading:
         own = order[first:last]
         points = (plane.frame.inverse() @ samples.points[own])[:, :2]
         for region in outline(points, samples.area[own], config.kernel, _HOLE):
-            pieces = tidy(region, config.kernel / 2, config.width / 2, noise)
-            patches += [Patch(plane.frame, piece) for piece in pieces]
+            for body in tidy(region, config.kernel / 2, config.width / 2):
+                inner = body.buffer(-_MARGIN * noise, join_style="mitre")
+                parts = [part for part in shapely.get_parts(inner) if not part.is_empty]
+                bodies = [body] + [Polygon()] * len(parts)  # of several parts the first has the body
+                patches += [Patch(plane.frame, *both) for both in zip(parts, bodies, strict=False)]
     patches.sort(key=lambda patch: -patch.polygon.area)
     height, beside = _from_patches(samples.thin, patches, config)
     on_patch = (height <= config.near) & (beside <= config.kernel + noise)
