@@ -71,7 +71,7 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
     with _caught() as found:
         model = spec.compile()
     if found:
-        raise InputError(f"MuJoCo warns: {one_line(found[0])}")
+        raise InputError(f"MuJoCo warns: {found[0]}")
     names = sorted((name for name in dir(model) if "_" in name.strip("_")), key=lambda name: not _named(model, name))
     arrays = {name: getattr(model, name) for name in names}
     arrays = {name: a for name, a in arrays.items() if isinstance(a, np.ndarray) and a.dtype.kind == "f" and a.size}
@@ -122,20 +122,27 @@ def copy_fields(source: Any, target: Any) -> None:
 
 
 @contextmanager
-def _caught() -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings instead of printing and logging them, and turn its errors into ValueErrors."""
+def mujoco_warnings() -> Iterator[list[str]]:
+    """Collect MuJoCo's warnings, one line each, instead of printing them and writing them to MUJOCO_LOG.TXT."""
     found: list[str] = []
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(found.append)
+    mujoco.set_mju_user_warning(lambda message: found.append(one_line(message)))
     try:
-        with warnings.catch_warnings(record=True) as others:
-            warnings.simplefilter("always")
-            yield found
-            found += [str(other.message) for other in others]
-    except (mujoco.FatalError, MemoryError) as error:
-        raise ValueError(one_line(error)) from error
+        yield found
     finally:
         mujoco.set_mju_user_warning(before)
+
+
+@contextmanager
+def _caught() -> Iterator[list[str]]:
+    """Collect all warnings, MuJoCo's and Python's, and turn MuJoCo's errors into ValueErrors."""
+    try:
+        with mujoco_warnings() as found, warnings.catch_warnings(record=True) as others:
+            warnings.simplefilter("always")
+            yield found
+            found += [one_line(other.message) for other in others]
+    except (mujoco.FatalError, MemoryError) as error:
+        raise ValueError(one_line(error)) from error
 
 
 def _take_assets(spec: mujoco.MjSpec, folder: Path) -> None:

@@ -77,8 +77,6 @@ class Recorder:
             self.fall = f"the base tilted by {np.degrees(np.arccos(np.clip(upright, -1.0, 1.0))):.0f} degrees"
         elif height < least:
             self.fall = f"the CoM sank to {height:.2f} m above the lower foot, below {least:.2f} m"
-        elif not np.isfinite(self.qpos[k]).all():
-            self.fall = "the simulation diverged"
 
     @property
     def limb_pose(self) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.errors import InputError
 from toolkit.execution.result import Controls
+from toolkit.mjcf import mujoco_warnings
 
 _NAMES = ("timestep", "qpos0", "qvel0", "ctrl", "qpos")
 
@@ -46,10 +47,11 @@ def replay(scene_path: Path | str, execution_path: Path | str) -> float:
 
 
 def replay_controls(scene: mujoco.MjModel, controls: Controls) -> np.ndarray:
-    """Final qpos (nq,) after one mj_step per row of controls from the initial state."""
+    """Final qpos (nq,) after one mj_step per row of controls from the initial state; MuJoCo's warnings are dropped."""
     data = mujoco.MjData(scene)
     data.qpos[:], data.qvel[:] = controls.qpos0, controls.qvel0
-    for row in controls.ctrl:
-        data.ctrl[:] = row
-        mujoco.mj_step(scene, data)
+    with mujoco_warnings():
+        for row in controls.ctrl:
+            data.ctrl[:] = row
+            mujoco.mj_step(scene, data)
     return data.qpos.copy()

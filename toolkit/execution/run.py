@@ -18,6 +18,7 @@ from toolkit.execution.measure import measure
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution
 from toolkit.execution.scene_index import SceneIndex
+from toolkit.mjcf import mujoco_warnings
 from toolkit.replanning.replanner import MAX_FRICTION, ReplanCounts, Replanner
 from toolkit.wholebody.plan import WholeBodyPlan
 
@@ -77,28 +78,32 @@ def execute(
     report_every = max(round(0.1 / period), 1)
     qpos, qvel = qpos0.copy(), qvel0.copy()
     started = perf_counter()
-    for tick in range(ticks):
-        tick_started = perf_counter()
-        torque = controller.tick(tick, *told(qpos, qvel), recorder.meter.normal_force)
-        recorder.tick_seconds[tick] = perf_counter() - tick_started
-        recorder.com_aim[tick] = controller.aim.com
-        recorder.meter.expected[:] = reference.authority[tick] > 0.0
-        data.ctrl[:] = torque
-        if push.any():
-            pushed = push_time <= reference.times[tick] < push_time + config.disturbance.push_duration
-            data.xfrc_applied[index.base, :3] = push if pushed else 0.0
-        for part in range(config.control_decimation):
-            ctrl[step] = torque
-            step += 1
-            mujoco.mj_step(scene, data)
-            recorder.meter.read(data)
-            if part == 0:
-                recorder.record(data, qpos, qvel)
-            qpos[:], qvel[:] = data.qpos, data.qvel
-        if recorder.fall:
-            break
-        if observer is not None and tick % report_every == 0:
-            observer(tick / ticks, f"{reference.times[tick]:.1f} s")
+    with mujoco_warnings() as warnings:
+        for tick in range(ticks):
+            tick_started = perf_counter()
+            torque = controller.tick(tick, *told(qpos, qvel), recorder.meter.normal_force)
+            recorder.tick_seconds[tick] = perf_counter() - tick_started
+            recorder.com_aim[tick] = controller.aim.com
+            recorder.meter.expected[:] = reference.authority[tick] > 0.0
+            data.ctrl[:] = torque
+            if push.any():
+                pushed = push_time <= reference.times[tick] < push_time + config.disturbance.push_duration
+                data.xfrc_applied[index.base, :3] = push if pushed else 0.0
+            for part in range(config.control_decimation):
+                ctrl[step] = torque
+                step += 1
+                mujoco.mj_step(scene, data)
+                recorder.meter.read(data)
+                if part == 0:
+                    recorder.record(data, qpos, qvel)
+                qpos[:], qvel[:] = data.qpos, data.qvel
+                if warnings:  # MuJoCo may have put a state that diverged back to where it began
+                    recorder.fall = f"the simulation diverged: {warnings[0]}"
+                    break
+            if recorder.fall:
+                break
+            if observer is not None and tick % report_every == 0:
+                observer(tick / ticks, f"{reference.times[tick]:.1f} s")
     return measure(
         recorder,
         Controls(config.timestep, qpos0, qvel0, ctrl[:step], qpos),
