@@ -111,7 +111,9 @@ def test_a_simulation_that_diverges_is_a_fall_and_leaves_no_log(standing, start,
     trajectory = standing.whole.trajectory
     wild = getattr(trajectory, start).copy()
     wild[0, -1] = 1e11
-    execution = execute(dataclasses.replace(standing.whole, trajectory=dataclasses.replace(trajectory, **{start: wild})))
+    execution = execute(
+        dataclasses.replace(standing.whole, trajectory=dataclasses.replace(trajectory, **{start: wild}))
+    )
     assert execution.fall is not None and execution.fall.reason.startswith("the simulation diverged: ")
     assert {"upright", "completed"} <= failed(execution)
     replay_controls(execution.scene, execution.controls)
