@@ -41,7 +41,10 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
         seed=args.seed,
         samples_per_category=args.samples,
     )
-    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
+    with (
+        executor(args.workers, args.cluster, unencrypted=args.cluster_unencrypted) as pool,
+        progress_bar(console) as progress,
+    ):
         task = progress.add_task("shards", total=config.shards)
 
         def tick(state: Collected) -> None:
@@ -71,7 +74,10 @@ def run_enrich(args: argparse.Namespace, console: Console) -> int:
         draws=args.draws,
         networks=str(args.networks.resolve()) if args.networks else None,
     )
-    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
+    with (
+        executor(args.workers, args.cluster, unencrypted=args.cluster_unencrypted) as pool,
+        progress_bar(console) as progress,
+    ):
         task = progress.add_task("shards")
 
         def tick(done: int, of: int) -> None:
@@ -175,7 +181,7 @@ def main(argv: list[str] | None = None) -> int:
         sub.add_argument(
             "--workers", type=cli.positive(int), default=cli.cores(), help="number of processes (default: all cores)"
         )
-        sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+        cli.add_cluster_options(sub)
 
     def add_categories(sub: argparse.ArgumentParser) -> None:
         numbers = [int(category) for category in Category]

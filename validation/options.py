@@ -42,7 +42,7 @@ def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> 
     made.add_argument(
         "--workers", type=_count, default=cli.cores(), help="processes, one thread each; 0: this one (default: cores)"
     )
-    made.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    cli.add_cluster_options(made)
     made.add_argument(
         "--out",
         type=Path,
@@ -128,4 +128,4 @@ def settings_of(args: argparse.Namespace) -> TrialSettings:
 
 def pool_of(args: argparse.Namespace) -> PoolOptions:
     """Where trials run."""
-    return PoolOptions(args.workers, args.cluster)
+    return PoolOptions(args.workers, args.cluster, args.cluster_unencrypted)

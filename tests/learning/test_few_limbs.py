@@ -50,7 +50,7 @@ def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
     assert planned("kinematic") == 0
 
     # Few samples, made in this process; the commands themselves are as they are.
-    monkeypatch.setattr(train, "executor", lambda workers, cluster: ThreadPoolExecutor(1))
+    monkeypatch.setattr(train, "executor", lambda workers, cluster, unencrypted: ThreadPoolExecutor(1))
     monkeypatch.setattr(train, "CollectConfig", partial(CollectConfig, per_shard=30, default_share=0.7))
     monkeypatch.setattr(fit, "MINIMUM", 3)
     data, rich, mixed = (str(tmp_path / folder) for folder in ("data", "rich", "mixed"))

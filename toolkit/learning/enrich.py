@@ -21,6 +21,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from toolkit.contacts.category import Category, performs
+from toolkit.drafts import clear_drafts
 from toolkit.geometry.limb import FEET
 from toolkit.learning.dataset import (
     SCHEMA,
@@ -286,4 +287,5 @@ def enrich(
         progress(done, len(paths))
 
     run_jobs(executor, _job, [(path.resolve(), folder.resolve(), config) for path in missing], take)
+    clear_drafts(folder)  # of workers that were killed
     return added
