@@ -4,23 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-
-import numpy as np
-from rich.console import Console
+from typing import TYPE_CHECKING
 
 from toolkit import cli
-from toolkit.contacts.category import Category
-from toolkit.errors import DatasetError, InputError
-from toolkit.learning.collect import Collected, collect
-from toolkit.learning.collect_config import CollectConfig
-from toolkit.learning.dataset import read_dataset, read_datasets
-from toolkit.learning.enrich import EnrichConfig, enrich
-from toolkit.learning.evaluate import Score, balanced, query_seconds, score
-from toolkit.learning.jobs import executor
-from toolkit.prediction.networks import load_networks
-from toolkit.report.console import make_console, progress_bar
-from toolkit.report.scores import score_table
-from toolkit.robot.loader import load_robot
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from toolkit.learning.collect import Collected
 
 DESCRIPTION = """\
 Make the networks with which the contact search judges transitions.
@@ -34,6 +25,12 @@ Make the networks with which the contact search judges transitions.
 
 def run_collect(args: argparse.Namespace, console: Console) -> int:
     """Run `collect`."""
+    from toolkit.learning.collect import collect
+    from toolkit.learning.collect_config import CollectConfig
+    from toolkit.learning.jobs import executor
+    from toolkit.report.console import progress_bar
+    from toolkit.robot.loader import load_robot
+
     robot = load_robot(args.robot, args.robots)
     config = CollectConfig(
         robot=robot.name,
@@ -65,6 +62,12 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
 
 def run_enrich(args: argparse.Namespace, console: Console) -> int:
     """Run `enrich`."""
+    from toolkit.contacts.category import Category
+    from toolkit.learning.enrich import EnrichConfig, enrich
+    from toolkit.learning.jobs import executor
+    from toolkit.report.console import progress_bar
+    from toolkit.robot.loader import load_robot
+
     robot = load_robot(args.robot, args.robots)
     config = EnrichConfig(
         robot=robot.name,
@@ -90,6 +93,12 @@ def run_enrich(args: argparse.Namespace, console: Console) -> int:
 
 def run_fit(args: argparse.Namespace, console: Console) -> int:
     """Run `fit`."""
+    from toolkit.contacts.category import Category
+    from toolkit.errors import DatasetError, InputError
+    from toolkit.learning.dataset import read_datasets
+    from toolkit.report.console import progress_bar
+    from toolkit.robot.loader import load_robot
+
     try:
         import torch
 
@@ -147,13 +156,22 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
 
 def run_evaluate(args: argparse.Namespace, console: Console) -> int:
     """Run `evaluate`."""
+    import numpy as np
+
+    from toolkit.errors import DatasetError
+    from toolkit.learning.dataset import read_dataset
+    from toolkit.learning.evaluate import balanced, query_seconds, score
+    from toolkit.prediction.networks import load_networks
+    from toolkit.report.scores import score_table
+    from toolkit.robot.loader import load_robot
+
     robot = load_robot(args.robot, args.robots)
     networks = load_networks(robot, args.networks)
     data = read_dataset(args.data, robot.fingerprint)
     at_default = {category: samples.at_default() for category, samples in data.items()}
     for title, chosen in (("1 s + 1 s, friction 0.5", at_default), ("all timings and frictions", data)):
         rng = np.random.default_rng(args.seed)
-        scores: dict[Category, Score] = {}
+        scores = {}
         for category, network in networks.items():
             if category not in chosen or not len(chosen[category]):
                 raise DatasetError(f"{args.data}: too few transitions of category {int(category)}; collect more")
@@ -164,6 +182,16 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
     alone, batch = query_seconds(network, 1), query_seconds(network, 60) / 60
     console.print(f"a query: {alone * 1e6:.0f} us alone, {batch * 1e6:.1f} us a transition in batches of 60")
     return 0
+
+
+def _category(text: str) -> int:
+    """An argparse type: the number of a contact category."""
+    from toolkit.contacts.category import Category
+
+    numbers = [int(category) for category in Category]
+    if text not in map(str, numbers):
+        raise argparse.ArgumentTypeError(f"{text!r} is none of {numbers[0]} to {numbers[-1]}")
+    return int(text)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -184,10 +212,8 @@ def main(argv: list[str] | None = None) -> int:
         cli.add_cluster_options(sub)
 
     def add_categories(sub: argparse.ArgumentParser) -> None:
-        numbers = [int(category) for category in Category]
-        metavar = f"{numbers[0]}..{numbers[-1]}"
         sub.add_argument(
-            "--categories", type=int, nargs="+", choices=numbers, metavar=metavar, help="only these categories"
+            "--categories", type=_category, nargs="+", metavar="NUMBER", help="only these categories of transitions"
         )
 
     sub = add("collect", "label transitions with the centroidal optimiser; continues where it was stopped")
@@ -251,6 +277,8 @@ def main(argv: list[str] | None = None) -> int:
     sub.set_defaults(run=run_evaluate)
 
     args = parser.parse_args(argv)
+    from toolkit.report.console import make_console
+
     return args.run(args, make_console())
 
 

@@ -156,11 +156,12 @@ def test_shards_written_twice_at_once_are_whole(tmp_path, config):
 
 COMMAND = """
 import sys
-from functools import partial
+from functools import partialmethod
 from toolkit import cli, train
+from toolkit.learning.collect_config import CollectConfig
 
 if __name__ == "__main__":
-    train.CollectConfig = partial(train.CollectConfig, per_shard=2)
+    CollectConfig.__init__ = partialmethod(CollectConfig.__init__, per_shard=2)
     cli.run(train.main, ["collect", "--seed", "7", "--samples", "12", "--workers", "2", "--out", sys.argv[1]])
 """
 
