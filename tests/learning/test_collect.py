@@ -183,7 +183,7 @@ def test_a_collection_killed_at_any_moment_goes_on_to_the_same_files(tmp_path):
         assert process.communicate()[1] == "" and process.returncode == 0
     seconds = time.monotonic() - began
     rng = np.random.default_rng(0)
-    kills, round_, words = 0, 0, {-signal.SIGKILL: "", 128 + signal.SIGTERM: "terminated\n"}
+    kills = round_ = 0
     while kills < 20:
         folder, round_ = tmp_path / f"killed{round_}", round_ + 1
         while True:
@@ -197,8 +197,9 @@ def test_a_collection_killed_at_any_moment_goes_on_to_the_same_files(tmp_path):
             if process.returncode == 0:
                 break
             # A signal that comes before anything is imported ends the process as any other.
-            assert process.returncode in (*words, -signal.SIGTERM), error
-            assert error == words.get(process.returncode, ""), error
+            assert process.returncode in (-signal.SIGKILL, -signal.SIGTERM, 128 + signal.SIGTERM), error
+            if process.returncode != -signal.SIGKILL:  # Python itself tells of what it clears up behind a killed one
+                assert error == ("terminated\n" if process.returncode > 0 else ""), error
         assert contents(folder) == contents(whole), f"after {kills} kills"
     sys.stdout.write(f"\n{kills} kills in {round_} collections of {seconds:.0f} s\n")
 
