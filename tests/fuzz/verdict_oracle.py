@@ -25,7 +25,8 @@ class Replay:
         torque, velocity: Largest torque and joint velocity as a part of its limit.
         excess: Largest angle beyond a joint's range, rad.
         slip: Largest tangential displacement of a patch's corner while its limb is planned to stand, m.
-        touched: Names of bodies other than the limbs' ends that touched the world, and of feet that did in mid-swing.
+        touched: Names of bodies other than the limbs' ends that touched the world.
+        brushed: Feet whose patches touched it in the middle of a swing, which a verdict allows.
     """
 
     final_qpos: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -37,6 +38,7 @@ class Replay:
     excess: float = 0.0
     slip: float = 0.0
     touched: set[str] = field(default_factory=set)
+    brushed: set[Limb] = field(default_factory=set)
 
 
 def replayed(scene: mujoco.MjModel, robot: RobotModel, controls: Controls, schedule: ContactSchedule) -> Replay:
@@ -65,8 +67,10 @@ def replayed(scene: mujoco.MjModel, robot: RobotModel, controls: Controls, sched
                 continue
             body = int(bodies[0] if own[bodies[0]] else bodies[1])
             limb = ends.get(scene.body_weldid[body])
-            if limb is None or (limb.is_foot and limb in standing.lifted(time)):
+            if limb is None:
                 found.touched.add(scene.body(body).name)
+            elif limb.is_foot and limb in standing.lifted(time):
+                found.brushed.add(limb)
     mujoco.mj_kinematics(scene, data)
     found.final_qpos = data.qpos.copy()
     found.feet = np.mean([data.site(robot.limbs[foot].site).xpos[:2] for foot in FEET], axis=0)
