@@ -10,7 +10,6 @@ from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.planner_config import PlannerConfig
 
-
 _LAYER = 0.13  # m of way; random expansions are as likely at every distance from the goal
 
 
