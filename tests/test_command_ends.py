@@ -179,6 +179,18 @@ time.sleep(60)"""
         os.kill(child, 0)
 
 
+COMMANDS = sorted(path.stem for path in (ROOT / "toolkit").glob("*.py") if "cli.run(main)" in path.read_text())
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_imports_little_before_it_minds_signals(name):
+    """Until then a signal ends it with a traceback of the import that it met."""
+    program = f"import sys, toolkit.{name}\nprint(*sorted({{name.partition('.')[0] for name in sys.modules}}))"
+    loaded = shell(f'$PY -c "{program}"').stdout.decode().split()
+    assert "toolkit" in loaded
+    assert not {"numpy", "scipy", "mujoco", "rich", "numba", "concurrent", "asyncio"} & set(loaded)
+
+
 def test_an_ignored_signal_stays_ignored():
     body = "import os, signal\nos.kill(os.getpid(), signal.SIGHUP)\nsys.stdout.write(str(1))"
     done = shell(f"trap '' HUP; $PY -c '{PROBE.format(chr(10).join('    ' + line for line in body.splitlines()))}'")

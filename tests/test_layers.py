@@ -10,6 +10,7 @@ LAYERS = [
     "errors",
     "shipped",
     "interruption",
+    "drafts",
     "compiled",
     "mjcf",
     "geometry",

@@ -1,5 +1,6 @@
 """What users import from the package itself."""
 
+import os
 import subprocess
 import sys
 import tomllib
@@ -37,3 +38,24 @@ def test_the_package_says_that_it_is_typed():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
     assert settings["tool"]["setuptools"]["package-data"]["toolkit"] == ["py.typed"]
     assert (ROOT / "toolkit" / "py.typed").is_file()
+
+
+PROGRAM = """
+import hashlib
+from toolkit import PipelineConfig, load_robot, load_world, make_planner, run
+robot, world = load_robot(None), load_world("worlds/flat.xml")
+planner = make_planner(robot, world, "kinematic")
+result = run(robot, world, planner, PipelineConfig(seed=1, time_limit=600.0))
+print(result.passed, hashlib.sha256(result.trial.execution.samples.qpos.tobytes()).hexdigest())
+"""
+
+
+@pytest.mark.slow
+def test_a_program_with_one_thread_for_matrix_products_gets_the_same_run_on_any_number_of_cores():
+    found = set()
+    for threads in ("1", "2", "7"):
+        environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OMP_NUM_THREADS": threads}
+        words = [sys.executable, "-c", PROGRAM]
+        done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
+        found.add(done.stdout)
+    assert len(found) == 1 and found.pop().startswith("True ")

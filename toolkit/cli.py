@@ -76,6 +76,21 @@ def add_robot_options(target: argparse.ArgumentParser) -> None:
     target.add_argument("--robots", type=Path, metavar="DIR", help="folder with the robots (default: robots/)")
 
 
+def add_cluster_options(target: argparse.ArgumentParser) -> None:
+    """Add `--cluster` and `--cluster-unencrypted`."""
+    target.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="scheduler of a dask cluster to run on instead, tls://HOST:PORT with the certificates of dask's own "
+        "settings; tcp://HOST:PORT only on this machine",
+    )
+    target.add_argument(
+        "--cluster-unencrypted",
+        action="store_true",
+        help="use a scheduler on another machine without TLS: anyone in its network can run programs there and here",
+    )
+
+
 def add_planning_options(target: argparse.ArgumentParser) -> None:
     """Add what every command that plans understands."""
     target.add_argument("--seed", type=seed, default=0, help="seed of every random draw (default: %(default)s)")

@@ -52,9 +52,9 @@ def main(argv: list[str] | None = None) -> int:
     for out in args.out:
         if out.suffix.lower() not in ENDINGS:
             raise InputError(f"{out}: the name must end in one of {', '.join(ENDINGS)}")
+    from toolkit.drafts import write_whole
     from toolkit.report.comparison import as_csv, as_markdown, compare, comparison_table
     from toolkit.report.console import make_console, progress_bar
-    from toolkit.report.drafts import write_whole
     from toolkit.report.saved_run import read_run
 
     console = make_console()

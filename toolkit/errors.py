@@ -41,3 +41,9 @@ class ExecutionError(ToolkitError):
     """The simulated execution could not be carried out."""
 
     exit_code = 1
+
+
+class WorkerError(ToolkitError):
+    """A process that did a part of the work ended before its time."""
+
+    exit_code = 1

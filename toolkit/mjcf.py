@@ -19,8 +19,14 @@ LARGEST = 1e4
 SIZES = ("memory", "nemax", "njmax", "nconmax", "nstack")
 """Sizes of MuJoCo's buffers; for -1 MuJoCo chooses them."""
 
+_TAG = re.compile(r"""<!--.*?-->|<(/?)([\w.-]+)((?:"[^"]*"|'[^']*'|[^"'>])*)>""", re.DOTALL)
+_ATTRIBUTE = re.compile(r"""([\w.-]+)\s*=\s*["']([^"']*)["']""")
 _NAN = re.compile(r"""=\s*["'][^"']*(?<![^\s"'])[+-]?nan(?![^\s"'])""", re.IGNORECASE)
 _MOST_CELLS = 4_000_000  # most points of a height field, or pixels of a texture
+_MOST_COPIES = 10_000  # most elements that copies or patterns make; MuJoCo takes seconds for so many
+_PATTERNS = {"flexcomp": "count", "composite": "count", "contact": "num"}  # elements that stand for many, and how many
+_FINEST = 300  # largest number that shapes a mesh which MuJoCo makes; most are resolutions
+_MOST_USER_VALUES = 1000  # most numbers of a user for each element, and most keys
 
 
 def one_line(message: object) -> str:
@@ -42,6 +48,7 @@ def read_spec(path: Path, text: str | None = None) -> mujoco.MjSpec:
         str(path).encode()
     except UnicodeEncodeError:
         raise InputError("the name of the file or of its folder is not UTF-8; rename it") from None
+    _check_copies(path.read_text(encoding="utf-8", errors="replace") if text is None else text, path.parent)
     with _caught() as found:
         spec = mujoco.MjSpec.from_file(str(path)) if text is None else mujoco.MjSpec.from_string(text)
     if any("NaN" in warning for warning in found):
@@ -57,6 +64,9 @@ def read_spec(path: Path, text: str | None = None) -> mujoco.MjSpec:
             first, second = (getattr(item, side) for side in sides)
             if first * second > _MOST_CELLS:
                 raise InputError(f"{kind} '{item.name}' has {first} x {second} cells; at most {_MOST_CELLS} are read")
+    for name in [name for name in dir(spec) if name.startswith(("nuser", "nkey"))]:
+        if getattr(spec, name) > _MOST_USER_VALUES:
+            raise InputError(f"{name} of <size> is {getattr(spec, name)}; at most {_MOST_USER_VALUES} are read")
     _take_assets(spec, path.parent)
     return spec
 
@@ -71,7 +81,7 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
     with _caught() as found:
         model = spec.compile()
     if found:
-        raise InputError(f"MuJoCo warns: {one_line(found[0])}")
+        raise InputError(f"MuJoCo warns: {found[0]}")
     names = sorted((name for name in dir(model) if "_" in name.strip("_")), key=lambda name: not _named(model, name))
     arrays = {name: getattr(model, name) for name in names}
     arrays = {name: a for name, a in arrays.items() if isinstance(a, np.ndarray) and a.dtype.kind == "f" and a.size}
@@ -85,6 +95,52 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         if not name.startswith("numeric_"):
             _check(model, name, np.isfinite(values), "is not finite")
     return model
+
+
+def _check_copies(text: str, folder: Path) -> None:
+    """Raise an InputError if a text and what it includes ask for more elements than can be made.
+
+    MuJoCo makes them while it reads the text. Attributes that are no numbers are left to MuJoCo.
+    """
+    made, seen = 0.0, set()
+    waiting: list[tuple[str, Path, float]] = [(text, folder, 1.0)]
+    while waiting:
+        content, place, factor = waiting.pop()
+        factors = [factor]
+        for end, tag, rest in _TAG.findall(content):
+            attributes = dict(_ATTRIBUTE.findall(rest))
+            if tag == "replicate" and end:
+                factors = factors[:-1] or factors
+            elif tag == "replicate" and not rest.endswith("/"):
+                factors.append(factors[-1] * _product(attributes.get("count", "")))
+                made += factors[-1] - 1
+            elif tag == "include":
+                for file in {(base / attributes.get("file", "")).resolve() for base in (folder, place)} - seen:
+                    seen.add(_regular(file))
+                    if file.is_file():
+                        waiting.append((file.read_text(encoding="utf-8", errors="replace"), file.parent, factors[-1]))
+            elif not end:
+                made += factors[-1] * _product(attributes.get(_PATTERNS.get(tag, ""), "")) - 1
+                finest = max((_product(word) for word in attributes.get("params", "").split()), default=0.0)
+                if not finest <= _FINEST:
+                    raise InputError(f"params of <{tag}> has {finest:g}; give numbers of at most {_FINEST}")
+            if not made <= _MOST_COPIES:
+                raise InputError(f"<{tag}> asks for {made:g} copies or more; at most {_MOST_COPIES} are made")
+
+
+def _product(text: str) -> float:
+    """Product of the numbers above one in a text; one if it holds something else."""
+    try:
+        return float(np.prod([max(float(word), 1.0) for word in text.split()]))
+    except ValueError:
+        return 1.0
+
+
+def _regular(file: Path) -> Path:
+    """The path of a file, if it is not something that may be read without end."""
+    if file.exists() and not file.is_file() and not file.is_dir():
+        raise InputError(f"{file} is no plain file; name a plain file")
+    return file
 
 
 def _check(model: mujoco.MjModel, name: str, good: np.ndarray, what: str) -> None:
@@ -122,20 +178,27 @@ def copy_fields(source: Any, target: Any) -> None:
 
 
 @contextmanager
-def _caught() -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings instead of printing and logging them, and turn its errors into ValueErrors."""
+def mujoco_warnings() -> Iterator[list[str]]:
+    """Collect MuJoCo's warnings, one line each, instead of printing them and writing them to MUJOCO_LOG.TXT."""
     found: list[str] = []
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(found.append)
+    mujoco.set_mju_user_warning(lambda message: found.append(one_line(message)))
     try:
-        with warnings.catch_warnings(record=True) as others:
-            warnings.simplefilter("always")
-            yield found
-            found += [str(other.message) for other in others]
-    except (mujoco.FatalError, MemoryError) as error:
-        raise ValueError(one_line(error)) from error
+        yield found
     finally:
         mujoco.set_mju_user_warning(before)
+
+
+@contextmanager
+def _caught() -> Iterator[list[str]]:
+    """Collect all warnings, MuJoCo's and Python's, and turn MuJoCo's errors into ValueErrors."""
+    try:
+        with mujoco_warnings() as found, warnings.catch_warnings(record=True) as others:
+            warnings.simplefilter("always")
+            yield found
+            found += [one_line(other.message) for other in others]
+    except (mujoco.FatalError, MemoryError, RuntimeError) as error:  # the last where its C++ code finds no memory
+        raise ValueError(one_line(error)) from error
 
 
 def _take_assets(spec: mujoco.MjSpec, folder: Path) -> None:
@@ -145,7 +208,7 @@ def _take_assets(spec: mujoco.MjSpec, folder: Path) -> None:
 
     def taken(name: str, directory: str) -> str:
         file = (folder / directory / (Path(name).name if spec.strippath else name)).resolve()
-        if not name or not file.is_file():
+        if not name or not _regular(file).is_file():
             return name
         if file not in names:
             names[file] = file.name if file.name not in assets else f"{len(names)}_{file.name}"

@@ -114,7 +114,7 @@ def _describe(console: Console, robot: RobotModel) -> None:
 def _picture(robot: RobotModel, path: Path) -> None:
     import imageio.v3 as imageio
 
-    from toolkit.report.drafts import write_whole
+    from toolkit.drafts import write_whole
     from toolkit.robot.picture import render_home
 
     picture = imageio.imwrite("<bytes>", render_home(robot), extension=path.suffix.lower())

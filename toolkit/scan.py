@@ -115,8 +115,8 @@ def main(argv: list[str] | None = None) -> int:
     # Heavy imports come after the options, so that --help and mistakes in them answer at once.
     from rich.progress import Progress
 
+    from toolkit.drafts import write_whole
     from toolkit.report.console import make_console
-    from toolkit.report.drafts import write_whole
     from toolkit.scanning.building import read_scene
     from toolkit.scanning.files import ReadOptions, read_scan
     from toolkit.scanning.world import ScanConfig, make_world

@@ -70,8 +70,8 @@ def main(argv: list[str] | None = None) -> int:
     options = vars(arguments().parse_args(argv))
     import numpy as np
 
+    from toolkit.drafts import write_whole
     from toolkit.errors import InputError
-    from toolkit.report.drafts import write_whole
     from toolkit.world.generators import KINDS
     from toolkit.world.loader import load_world
 

@@ -4,24 +4,15 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-
-import numpy as np
-from rich.console import Console
+from typing import TYPE_CHECKING
 
 from toolkit import cli
-from toolkit.contacts.category import Category
-from toolkit.errors import DatasetError, InputError
-from toolkit.learning.collect import Collected, collect
-from toolkit.learning.collect_config import CollectConfig
-from toolkit.learning.dataset import read_dataset, read_datasets
-from toolkit.learning.evaluate import Score, balanced, query_seconds, score
-from toolkit.learning.jobs import executor
-from toolkit.learning.samples import Split
-from toolkit.prediction.networks import digest, load_networks
-from toolkit.report.console import make_console, progress_bar
-from toolkit.report.scores import score_table
-from toolkit.robot.loader import load_robot
-from toolkit.robot.model import RobotModel
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from toolkit.learning.collect import Collected
+    from toolkit.robot.model import RobotModel
 
 DESCRIPTION = """\
 Make the networks with which the contact search judges transitions.
@@ -35,6 +26,13 @@ Make the networks with which the contact search judges transitions.
 
 def run_collect(args: argparse.Namespace, console: Console) -> int:
     """Run `collect`."""
+    from toolkit.learning.collect import collect
+    from toolkit.learning.collect_config import CollectConfig
+    from toolkit.learning.jobs import executor
+    from toolkit.prediction.networks import digest
+    from toolkit.report.console import progress_bar
+    from toolkit.robot.loader import load_robot
+
     robot = load_robot(args.robot, args.robots)
     networks = _searching_networks(args, robot)
     config = CollectConfig(
@@ -45,7 +43,10 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
         networks=None if networks is None else str(networks.resolve()),
         networks_digest="" if networks is None else digest(networks),
     )
-    with executor(args.workers, args.cluster) as pool, progress_bar(console) as progress:
+    with (
+        executor(args.workers, args.cluster, unencrypted=args.cluster_unencrypted) as pool,
+        progress_bar(console) as progress,
+    ):
         task = progress.add_task("shards", total=config.shards)
 
         def tick(state: Collected) -> None:
@@ -67,6 +68,8 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
 
 def _searching_networks(args: argparse.Namespace, robot: RobotModel) -> Path | None:
     """Folder of the networks that take part in the search, made sure of; None for none."""
+    from toolkit.prediction.networks import load_networks
+
     folder = args.networks or robot.folder / "networks"
     if args.no_networks or (args.networks is None and not folder.is_dir()):
         return None
@@ -76,6 +79,12 @@ def _searching_networks(args: argparse.Namespace, robot: RobotModel) -> Path | N
 
 def run_fit(args: argparse.Namespace, console: Console) -> int:
     """Run `fit`."""
+    from toolkit.contacts.category import Category
+    from toolkit.errors import DatasetError, InputError
+    from toolkit.learning.dataset import read_datasets
+    from toolkit.report.console import progress_bar
+    from toolkit.robot.loader import load_robot
+
     try:
         import torch
 
@@ -132,6 +141,16 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
 
 def run_evaluate(args: argparse.Namespace, console: Console) -> int:
     """Run `evaluate`."""
+    import numpy as np
+
+    from toolkit.errors import DatasetError
+    from toolkit.learning.dataset import read_dataset
+    from toolkit.learning.evaluate import balanced, query_seconds, score
+    from toolkit.learning.samples import Split
+    from toolkit.prediction.networks import load_networks
+    from toolkit.report.scores import score_table
+    from toolkit.robot.loader import load_robot
+
     robot = load_robot(args.robot, args.robots)
     networks = load_networks(robot, args.networks)
     data = read_dataset(args.data, robot.fingerprint)
@@ -140,7 +159,7 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
     at_default = {category: samples.at_default() for category, samples in data.items()}
     for title, chosen in (("1 s + 1 s, friction 0.5", at_default), ("all timings and frictions", data)):
         rng = np.random.default_rng(args.seed)
-        scores: dict[Category, Score] = {}
+        scores = {}
         for category, network in networks.items():
             if category not in data or not data[category].known.any():
                 raise DatasetError(f"{args.data}: too few transitions of category {int(category)}; collect more")
@@ -154,6 +173,26 @@ def run_evaluate(args: argparse.Namespace, console: Console) -> int:
     return 0
 
 
+def _category(text: str) -> int:
+    """An argparse type: the number of a contact category."""
+    from toolkit.contacts.category import Category
+
+    numbers = [int(category) for category in Category]
+    if text not in map(str, numbers):
+        raise argparse.ArgumentTypeError(f"{text!r} is none of {numbers[0]} to {numbers[-1]}")
+    return int(text)
+
+
+def _split(text: str) -> str:
+    """An argparse type: which part of the worlds of a data set."""
+    from toolkit.learning.samples import Split
+
+    names = ["all", *(split.name.lower() for split in Split)]
+    if text not in names:
+        raise argparse.ArgumentTypeError(f"{text!r} is none of {', '.join(names)}")
+    return text
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run one of the subcommands; returns the exit code."""
     parser = cli.parser("train", DESCRIPTION)
@@ -164,9 +203,6 @@ def main(argv: list[str] | None = None) -> int:
         cli.add_robot_options(sub)
         sub.add_argument("--seed", type=cli.seed, default=0, help="seed of every random draw (default: %(default)s)")
         return sub
-
-    numbers = [int(category) for category in Category]
-    metavar = f"{numbers[0]}..{numbers[-1]}"
 
     sub = add("collect", "draw and label whole sequences; continues where it was stopped")
     sub.add_argument("--out", type=Path, required=True, help="data set folder, new or begun")
@@ -180,7 +216,7 @@ def main(argv: list[str] | None = None) -> int:
     sub.add_argument(
         "--workers", type=cli.positive(int), default=cli.cores(), help="number of processes (default: all cores)"
     )
-    sub.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    cli.add_cluster_options(sub)
     sub.set_defaults(run=run_collect)
 
     sub = add("fit", "train a classifier and a regressor per category")
@@ -198,9 +234,7 @@ def main(argv: list[str] | None = None) -> int:
     )
     sub.add_argument("--refine", action="store_true", help="train the regressors in --out further, keep classifiers")
     sub.add_argument("--keep-classifiers", action="store_true", help="keep the classifiers in --out, train regressors")
-    sub.add_argument(
-        "--categories", type=int, nargs="+", choices=numbers, metavar=metavar, help="only these categories"
-    )
+    sub.add_argument("--categories", type=_category, nargs="+", metavar="NUMBER", help="only these categories")
     sub.add_argument(
         "--workers", type=cli.positive(int), default=cli.cores(), help="number of threads (default: all cores)"
     )
@@ -209,12 +243,13 @@ def main(argv: list[str] | None = None) -> int:
 
     sub = add("evaluate", "score the networks on transitions that they have not seen")
     sub.add_argument("--data", type=Path, required=True, help="data set folder")
-    splits = ["all", *(split.name.lower() for split in Split)]
     sub.add_argument(
         "--split",
-        choices=splits,
+        type=_split,
         default="test",
-        help="which worlds of the data set; all of them only where the networks did not learn from it (default: test)",
+        metavar="PART",
+        help="which worlds of the data set: training, validation, test, or all, which is fair only where the networks "
+        "did not learn from it (default: %(default)s)",
     )
     sub.add_argument("--networks", type=Path, help="folder of networks (default: the robot's networks/)")
     sub.add_argument(
@@ -223,6 +258,8 @@ def main(argv: list[str] | None = None) -> int:
     sub.set_defaults(run=run_evaluate)
 
     args = parser.parse_args(argv)
+    from toolkit.report.console import make_console
+
     return args.run(args, make_console())
 
 

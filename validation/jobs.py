@@ -43,10 +43,12 @@ class PoolOptions:
     Attributes:
         workers: processes, one thread each; 0 for this process.
         cluster: scheduler of a dask cluster; None for this machine.
+        unencrypted: whether a scheduler on another machine may be used without TLS.
     """
 
     workers: int = 1
     cluster: str | None = None
+    unencrypted: bool = False
 
 
 def run_job(job: Job) -> Record:
@@ -130,7 +132,7 @@ def _run_in_pool(
     if not jobs:
         return []
     left = list(jobs)[::-1]
-    with executor(workers, options.cluster) as pool:
+    with executor(workers, options.cluster, unencrypted=options.unencrypted) as pool:
         running: dict[Future, Job] = {}
         lost: list[Job] = []
         while left or running:

@@ -45,7 +45,7 @@ def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> 
     made.add_argument(
         "--workers", type=count, default=cli.cores(), help="processes, one thread each; 0: this one (default: cores)"
     )
-    made.add_argument("--cluster", metavar="ADDRESS", help="scheduler of a dask cluster to run on instead")
+    cli.add_cluster_options(made)
     made.add_argument(
         "--out",
         type=Path,
@@ -147,4 +147,4 @@ def goal_code(found: Sequence[Goal]) -> int:
 
 def pool_of(args: argparse.Namespace) -> PoolOptions:
     """Where trials run."""
-    return PoolOptions(args.workers, args.cluster)
+    return PoolOptions(args.workers, args.cluster, args.cluster_unencrypted)

@@ -53,6 +53,17 @@ def test_a_fall_is_replayed_as_a_fall(walking):
     assert difference(fell, again) == ""
 
 
+def test_a_simulation_that_diverged_is_replayed_as_that(standing):
+    trajectory = standing.whole.trajectory
+    wild = trajectory.qvel.copy()
+    wild[0, -1] = 1e11
+    plan = dataclasses.replace(standing.whole, trajectory=dataclasses.replace(trajectory, qvel=wild))
+    fell = execute(plan, config=ExecutionConfig(timestep=0.001, control_decimation=2))
+    again = replay_run(fell)
+    assert fell.fall is not None and fell.fall.reason.startswith("the simulation diverged: ")
+    assert again.fall == fell.fall and again.failure == fell.failure and difference(fell, again) == ""
+
+
 def test_other_controls_differ_from_their_first_tick_on(walked):
     ctrl = walked.controls.ctrl.copy()
     ctrl[100] += 1e-9

@@ -87,6 +87,22 @@ def test_a_robot_without_its_motors_falls(walking):
     assert failure.transition == walking.schedule.phase_at(failure.time).transition
 
 
+@pytest.mark.parametrize("start", ["qpos", "qvel"])
+def test_a_simulation_that_diverges_is_a_fall_and_leaves_no_log(standing, start, tmp_path, monkeypatch, capfd):
+    """MuJoCo puts such a state back to where it began, warns, and would write MUJOCO_LOG.TXT."""
+    monkeypatch.chdir(tmp_path)
+    trajectory = standing.whole.trajectory
+    wild = getattr(trajectory, start).copy()
+    wild[0, -1] = 1e11
+    execution = execute(
+        dataclasses.replace(standing.whole, trajectory=dataclasses.replace(trajectory, **{start: wild}))
+    )
+    assert execution.fall is not None and execution.fall.reason.startswith("the simulation diverged: ")
+    assert {"upright", "completed"} <= failed(execution)
+    replay_controls(execution.scene, execution.controls)
+    assert not list(tmp_path.iterdir()) and capfd.readouterr() == ("", "")
+
+
 def test_a_push_that_is_too_strong_is_a_fall_and_is_not_replayable(walking):
     config = ExecutionConfig(disturbance=Disturbance(push=3000.0, push_time=0.3, push_duration=0.3))
     execution = walking.run(config=config)

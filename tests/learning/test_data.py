@@ -108,7 +108,11 @@ def test_a_data_set_comes_back_in_order(tmp_path):
     for part in PARTS:
         expected = np.concatenate([getattr(group, part) for group in groups])
         np.testing.assert_array_equal(getattr(samples, part), expected)
-    assert not list(tmp_path.glob("*.part"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "manifest.json",
+        "shard-000000.npz",
+        "shard-000001.npz",
+    ]
 
 
 def test_a_broken_data_set_is_refused(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from tests.robot.samples import TOML, arm_toml, biped_mjcf, write_robot
 from toolkit import plan, train
 from toolkit.contacts.category import categories_of
-from toolkit.learning import fit
+from toolkit.learning import collect_config, fit, jobs
 from toolkit.learning.collect_config import CollectConfig
 from toolkit.learning.dataset import read_dataset
 from toolkit.prediction.networks import load_networks
@@ -50,8 +50,10 @@ def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
     assert planned("kinematic") == 0
 
     # Few samples, made in this process; the commands themselves are as they are.
-    monkeypatch.setattr(train, "executor", lambda workers, cluster: ThreadPoolExecutor(1))
-    monkeypatch.setattr(train, "CollectConfig", partial(CollectConfig, per_shard=8, paper_share=0.8, most_worlds=30))
+    monkeypatch.setattr(jobs, "executor", lambda workers, cluster, unencrypted: ThreadPoolExecutor(1))
+    monkeypatch.setattr(
+        collect_config, "CollectConfig", partial(CollectConfig, per_shard=8, paper_share=0.8, most_worlds=30)
+    )
     monkeypatch.setattr(fit, "MINIMUM", 3)
     data = str(tmp_path / "data")
     assert trained("collect", "--out", data, "--samples", "8") == 0

@@ -16,10 +16,10 @@ import pytest
 
 from toolkit.centroidal.problem import Margins
 from toolkit.contacts.failure import Failure
+from toolkit.drafts import clear_drafts, draft_in, write_whole
 from toolkit.errors import InputError
 from toolkit.execution.check import Result
 from toolkit.report.arrays import write_execution, write_motion
-from toolkit.report.drafts import clear_drafts, draft_in, write_whole
 from toolkit.report.files import REPORT, RunFolder, read_json, write_json, write_scene
 from toolkit.report.plan_file import read_plan, write_plan
 from toolkit.report.run_report import STAGES, RunReport, write_report

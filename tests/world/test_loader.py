@@ -69,6 +69,20 @@ def test_file_with_includes_and_meshes_beside_it(tmp_path, monkeypatch):
     assert sum(surface.serves_foot for surface in world.surfaces) == 1
 
 
+def test_replicas_in_an_included_file_are_counted(tmp_path):
+    """An include inside a replica counts as often as the replica; a few copies are as good as written geoms."""
+    path = tmp_path / "world.xml"
+    path.write_text(mjcf_of(FLOOR + '<replicate count="30"><include file="part.xml"/></replicate>'))
+    for count, fits in ((2, True), (1000, False)):
+        text = f'<mujocoinclude><replicate count="{count}"><site/></replicate><!-- <replicate> --></mujocoinclude>'
+        (tmp_path / "part.xml").write_text(text)
+        if fits:
+            assert load_world(path).mujoco_model.nsite == 2 + 30 * count
+        else:
+            with pytest.raises(WorldError, match=r"world.xml: <replicate> asks for 3\d+ copies or more"):
+                load_world(path)
+
+
 def test_start_between_two_stones_is_on_the_ground(make_world):
     stones = '<geom type="box" size="0.3 0.15 0.1" pos="0 {} -0.1"/>'
     make_world(stones.format(0.17) + stones.format(-0.17))
@@ -149,6 +163,32 @@ CASES = {
     "missing_mesh": (
         mjcf_of(FLOOR + '<geom type="mesh" mesh="m"/>', '<mesh name="m" file="nowhere.stl"/>'),
         "cannot read this world: .*nowhere.stl",
+    ),
+    "mesh_that_is_a_device": (
+        mjcf_of(FLOOR + '<geom type="mesh" mesh="m"/>', '<mesh name="m" file="/dev/zero"/>'),
+        "/dev/zero is no plain file; name a plain file",
+    ),
+    "include_that_is_a_device": (mjcf_of(FLOOR + '<include file="/dev/zero"/>'), "/dev/zero is no plain file"),
+    "replicas": (
+        mjcf_of(FLOOR + '<replicate count="1000000000"><geom size="1"/></replicate>'),
+        "<replicate> asks for 1e\\+09 copies or more; at most 10000 are made",
+    ),
+    "replicas_of_nothing": (mjcf_of(FLOOR + '<replicate count="99999"></replicate>'), "asks for 99998 copies"),
+    "replicas_of_replicas": (
+        mjcf_of(FLOOR + 3 * '<replicate count="60">' + '<geom size="1"/>' + 3 * "</replicate>"),
+        "<replicate> asks for 219[0-9]+ copies or more",
+    ),
+    "replicas_of_no_number": (mjcf_of(FLOOR + '<replicate count="nan"><site/></replicate>'), "asks for nan copies"),
+    "grid_of_a_flex": (mjcf_of(FLOOR + '<flexcomp name="f" count="2000 2000 2000"/>'), "<flexcomp> asks for 8e\\+09"),
+    "fine_mesh": (
+        mjcf_of(FLOOR, '<mesh name="m" builtin="plate" params="100000 10"/>'),
+        "params of <mesh> has 100000; give numbers of at most 300",
+    ),
+    "many_user_values": (mjcf_of(FLOOR, more='<size nuser_geom="1000000000"/>'), "nuser_geom of <size> is 1000000000"),
+    "many_keys": (mjcf_of(FLOOR, more='<size nkey="1000000000"/>'), "nkey of <size> is 1000000000; at most 1000"),
+    "contacts_of_a_sensor": (
+        mjcf_of(FLOOR, more='<sensor><contact num="2000000000" site="start"/></sensor>'),
+        "<contact> asks for 2e\\+09 copies or more",
     ),
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -66,6 +68,14 @@ class Recorder:
                 self.cop_margin[k, limb] = min(half[0] - abs(x), half[1] - abs(y))
         self._judge(data)
 
+    def note_warnings(self, warnings: Sequence[str]) -> None:
+        """Note at the end of a tick that the simulation diverged, if MuJoCo warned during the run.
+
+        MuJoCo may have put such a state back to where it began.
+        """
+        if warnings:
+            self.fall = f"the simulation diverged: {warnings[0]}"
+
     def _judge(self, data: mujoco.MjData) -> None:
         """Note whether the robot has fallen."""
         index, k = self.index, self.count - 1
@@ -78,8 +88,6 @@ class Recorder:
             self.fall = f"the base tilted by {np.degrees(np.arccos(np.clip(upright, -1.0, 1.0))):.0f} degrees"
         elif height < least:
             self.fall = f"the CoM sank to {height:.2f} m above the lower foot, below {least:.2f} m"
-        elif not np.isfinite(self.qpos[k]).all():
-            self.fall = "the simulation diverged"
 
     @property
     def limb_pose(self) -> np.ndarray:

@@ -14,16 +14,21 @@ from toolkit.execution.measure import Planned, measure
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution
 from toolkit.execution.scene_index import SceneIndex
+from toolkit.mjcf import mujoco_warnings
 from toolkit.replanning.replanner import ReplanCounts
 
 
 def replay_controls(scene: mujoco.MjModel, controls: Controls) -> np.ndarray:
-    """Final qpos (nq,) after one mj_step per row of controls from the initial state; what pushed is left out."""
+    """Final qpos (nq,) after one mj_step per row of controls from the initial state.
+
+    What pushed is left out, and MuJoCo's warnings are dropped.
+    """
     data = mujoco.MjData(scene)
     data.qpos[:], data.qvel[:] = controls.qpos0, controls.qvel0
-    for row in controls.ctrl:
-        data.ctrl[:] = row
-        mujoco.mj_step(scene, data)
+    with mujoco_warnings():
+        for row in controls.ctrl:
+            data.ctrl[:] = row
+            mujoco.mj_step(scene, data)
     return data.qpos.copy()
 
 
@@ -53,23 +58,25 @@ def replay_run(execution: Execution, *, observer: Callable[[float], None] = lamb
     qpos, qvel = controls.qpos0.copy(), controls.qvel0.copy()
     report_every = max(round(0.1 / standard.period), 1)
     began, step = perf_counter(), 0
-    for tick in range(ticks):
-        recorder.com_aim[tick] = samples.com_aim[tick]
-        recorder.may_touch[tick] = recorder.meter.expected[:] = samples.may_touch[tick]
-        for part in range(standard.decimation):
-            data.ctrl[:] = controls.ctrl[step]
-            if controls.push is not None:
-                data.xfrc_applied[index.base, :3] = controls.push[step]
-            step += 1
-            mujoco.mj_step(scene, data)
-            recorder.meter.read(data)
-            if part == 0:
-                recorder.record(data, qpos, qvel)
-            qpos[:], qvel[:] = data.qpos, data.qvel
-        if recorder.fall:
-            break
-        if tick % report_every == 0:
-            observer(tick / ticks)
+    with mujoco_warnings() as warnings:
+        for tick in range(ticks):
+            recorder.com_aim[tick] = samples.com_aim[tick]
+            recorder.may_touch[tick] = recorder.meter.expected[:] = samples.may_touch[tick]
+            for part in range(standard.decimation):
+                data.ctrl[:] = controls.ctrl[step]
+                if controls.push is not None:
+                    data.xfrc_applied[index.base, :3] = controls.push[step]
+                step += 1
+                mujoco.mj_step(scene, data)
+                recorder.meter.read(data)
+                if part == 0:
+                    recorder.record(data, qpos, qvel)
+                qpos[:], qvel[:] = data.qpos, data.qvel
+            recorder.note_warnings(warnings)
+            if recorder.fall:
+                break
+            if tick % report_every == 0:
+                observer(tick / ticks)
     push = None if controls.push is None else controls.push[:step]
     return measure(
         recorder,

@@ -19,6 +19,7 @@ from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution
 from toolkit.execution.scene_index import SceneIndex
 from toolkit.execution.standard import Standard
+from toolkit.mjcf import mujoco_warnings
 from toolkit.replanning.replanner import MAX_FRICTION, ReplanCounts, Replanner
 from toolkit.wholebody.plan import WholeBodyPlan
 
@@ -80,29 +81,31 @@ def execute(
     report_every = max(round(0.1 / period), 1)
     qpos, qvel = qpos0.copy(), qvel0.copy()
     started = perf_counter()
-    for tick in range(ticks):
-        tick_started = perf_counter()
-        torque = controller.tick(tick, *told(qpos, qvel), recorder.meter.normal_force)
-        recorder.tick_seconds[tick] = perf_counter() - tick_started
-        recorder.com_aim[tick] = controller.aim.com
-        recorder.may_touch[tick] = recorder.meter.expected[:] = reference.authority[tick] > 0.0
-        data.ctrl[:] = torque
-        if pushes is not None:
-            pushed = push_time <= reference.times[tick] < push_time + config.disturbance.push_duration
-            pushes[step : step + config.control_decimation] = push if pushed else 0.0
-            data.xfrc_applied[index.base, :3] = pushes[step]
-        for part in range(config.control_decimation):
-            ctrl[step] = torque
-            step += 1
-            mujoco.mj_step(scene, data)
-            recorder.meter.read(data)
-            if part == 0:
-                recorder.record(data, qpos, qvel)
-            qpos[:], qvel[:] = data.qpos, data.qvel
-        if recorder.fall:
-            break
-        if observer is not None and tick % report_every == 0:
-            observer(tick / ticks, f"{reference.times[tick]:.1f} s")
+    with mujoco_warnings() as warnings:
+        for tick in range(ticks):
+            tick_started = perf_counter()
+            torque = controller.tick(tick, *told(qpos, qvel), recorder.meter.normal_force)
+            recorder.tick_seconds[tick] = perf_counter() - tick_started
+            recorder.com_aim[tick] = controller.aim.com
+            recorder.may_touch[tick] = recorder.meter.expected[:] = reference.authority[tick] > 0.0
+            if pushes is not None:
+                pushed = push_time <= reference.times[tick] < push_time + config.disturbance.push_duration
+                pushes[step : step + config.control_decimation] = push if pushed else 0.0
+            for part in range(config.control_decimation):
+                ctrl[step] = data.ctrl[:] = torque  # in every step, since MuJoCo clears it where a state diverges
+                if pushes is not None:
+                    data.xfrc_applied[index.base, :3] = pushes[step]
+                step += 1
+                mujoco.mj_step(scene, data)
+                recorder.meter.read(data)
+                if part == 0:
+                    recorder.record(data, qpos, qvel)
+                qpos[:], qvel[:] = data.qpos, data.qvel
+            recorder.note_warnings(warnings)
+            if recorder.fall:
+                break
+            if observer is not None and tick % report_every == 0:
+                observer(tick / ticks, f"{reference.times[tick]:.1f} s")
     return measure(
         recorder,
         Controls(config.timestep, qpos0, qvel0, ctrl[:step], qpos, None if pushes is None else pushes[:step]),

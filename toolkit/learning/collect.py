@@ -11,6 +11,7 @@ from importlib import metadata
 from pathlib import Path
 
 from toolkit.contacts.category import Category, categories_of
+from toolkit.drafts import clear_drafts
 from toolkit.learning.collect_config import CollectConfig
 from toolkit.learning.dataset import SCHEMA, Manifest, begin, plain_settings, read_shard, shard_path, write_shard
 from toolkit.learning.jobs import run_jobs
@@ -107,6 +108,7 @@ def collect(
     progress(state())
     jobs = [(config, index, str(folder.resolve())) for index in missing]
     run_jobs(executor, _job, jobs, take, ahead=ahead)
+    clear_drafts(folder)  # of workers that were killed
     return state()
 
 

@@ -9,8 +9,8 @@ Shard i depends only on the manifest and on i. So a collection that was killed c
 
 from __future__ import annotations
 
+import io
 import json
-import os
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from toolkit.contacts.category import Category
+from toolkit.drafts import clear_drafts, is_draft, write_whole
 from toolkit.errors import DatasetError
 from toolkit.learning.samples import PARTS, Samples, join
 from toolkit.prediction.features import TARGETS, feature_size
@@ -49,9 +50,7 @@ class Manifest:
 
     def write(self, folder: Path) -> None:
         """Write `folder/manifest.json`, whole or not at all."""
-        temporary = folder / "manifest.json.part"
-        temporary.write_text(json.dumps(asdict(self), indent=2))
-        os.replace(temporary, folder / "manifest.json")
+        write_whole(folder / "manifest.json", json.dumps(asdict(self), indent=2).encode())
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -86,6 +85,7 @@ def begin(folder: Path, wanted: Manifest) -> None:
     Raises:
         DatasetError: The folder holds something else, or data of other settings or of another robot.
     """
+    clear_drafts(folder)
     if (folder / "manifest.json").is_file():
         found = read_manifest(folder)
         for name in ("robot", "fingerprint", "seed", "settings"):
@@ -95,7 +95,7 @@ def begin(folder: Path, wanted: Manifest) -> None:
                     f"{getattr(wanted, name)!r}; use another --out, or the same options"
                 )
         return
-    if folder.exists() and any(folder.iterdir()):
+    if folder.exists() and not all(is_draft(entry.name) for entry in folder.iterdir()):
         raise DatasetError(f"{folder}: not empty and not a data set; use another --out")
     folder.mkdir(parents=True, exist_ok=True)
     wanted.write(folder)
@@ -132,13 +132,9 @@ def shard_index(path: Path) -> int:
 def write_shard(folder: Path, index: int, samples: dict[Category, Samples]) -> None:
     """Write a shard, whole or not at all."""
     arrays = {f"{part}_{int(category)}": getattr(group, part) for category, group in samples.items() for part in PARTS}
-    path = shard_path(folder, index)
-    temporary = path.with_suffix(".part")
-    with temporary.open("wb") as file:
-        np.savez(file, **arrays)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(temporary, path)
+    content = io.BytesIO()
+    np.savez(content, **arrays)
+    write_whole(shard_path(folder, index), content.getvalue())
 
 
 def read_shard(path: Path) -> dict[Category, Samples]:

@@ -2,42 +2,58 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import TypeVar
 
-from toolkit.errors import InputError
+from toolkit.errors import WorkerError
+from toolkit.learning.cluster import cluster_executor
 
 Result = TypeVar("Result")
 
 
 @contextmanager
-def executor(workers: int, cluster: str | None = None) -> Iterator[Executor]:
+def executor(workers: int, cluster: str | None = None, *, unencrypted: bool = False) -> Iterator[Executor]:
     """Local processes, or the workers of a dask cluster.
 
     Args:
         workers: Number of local processes.
         cluster: Address of the cluster's scheduler, None for local processes.
+        unencrypted: Whether a scheduler on another machine may be used without encryption.
 
     Raises:
-        InputError: Dask is not installed, or the cluster does not answer.
+        InputError: Dask is not installed, or the cluster cannot be used (see `cluster_executor`).
     """
-    if cluster is None:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    if cluster is not None:
+        with cluster_executor(cluster, unencrypted=unencrypted) as pool:
             yield pool
         return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError("--cluster needs dask: pip install -e '.[cluster]'") from None
-    try:
-        client = Client(cluster, timeout="20s")
-    except (OSError, TimeoutError, ValueError) as error:
-        raise InputError(f"--cluster {cluster}: no dask scheduler answers there ({error})") from None
-    with client, client.get_executor(pure=False) as pool:
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
         yield pool
+
+
+def _end_with_parent() -> None:
+    """Let this process end as soon as the one that started it does, even if that is killed."""
+    parent = parent_process()
+    if parent is not None:
+
+        def watch() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=watch, daemon=True).start()
 
 
 def run_jobs(
@@ -56,6 +72,9 @@ def run_jobs(
         arguments: The arguments of each job.
         take: Is called with each result in this process.
         ahead: Number of jobs that wait in the pool at a time, None for all.
+
+    Raises:
+        WorkerError: A process of the pool died.
     """
     left = list(arguments)[::-1]
     waiting: set[Future[Result]] = set()
@@ -65,8 +84,23 @@ def run_jobs(
                 waiting.add(pool.submit(work, *left.pop()))
             finished, waiting = wait(waiting, return_when=FIRST_COMPLETED)
             for job in finished:
-                take(job.result())
+                take(_result_of(job))
     except BaseException:
         for job in waiting:
             job.cancel()
         raise
+
+
+def _result_of(job: Future[Result]) -> Result:
+    """What a finished job returned.
+
+    Raises:
+        WorkerError: The process that ran it died, or the cluster went away.
+    """
+    try:
+        return job.result()
+    except (BrokenExecutor, CancelledError) as error:
+        reason = " ".join(str(error).split()) or "the connection was lost"
+        raise WorkerError(
+            f"a process that did a part of the work died ({reason}); what is done is kept, the same command goes on"
+        ) from error

@@ -87,7 +87,9 @@ def run(
 ) -> PipelineResult:
     """Plan, test and execute.
 
-    The planner is made for the same robot and world; the observer is told of every stage.
+    The planner is made for the same robot and world; the observer is told of every stage. The same seed gives the same
+    result if the libraries of matrix products keep to one thread, as in the commands; set `OPENBLAS_NUM_THREADS=1` and
+    `MKL_NUM_THREADS=1` before NumPy is imported.
 
     Raises:
         ToolkitError: The input cannot be used at all (no start stance, nothing leads to the goal).

@@ -11,11 +11,11 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from toolkit.drafts import write_whole
 from toolkit.errors import InputError
 from toolkit.execution.result import Execution
 from toolkit.report.colors import RUNS, Color
 from toolkit.report.comparison import Comparison, as_markdown, momentum_rates
-from toolkit.report.drafts import write_whole
 from toolkit.report.draw import draw_goal, draw_scene, recording
 from toolkit.report.meshes import static_bodies
 from toolkit.report.motion_scene import TIMELINE, draw_com, draw_motion, frames

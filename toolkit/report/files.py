@@ -17,10 +17,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from toolkit.drafts import clear_drafts, draft_in, is_draft, is_left, make_folders, remove, remove_folders
 from toolkit.errors import InputError
 from toolkit.execution.check import Check, Result
 from toolkit.interruption import undisturbed
-from toolkit.report.drafts import clear_drafts, draft_in, is_draft, is_left, make_folders, remove, remove_folders
 
 REPORT = "report.json"
 PLAN = "plan.json"

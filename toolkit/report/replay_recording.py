@@ -10,9 +10,9 @@ import rerun as rr
 
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
+from toolkit.drafts import write_whole
 from toolkit.execution.result import Execution
 from toolkit.report.blueprint import blueprint
-from toolkit.report.drafts import write_whole
 from toolkit.report.draw import draw_goal, draw_scene, recording
 from toolkit.report.motion_scene import draw_centres, draw_motion, draw_plan, frames
 from toolkit.report.recording import APPLICATION, draw_execution

@@ -6,8 +6,8 @@ import tempfile
 from pathlib import Path
 
 from toolkit.contacts.sequence import ContactSequence
+from toolkit.drafts import write_whole
 from toolkit.execution.result import Execution
-from toolkit.report.drafts import write_whole
 from toolkit.report.offscreen import Patches
 from toolkit.report.pictures import video
 

@@ -13,8 +13,8 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from toolkit.drafts import write_whole
 from toolkit.report.colors import FOOT_SURFACE, PALM_SURFACE, START
-from toolkit.report.drafts import write_whole
 from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, recording
 from toolkit.world.world import World
 

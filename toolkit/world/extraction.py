@@ -14,6 +14,7 @@ from shapely.geometry.polygon import orient
 from toolkit.geometry.pose import Pose
 from toolkit.world.convex import convex_partition
 from toolkit.world.faces import Face, faces_of
+from toolkit.world.overlay import cut, overlap, united
 from toolkit.world.solids import Solids
 from toolkit.world.source import Source
 from toolkit.world.surface import Surface
@@ -192,7 +193,7 @@ def _in_frame(face: Face, frame: Pose) -> Polygon:
 
 def _sealed(shapes: list[Polygon], gap: float) -> Polygon:
     """Union of shapes in which seams up to `gap` m wide are closed."""
-    union = shapely.union_all(shapes)
+    union = united(shapes)
     if isinstance(union, Polygon) and not union.interiors:
         return union
     closed = union.buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
@@ -212,14 +213,14 @@ def _open_regions(faces: list[Face], solids: Solids, config: SurfaceConfig) -> l
     regions[lost] = Polygon()
     shapely.prepare(rest)
     covers = ~lost[owner] & (large | shapely.dwithin(rest[owner], shadows, 10 * config.simplify))
-    covers[covers] = shapely.area(shapely.intersection(regions[owner[covers]], shadows[covers])) > 1e-7
+    covers[covers] = overlap(regions[owner[covers]], shadows[covers])
     owner, shadows = owner[covers], shadows[covers]
     covered = np.unique(owner)
     if len(covered):
         # The covers are widened by the distance that simplifying may move the outline, so that the result stays free.
-        unions = [shapely.union_all(group) for group in np.split(shadows, np.searchsorted(owner, covered[1:]))]
+        unions = [united(group) for group in np.split(shadows, np.searchsorted(owner, covered[1:]))]
         covers = shapely.buffer(unions, config.simplify, join_style="mitre", quad_segs=16)
-        regions[covered] = shapely.simplify(shapely.difference(regions[covered], covers), config.simplify)
+        regions[covered] = shapely.simplify(cut(regions[covered], covers), config.simplify)
     parts, whole = shapely.get_parts(shapely.make_valid(regions), return_index=True)
     pieces, part = shapely.get_parts(parts, return_index=True)
     return [
@@ -244,7 +245,7 @@ def _without_largest(
     for turn in range(_LARGEST):
         chosen = np.flatnonzero(rank == turn)
         chosen = chosen[shapely.area(rest[owner[chosen]]) >= least]
-        rest[owner[chosen]] = shapely.difference(rest[owner[chosen]], shadows[chosen])
+        rest[owner[chosen]] = cut(rest[owner[chosen]], shadows[chosen])
     return rest, rank < _LARGEST
 
 

@@ -11,6 +11,7 @@ from shapely.geometry import Polygon
 
 from toolkit.compiled import compiled
 from toolkit.geometry.pose import Pose
+from toolkit.world.overlay import united
 
 _MANY = 100  # more triangles are merged along edges; for fewer the general union is as quick and allows overlaps
 
@@ -130,4 +131,4 @@ def _union(triangles: np.ndarray) -> shapely.Geometry:
         merged = shapely.coverage_union_all(shapes)
         if abs(merged.area - shapely.area(shapes).sum()) < 1e-9 * merged.area:
             return merged
-    return shapely.union_all(shapes)
+    return united(shapes)

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import socket
+import threading
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from toolkit.errors import InputError
 from toolkit.interruption import undisturbed
 
 _NAME = re.compile(r"\.(?P<owner>[^/]+)\.(?P<process>\d+)-(?P<start>\d+)\.tmp")
+
+_WRITING = threading.Lock()
 
 
 def draft_in(folder: Path) -> Path:
@@ -103,11 +106,14 @@ def write_whole(path: Path, content: bytes, option: str = "--out") -> None:
             return
         if place.exists() and not place.is_file():
             raise InputError(f"{path}: is a folder or no ordinary file; choose another {option}")
-        with undisturbed():
+        with _WRITING, undisturbed():  # threads share the name of the draft
             try:
                 made += make_folders(place.parent)
                 clear_drafts(place.parent)
-                draft_in(place.parent).write_bytes(content)
+                with draft_in(place.parent).open("wb") as file:
+                    file.write(content)
+                    file.flush()
+                    os.fsync(file.fileno())
                 os.replace(draft_in(place.parent), place)
             except OSError:
                 remove(draft_in(place.parent))

@@ -1,0 +1,91 @@
+"""Unions and differences of polygons that are held against their arguments.
+
+The overlay of polygons whose sides coincide but for rounding may lose whole parts without an error. A result that does
+not hold is computed again with all corners on a fine grid, which is slower and exact on that grid.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+
+_GRID = 1e-9  # m
+_HOLE = 1e-9  # m^2; smaller holes are rounding
+_COLLECTION = 7  # shapely's number of this type
+_AREA = 1e-7  # m^2; areas that differ by less are equal
+
+
+def united(shapes: Any) -> shapely.Geometry:
+    """Union of one polygon or more."""
+    union = shapely.union_all(shapes)
+    return union if _is_union(union, np.asarray(shapes)) else _cleared(shapely.union_all(shapes, grid_size=_GRID))
+
+
+def cut(shapes: np.ndarray, cutters: np.ndarray) -> np.ndarray:
+    """What is left of each of n polygons without the polygon at its place in `cutters`, (n,) polygons of any parts."""
+    left = shapely.difference(shapes, cutters)
+    for index in np.flatnonzero(shapely.get_type_id(left) == _COLLECTION).tolist():
+        left[index] = _cleared(left[index])
+    for index in np.flatnonzero(~_are_differences(left, shapes, cutters)).tolist():
+        left[index] = _cleared(shapely.difference(shapes[index], cutters[index], grid_size=_GRID))
+    return left
+
+
+def overlap(shapes: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Whether each of n polygons has an area in common with the polygon at its place in `others`, (n,) bool.
+
+    True also for some that merely touch.
+    """
+    result = np.asarray(shapely.area(shapely.intersection(shapes, others)) > _AREA)
+    doubtful = np.flatnonzero(~result)
+    shapes, others = shapes[doubtful], others[doubtful]
+    for points, owner in (_inner_points(group) for group in (shapes, others)):
+        common = np.logical_and(*(shapely.contains_xy(group[owner], *points.T) for group in (shapes, others)))
+        result[doubtful[owner[common]]] = True
+    return result
+
+
+def _is_union(union: shapely.Geometry, shapes: np.ndarray) -> bool:
+    """Whether a union has the inner points of every shape and no others."""
+    if abs(union.area - shapely.area(shapes).sum()) < _AREA:  # all of them, side by side
+        return True
+    shapely.prepare(union)
+    if not shapely.dwithin(union, shapely.points(_inner_points(shapes)[0]), _GRID).all():
+        return False
+    points = _inner_points(np.array([union]))[0]
+    points = np.asarray(shapely.points(points[shapely.contains_xy(union, *points.T)]))
+    return len(np.unique(shapely.STRtree(shapes).query(points, "dwithin", _GRID)[0])) == len(points)
+
+
+def _are_differences(left: np.ndarray, shapes: np.ndarray, cutters: np.ndarray) -> np.ndarray:
+    """Whether differences (n,) have the inner points of the shapes that are outside the cutters, and no others."""
+    good = np.ones(len(left), bool)
+    for points, owner in (_inner_points(group) for group in (left, shapes, cutters)):
+        inside, wanted, unwanted = (shapely.contains_xy(group[owner], *points.T) for group in (left, shapes, cutters))
+        wrong = np.flatnonzero(inside != (wanted & ~unwanted))
+        places, owner = shapely.points(points[wrong]), owner[wrong]
+        edges = (shapely.dwithin(shapely.boundary(group[owner]), places, _GRID) for group in (shapes, cutters))
+        good[owner[~np.logical_or(*edges)]] = False
+    return good
+
+
+def _inner_points(shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (k, 2) inside the rings of shapes: one deep inside each, at most one towards each corner; their owners."""
+    parts, owner = shapely.get_parts(shapes, return_index=True)
+    rings, part = shapely.get_rings(parts, return_index=True)
+    rings, owner = np.asarray(shapely.polygons(rings)), owner[part]
+    deep = shapely.get_coordinates(shapely.point_on_surface(rings))
+    corners, ring = shapely.get_coordinates(rings, return_index=True)
+    points = (corners + deep[ring]) / 2
+    inside = shapely.contains_xy(rings[ring], *points.T)
+    return np.concatenate([deep, points[inside]]), np.concatenate([owner, owner[ring[inside]]])
+
+
+def _cleared(shape: Any) -> Polygon | MultiPolygon:
+    """A shape without the lines, points and tiny holes that rounding makes of what is thinner."""
+    parts = [part for part in shapely.get_parts(shapely.get_parts(shape)) if isinstance(part, Polygon)]
+    parts = [Polygon(part.exterior, [hole for hole in part.interiors if Polygon(hole).area > _HOLE]) for part in parts]
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
