@@ -35,7 +35,7 @@ class TransitionEvaluator(ABC):
     """Judges all candidate transitions of one parent state together.
 
     Attributes:
-        costly: Whether a search should ask about one transition at a time, since each takes about a millisecond.
+        costly: Whether a search should ask about one transition at a time, since each takes some milliseconds.
         rejection: What it means that a transition is infeasible, for messages.
         stand_in: The judge of what this one was not trained for. It also judges on ground that holds no resting foot,
             where feasibility must be exact. None where there is no such judge.

@@ -16,7 +16,7 @@ from toolkit.robot.model import RobotModel
 
 
 class OptimiserEvaluator(TransitionEvaluator):
-    """Solves the centroidal problem of every transition, which takes about two milliseconds each.
+    """Solves the centroidal problem of every transition, which takes about five milliseconds each.
 
     Args:
         robot: The robot.
