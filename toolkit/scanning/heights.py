@@ -61,7 +61,7 @@ def npy_heights(path: Path) -> Heights:
 
 def png_heights(path: Path) -> Heights:
     """The grey levels of an image."""
-    values = np.asarray(imageio.v3.imread(path))
+    values = np.asarray(imageio.v3.imread(path.read_bytes(), extension=".png"))
     if values.ndim == 3 and (values[..., :1] == values[..., : min(3, values.shape[2])]).all():
         values = values[..., 0]
     if values.ndim != 2:
