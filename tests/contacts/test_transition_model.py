@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toolkit.contacts.transition_model import TransitionModel, palm_rays, steps_38, steps_60, wide_steps
+from toolkit.contacts.transition_model import TransitionModel, palm_rays, steps_38, steps_60, running_steps
 from toolkit.geometry.limb import Limb
 from toolkit.robot.loader import load_robot
 
@@ -26,7 +26,11 @@ def test_steps_obey_the_rules():
     assert set(np.round(y, 3)) == {0.2, 0.3, 0.4} and (y[x < 0] == 0.2).all()
     assert set(np.round(np.degrees(yaw)).astype(int)) == {-30, -15, 0, 15, 30}
     assert (yaw[(x == 0) | (x == 0.4)] == 0).all()
-    assert wide_steps()[:, 0].min() == 0.45 and wide_steps()[:, 0].max() == 0.75 and (wide_steps()[:, 2] == 0).all()
+    assert (
+        running_steps()[:, 0].min() == 0.45
+        and running_steps()[:, 0].max() == 0.75
+        and (running_steps()[:, 2] == 0).all()
+    )
 
 
 def test_rays_are_unit_and_point_to_the_left():

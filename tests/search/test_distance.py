@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from tests.search.worlds import FLOOR, box, make_world
+from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projector
 from toolkit.geometry.pose import Pose
 from toolkit.search.costs.heuristic import EuclideanDistance
@@ -12,7 +13,9 @@ from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
 
 
 def terrain(robot, world):
-    return TerrainDistance(robot, world, Projector(robot, world.surfaces, world.mujoco_model))
+    projector = Projector(robot, world.surfaces, world.mujoco_model)
+    footholds = Footholds(world.surfaces, robot.half_sizes[0], projector.config.margin)
+    return TerrainDistance(robot, world, projector, footholds)
 
 
 def at(distance, x, y, z=0.0, yaw=0.0):

@@ -101,7 +101,7 @@ def test_same_seed_same_plan(robot):
 def standing(robot, mjcf, timings):
     """Drift in a world, its table, and the numbers of the feet side by side at the start."""
     planner = ContactPlanner(robot, make_world(mjcf, goal=(0.6, 0, 0)), KinematicEvaluator(robot))
-    table = planner.ground.moves(wide=False).table
+    table = planner.ground.moves().table
     numbers = np.array([*(table.add_contact(c) for c in planner.ground.start_stance().contacts), -1, -1])
     return Drift(robot, table, timings), table, numbers
 

@@ -15,7 +15,7 @@ def reached(robot, world, limb):
     """Positions and headings of all moves of a limb out of the start stance."""
     planner = ContactPlanner(robot, world, KinematicEvaluator(robot))
     stance = planner.ground.start_stance()
-    moves = planner.ground.moves(wide=True)
+    moves = planner.ground.moves()
     table = moves.table
     left, right = (table.add_contact(stance[foot]) for foot in (Limb.LEFT_FOOT, Limb.RIGHT_FOOT))
     found = moves.steps(limb, right if limb.is_left else left) if limb.is_foot else moves.palms(limb, left, right)
@@ -108,7 +108,7 @@ def test_cul_de_sac(robot):
     def first(heuristic, epsilon, crowding):
         search = AnaStarConfig(epsilon=epsilon, crowding=crowding, max_expansions=1200)
         cost = CostConfig(time=0.0)
-        config = PlannerConfig(heuristic=heuristic, search=search, wide_steps="off", palms=False, cost=cost)
+        config = PlannerConfig(heuristic=heuristic, search=search, drawn=False, palms=False, cost=cost)
         planner = ContactPlanner(robot, world, KinematicEvaluator(robot), config)
         found = []
 

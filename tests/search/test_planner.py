@@ -79,12 +79,12 @@ def test_start_stance_is_the_home_stance(robot):
     assert 0.1 < width < 0.4
 
 
-def test_gap_needs_wide_steps(robot):
+def test_a_gap_needs_places_drawn_from_the_ground(robot):
     gap = [box([0, 0, -0.05], [0.5, 0.6, 0.05]), box([1.7, 0, -0.05], [0.7, 0.6, 0.05])]  # 0.5 m wide
     world = make_world(*gap, goal=(1.7, 0, 0))
     check(robot, world, plan(robot, world, PlannerConfig(search=AnaStarConfig(max_expansions=600))))
     with pytest.raises(PlanningError, match=r"made\.xml: nothing leads to the goal at \(1\.7, 0\): .* gap wider than"):
-        plan(robot, world, PlannerConfig(wide_steps="off"))
+        plan(robot, world, PlannerConfig(drawn=False))
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_reason_of_failure_names_what_rejected_most(robot):
         box([2.0, 0, -0.05], [0.5, 0.5, 0.05]),
         goal=(2.0, 0, 0),
     )
-    config = PlannerConfig(wide_steps="off", search=AnaStarConfig(max_expansions=200))
+    config = PlannerConfig(drawn=False, search=AnaStarConfig(max_expansions=200))
     result = plan(robot, steep, config)
     assert not result.solutions
     assert "limit of 200 expansions" in result.reason and "too steep" in result.reason and "\n" not in result.reason
@@ -137,7 +137,7 @@ def test_reason_of_failure_names_what_rejected_most(robot):
 def test_search_exhausted(robot):
     """A floor barely larger than the stance: few states, the goal out of reach of any."""
     world = make_world(box([0, 0, -0.05], [0.14, 0.19, 0.05]), goal=(0.3, 0, 0), radius=0.1)
-    config = PlannerConfig(heuristic="euclidean", wide_steps="off")
+    config = PlannerConfig(heuristic="euclidean", drawn=False)
     result = plan(robot, world, config)
     assert result.exhausted and "every stance that can be reached" in result.reason
 
@@ -242,7 +242,7 @@ def test_the_motion_of_the_whole_sequence_has_the_last_word(robot):
 
 
 def test_bad_settings():
-    for setting in ({"steps": 50}, {"wide_steps": "maybe"}, {"heuristic": "none"}):
+    for setting in ({"steps": 50}, {"heuristic": "none"}):
         name = next(iter(setting))
         with pytest.raises(InputError, match=name):
             PlannerConfig(**setting)
@@ -278,3 +278,27 @@ def test_the_first_sequence_over_slippery_ground_begins_with_the_left_foot_and_l
     first, *later = [solution.sequence.transitions[0].limb for solution in result.solutions]
     assert result.hasty == 1 and first == Limb.LEFT_FOOT and Limb.RIGHT_FOOT in later
     assert all(np.isfinite(solution.bound) for solution in result.solutions)
+
+
+@pytest.mark.parametrize("width", [0.25, 0.3, 0.35, 0.45, 0.6])
+def test_gaps_of_every_width_are_crossed(robot, width):
+    gap = [box([0, 0, -0.05], [0.5, 0.6, 0.05]), box([1.0 + width, 0, -0.05], [0.5, 0.6, 0.05])]
+    world = make_world(*gap, goal=(1.0 + width, 0, 0))
+    check(robot, world, plan(robot, world, PlannerConfig(search=AnaStarConfig(max_expansions=300))))
+
+
+@pytest.mark.parametrize(("width", "turn"), [(0.16, 0.0), (0.2, 17.0), (0.3, 61.0)])
+def test_beams_are_walked_whichever_way_they_point(robot, width, turn):
+    c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    beam = box([0.9 * c, 0.9 * s, -0.05], [0.5, width / 2, 0.05], [0, 0, turn])
+    ends = [box([x * c, x * s, -0.05], [0.4, 0.4, 0.05], [0, 0, turn]) for x in (0.0, 1.8)]
+    world = make_world(*ends, beam, goal=(1.8 * c, 1.8 * s, 0))
+    check(robot, world, plan(robot, world, PlannerConfig(search=AnaStarConfig(max_expansions=600))))
+
+
+def test_stones_hardly_larger_than_a_sole_are_crossed(robot):
+    stones = [box([0.55 + 0.34 * i, y, -0.05], [0.12, 0.11, 0.05]) for i in range(3) for y in (-0.16, 0.16)]
+    world = make_world(
+        box([0, 0, -0.05], [0.4, 0.4, 0.05]), *stones, box([1.8, 0, -0.05], [0.4, 0.4, 0.05]), goal=(1.8, 0, 0)
+    )
+    check(robot, world, plan(robot, world, PlannerConfig(search=AnaStarConfig(max_expansions=600))))

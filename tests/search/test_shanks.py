@@ -64,7 +64,7 @@ def test_ball_on_the_grid():
 
 def codes(robot, world, poses, standing):
     """Screen codes of left soles (x, y, yaw in degrees) beside a standing right one on level ground."""
-    moves = ContactPlanner(robot, world, KinematicEvaluator(robot)).ground.moves(wide=False)
+    moves = ContactPlanner(robot, world, KinematicEvaluator(robot)).ground.moves()
     stand = Pose.from_yaw(np.array([*standing[:2], 0.0]), np.radians(standing[2]))
     number = moves.table.add_contact(Contact(Limb.RIGHT_FOOT, stand, 0.7, 0))
     poses = np.array(poses, float)

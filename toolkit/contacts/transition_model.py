@@ -43,8 +43,8 @@ def steps_60() -> np.ndarray:
     return _foot_steps((0.0, -15.0, 15.0, -30.0, 30.0))
 
 
-def wide_steps() -> np.ndarray:
-    """(14, 3) straight steps of 0.45 m to 0.75 m, which are added for wide gaps."""
+def running_steps() -> np.ndarray:
+    """(14, 3) straight steps of 0.45 m to 0.75 m, which are added for ground that has to be crossed fast."""
     return np.array([(x, y, 0.0) for x in (0.45, 0.50, 0.55, 0.60, 0.65, 0.70, 0.75) for y in (0.2, 0.3)])
 
 
@@ -55,6 +55,13 @@ def palm_rays() -> np.ndarray:
         [np.cos(elevation) * np.sin(forward), np.cos(elevation) * np.cos(forward), np.sin(elevation)], axis=-1
     )
     return rays.reshape(-1, 3)
+
+
+def leg_scale(robot: RobotModel) -> float:
+    """Length of a robot's legs over that of the legs that the paper's numbers fit; 1 where it is within 10 %."""
+    leg = robot.legs[Limb.LEFT_FOOT]
+    scale = (leg.thigh + leg.shin) / _REFERENCE_LEG
+    return 1.0 if abs(scale - 1.0) < 0.1 else scale
 
 
 @dataclass(frozen=True)
@@ -75,9 +82,7 @@ class TransitionModel:
 
         Steps are not scaled where the legs are within 10 % of those that the paper's numbers fit.
         """
-        leg = robot.legs[Limb.LEFT_FOOT]
-        scale = (leg.thigh + leg.shin) / _REFERENCE_LEG
-        scale = 1.0 if abs(scale - 1.0) < 0.1 else scale
+        scale = leg_scale(robot)
         scaled = steps * [scale, scale, 1.0]
         apart = 2.0 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04
         scaled[:, 1] += max(0.0, apart - scaled[:, 1].min())

@@ -8,15 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.contacts.arm_map import ArmMap
+from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projected, Projector
 from toolkit.contacts.stance import Stance
-from toolkit.contacts.transition_model import TransitionModel, steps_38, steps_60, wide_steps
+from toolkit.contacts.transition_model import TransitionModel, running_steps, steps_38, steps_60
 from toolkit.errors import InputError, PlanningError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
 from toolkit.search.costs.heuristic import Distance, EuclideanDistance
 from toolkit.search.costs.terrain_distance import TerrainDistance, resting_surfaces
+from toolkit.search.moves.drawn import DrawnSteps, longest_step
 from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.start_palms import with_palms
@@ -32,7 +34,6 @@ class Way:
     Attributes:
         distance: Distance to the goal.
         length: Length of the whole way in m.
-        wide: Whether wide steps are to be used.
         longest: The farthest, in m, that the mean of the feet moves in one transition.
         slides: Whether no way leads over resting ground alone.
         forced: The most, in m/s^2, that the ground forces the robot to accelerate on the way.
@@ -40,7 +41,6 @@ class Way:
 
     distance: Distance
     length: float
-    wide: bool
     longest: float
     slides: bool
     forced: float
@@ -52,24 +52,28 @@ class Ground:
     def __init__(self, robot: RobotModel, world: World, config: PlannerConfig):
         self._robot, self._world, self._config = robot, world, config
         self._projector = self._projected(config.rest_friction)
+        half, margin = robot.half_sizes[Limb.LEFT_FOOT], self._projector.config.margin
+        self._footholds = Footholds(world.surfaces, half, margin)
         self._terrain = self._distances(self._projector)
         walls = config.palms and bool(self._projector.table.palm.any())
         self._arms = {limb: ArmMap.of(robot, limb) for limb in robot.arms if walls}
-        self._models = {wide: self._model(wide) for wide in (False, True)}
+        self._models = {slides: self._model(slides) for slides in (False, True)}
+        self._longest = max(longest_step(robot), self._stride(slides=False))
         self._warm_up()
 
     def _warm_up(self) -> None:
         """Compile or load all kernels."""
-        moves, ground, surface = self.moves(wide=False), self._projector.table, np.zeros(1, int)
+        moves, ground, surface = self.moves(), self._projector.table, np.zeros(1, int)
         sole = Projected(surface, ground.origin[surface], ground.rotation[surface])
         moves.warm_up(int(moves.table.add(Limb.RIGHT_FOOT, sole)[0]))
 
-    def moves(self, wide: bool) -> MoveGenerator:
-        """Screened moves, with wide steps or without."""
-        terrain = self._terrain
-        return MoveGenerator(
-            self._robot, self._projector, self._models[wide], terrain.occupancy, terrain.box, self._arms
-        )
+    def moves(self, way: Way | None = None) -> MoveGenerator:
+        """Screened moves on the way to the goal; None: the steps of the table, wherever they lead."""
+        terrain, drawn = self._terrain, None
+        model = self._models[way is not None and way.slides]
+        if way is not None and self._config.drawn:
+            drawn = DrawnSteps(self._robot, self._projector.table, self._footholds, way.distance, self._longest)
+        return MoveGenerator(self._robot, self._projector, model, terrain.occupancy, terrain.box, self._arms, drawn)
 
     def start_stance(self) -> Stance:
         """Both feet on the ground below the start, at their distance in the home posture, and palms at their sites.
@@ -85,7 +89,7 @@ class Ground:
                 f"{world.path}: palms are switched off, but the world asks for palms in contact at the "
                 f"start; leave out --no-palms, or remove the site{'s' * (len(names) > 1)} {' and '.join(names)}"
             )
-        moves = self.moves(wide=False)
+        moves = self.moves()
         reasons: Counter[str] = Counter()
         for stance in place_feet(robot, world, self._projector):
             left, right = (stance[limb] for limb in FEET)
@@ -106,41 +110,42 @@ class Ground:
         Raises:
             PlanningError: Nothing leads to the goal.
         """
-        config, feet, forced = self._config, start.mean_feet, self._terrain.forced_acceleration()
-        choices = {"on": [True], "off": [False], "auto": [False, True]}[config.wide_steps]
-        slides, rests = False, []
+        feet, forced = start.mean_feet, self._terrain.forced_acceleration()
+        strides = [self._stride(slides=False), self._longest] if self._config.drawn else [self._stride(slides=False)]
+        slides = False
         if forced > 0.0:
             projector = self._projected(1.0)
+            rests: list[float] = []
             if projector.table.foot.any():
                 resting = self._distances(projector)
-                rests = [wide for wide in choices if resting.distance(feet, self._stride(wide)) is not None]
-            slides, choices = not rests, rests or choices[-1:]
-        distance, wide = self._distance(feet, choices)
+                rests = [stride for stride in strides if resting.distance(feet, stride) is not None]
+            slides, strides = not rests, rests or [self._stride(slides=True), *strides[1:]]
+        distance, stride = self._distance(feet, strides)
         length = float(distance(feet.position[None], np.array([feet.yaw]))[0])
-        return Way(distance, length, wide, self._stride(wide) + self._projector.config.shift, slides, forced)
+        return Way(distance, length, stride + self._projector.config.shift, slides, forced)
 
-    def _distance(self, feet: Pose, choices: list[bool]) -> tuple[Distance, bool]:
-        """Distance to the goal with the first choice of steps, wide or not, that leads there."""
+    def _distance(self, feet: Pose, strides: list[float]) -> tuple[Distance, float]:
+        """Distance to the goal with the first of the longest steps in m that leads there, and that step."""
         config = self._config
         if config.heuristic == "euclidean":
-            return EuclideanDistance(self._world.goal), config.wide_steps != "off"
-        for wide in choices:
-            distance = self._terrain.distance(feet, self._stride(wide))
+            return EuclideanDistance(self._world.goal), strides[-1]
+        for stride in strides:
+            distance = self._terrain.distance(feet, stride)
             if distance is not None:
-                return distance, wide
-        stride = self._stride(choices[-1])
+                return distance, stride
+        stride = strides[-1]
         if config.rest_friction is not None:
             if self._distances(self._projected(None)).distance(feet, stride) is not None:
                 raise PlanningError(self._terrain.too_steep(config.rest_friction))
-        raise PlanningError(self._terrain.obstacle(feet, stride))
+        raise PlanningError(self._terrain.obstacle(feet, stride, strides[0]))
 
-    def _model(self, wide: bool) -> TransitionModel:
+    def _model(self, slides: bool) -> TransitionModel:
         steps = steps_60() if self._config.steps == 60 else steps_38()
-        return TransitionModel.of(self._robot, np.concatenate([steps, wide_steps()]) if wide else steps)
+        return TransitionModel.of(self._robot, np.concatenate([steps, running_steps()]) if slides else steps)
 
-    def _stride(self, wide: bool) -> float:
-        """The longest step in m."""
-        return self._models[wide].longest_step
+    def _stride(self, *, slides: bool) -> float:
+        """The longest step of the table in m."""
+        return self._models[slides].longest_step
 
     def _projected(self, friction: float | None) -> Projector:
         """Projector onto the ground on which a foot rests with this part of its friction; None: onto all ground."""
@@ -148,4 +153,4 @@ class Ground:
         return Projector(self._robot, surfaces, self._world.mujoco_model)
 
     def _distances(self, projector: Projector) -> TerrainDistance:
-        return TerrainDistance(self._robot, self._world, projector)
+        return TerrainDistance(self._robot, self._world, projector, self._footholds)

@@ -142,7 +142,7 @@ class ContactPlanner:
         self, way: Way, strategy: Strategy, tally: Tally, exclusions: Sequence[Exclusion], palms: bool, deadline: float
     ) -> Parts:
         """The parts of the graphs of one search."""
-        moves, timings = self.ground.moves(way.wide), self._timings
+        moves, timings = self.ground.moves(way), self._timings
         table, palms = moves.table, palms and self.config.palms and moves.has_palm_surfaces
         limbs = [limb for limb in PALMS if palms and limb in self.robot.arms]
         candidates = CandidateGenerator(moves, limbs, timings, exclusions, tally.rejected)

@@ -16,8 +16,7 @@ class PlannerConfig:
 
     Attributes:
         steps: Number of rows of the foot transition model, 60 or 38.
-        wide_steps: "on", "off", or "auto": where normal steps do not lead to the goal, or where some ground holds no
-            resting foot and has to be crossed fast.
+        drawn: Whether landing places are drawn from the surfaces where the table's steps lead no farther.
         palms: Whether palms may be used.
         heuristic: "grid" or "euclidean".
         timings: Timings of a transition to choose from; empty: the world's.
@@ -31,7 +30,7 @@ class PlannerConfig:
     """
 
     steps: int = 60
-    wide_steps: str = "auto"
+    drawn: bool = True
     palms: bool = True
     heuristic: str = "grid"
     timings: tuple[Timing, ...] = ()
@@ -41,7 +40,7 @@ class PlannerConfig:
     search: AnaStarConfig = field(default_factory=lambda: AnaStarConfig(max_expansions=20_000))
 
     def __post_init__(self):
-        choices = {"steps": (60, 38), "wide_steps": ("auto", "on", "off"), "heuristic": ("grid", "euclidean")}
+        choices = {"steps": (60, 38), "heuristic": ("grid", "euclidean")}
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 raise InputError(f"planner setting {name} is {getattr(self, name)!r}; it must be one of {allowed}")

@@ -134,7 +134,6 @@ def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig 
         config,
         cost=replace(config.cost, dynamics=0.0, time=0.0, steep=0.0),
         rest_friction=None if palms else _FRICTION,
-        wide_steps="off" if config.wide_steps == "auto" else config.wide_steps,
         timings=config.timings[:1],
     )
     return ContactPlanner(robot, world, QuasiStaticEvaluator(robot), config)

@@ -11,8 +11,8 @@ from toolkit.search.moves.occupancy import body_free
 LEVELS = 4  # heights kept per cell
 
 
-@compiled
-def _add_level(levels, z, merge):
+@compiled(kept=True)
+def add_level(levels, z, merge):
     """Enter a height in a falling list whose free places are -inf; of heights closer than `merge` the highest stays."""
     for k in range(len(levels)):
         if abs(levels[k] - z) < merge:
@@ -45,7 +45,7 @@ def sole_levels(corner, cell, half, offsets, merge, table, result):
                     for turn in range(4):
                         angle = turn * np.pi / 4
                         if sole_fits(table, place, entry, x, y, np.cos(angle), np.sin(angle), half):
-                            _add_level(result[a, b], z, merge)
+                            add_level(result[a, b], z, merge)
                             break
 
 
@@ -66,7 +66,7 @@ def spread(levels, disc, merge, result):
                     for n in range(LEVELS):
                         new &= not abs(result[a, b, n] - z) < merge
                     if new:
-                        _add_level(result[a, b], z, merge)
+                        add_level(result[a, b], z, merge)
     return result
 
 

@@ -14,16 +14,17 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projector
+from toolkit.contacts.surface_table import SurfaceTable
 from toolkit.geometry.limb import Limb
-from toolkit.search.costs.grid_kernels import LEVELS, link_nodes, number_nodes, query, sole_levels, spread
+from toolkit.search.costs.grid_kernels import LEVELS, add_level, link_nodes, number_nodes, query, sole_levels, spread
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.world import Goal
 
 _CELL = 0.1  # m; larger where the world would need more than _MAX_CELLS
 _MAX_CELLS = 200_000  # cells in XY
 _YAWS = 8  # layers over half a turn (the box is the same both ways)
-CLIMB = 0.35  # m; largest change of height between neighbouring cells
 _MERGE = 0.3  # m; heights in one cell that differ by less are one
 _TURN = 1e-4  # m; cost of one yaw layer, only there to prefer straight ways
 _OCTILE = 1.0 / 1.0823923  # largest ratio of 8-connected to straight distance, inverted: keeps the estimate low
@@ -47,6 +48,8 @@ class EuclideanDistance:
 class GridDistance:
     """Distance to the goal on a grid with bounds (xmin, ymin, xmax, ymax) m, with steps of at most `stride` m.
 
+    Heights of neighbouring cells differ by `climb` m at most. `footholds` are places on the same surfaces.
+
     Attributes:
         supported: Whether any cell in the goal region has a surface for a sole.
     """
@@ -59,13 +62,15 @@ class GridDistance:
         goal: Goal,
         bounds: tuple[float, float, float, float],
         stride: float,
+        climb: float,
+        footholds: Footholds,
     ):
         self._goal = goal
         extent = np.array(bounds[2:]) - bounds[:2]
         self._cell = cell = max(_CELL, float(np.sqrt(extent.prod() / _MAX_CELLS)))
         shape = np.ceil(extent / cell).astype(np.int64) + 1
         self._corner = np.array(bounds[:2], float)
-        levels = self._levels(projector, shape, stride)
+        levels = self._levels(projector, footholds, shape, stride)
         self._height = levels
         nodes = np.full((*levels.shape, _YAWS), -1, np.int32)
         count = number_nodes(levels, self._corner, cell, occupancy, box, nodes)
@@ -77,7 +82,7 @@ class GridDistance:
         self.supported = bool((levels[inside] > -np.inf).any())
         if len(targets):
             start, none = np.zeros(count + 1, np.int32), np.zeros(0)
-            grid = (nodes, levels, cell, CLIMB, _TURN, start)
+            grid = (nodes, levels, cell, climb, _TURN, start)
             edges = link_nodes(*grid, none.astype(np.int32), none)
             end, weight = np.empty(edges, np.int32), np.empty(edges)
             link_nodes(*grid, end, weight)
@@ -85,7 +90,7 @@ class GridDistance:
             distance = dijkstra(graph, directed=True, indices=targets, min_only=True)
             self._distance[nodes >= 0] = distance[nodes[nodes >= 0]]
 
-    def _levels(self, projector: Projector, shape: np.ndarray, stride: float) -> np.ndarray:
+    def _levels(self, projector: Projector, footholds: Footholds, shape: np.ndarray, stride: float) -> np.ndarray:
         """(nx, ny, 4) float heights of ground in reach of each cell, -inf where there is none."""
         cell = self._cell
         low = np.full((*shape, LEVELS), -np.inf)
@@ -98,6 +103,7 @@ class GridDistance:
             projector.table,
             low,
         )
+        self._add_footholds(projector.table, footholds, low)
         reach = stride / 2 / cell
         k = int(np.floor(reach))
         disc = [(i, j) for i in range(-k, k + 1) for j in range(-k, k + 1) if 0 < i * i + j * j <= reach**2]
@@ -105,6 +111,23 @@ class GridDistance:
         levels = low.copy()
         spread(low, np.array(disc, np.int64).reshape(-1, 2), _MERGE, levels)
         return levels
+
+    def _add_footholds(self, table: SurfaceTable, footholds: Footholds, levels: np.ndarray) -> None:
+        """Add the heights of surfaces that no sole of the grid met, but others fit on: stones, beams."""
+        shape = np.array(levels.shape[:2])
+        upright = np.clip(table.rotation[:, 2, 2], 0.0, 1.0)
+        half = table.radius[:, None] * np.column_stack([np.ones((len(upright), 2)), np.sqrt(1.0 - upright**2)])
+        lower, upper = table.centre - half, table.centre + half
+        first = np.clip(np.floor((lower[:, :2] - self._corner) / self._cell).astype(int), 0, shape)
+        last = np.clip(np.ceil((upper[:, :2] - self._corner) / self._cell).astype(int) + 1, 0, shape)
+        for index in np.flatnonzero(table.foot & (first < last).all(1)).tolist():
+            near = levels[first[index, 0] : last[index, 0], first[index, 1] : last[index, 1]]
+            if ((near > lower[index, 2] - _MERGE) & (near < upper[index, 2] + _MERGE)).any():
+                continue
+            for point in footholds.samples(index, self._cell):
+                i, j = np.floor((point[:2] - self._corner) / self._cell + 0.5).astype(int)
+                if 0 <= i < shape[0] and 0 <= j < shape[1]:
+                    add_level(levels[i, j], point[2], _MERGE)
 
     def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """See `Distance`; at least the straight line."""

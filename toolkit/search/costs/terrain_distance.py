@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from toolkit.centroidal.problem import GRAVITY
+from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projector
 from toolkit.geometry.pose import Pose, steepness
 from toolkit.robot.model import RobotModel
-from toolkit.search.costs.heuristic import CLIMB, GridDistance
+from toolkit.search.costs.heuristic import GridDistance
+from toolkit.search.moves.limits import climb
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.surface import Surface
 from toolkit.world.world import World
@@ -43,8 +45,8 @@ class TerrainDistance:
         occupancy: Cells that the body can hit, around start and goal.
     """
 
-    def __init__(self, robot: RobotModel, world: World, projector: Projector):
-        self._world, self._projector = world, projector
+    def __init__(self, robot: RobotModel, world: World, projector: Projector, footholds: Footholds):
+        self._world, self._projector, self._footholds, self._climb = world, projector, footholds, climb(robot)
         self.box = BodyBox.of(robot)
         table = projector.table
         first, last = table.edge_start[:-1], table.edge_start[1:]
@@ -87,14 +89,15 @@ class TerrainDistance:
 
     def _grid(self, occupancy: Occupancy, stride: float) -> GridDistance:
         bounds = self._bounds[self._detour]
-        return GridDistance(self._projector, occupancy, self.box, self._world.goal, bounds, stride)
+        goal = self._world.goal
+        return GridDistance(self._projector, occupancy, self.box, goal, bounds, stride, self._climb, self._footholds)
 
     @staticmethod
     def _at(grid: GridDistance, start: Pose) -> float:
         return float(grid(start.position[None], np.array([start.yaw]))[0])
 
-    def obstacle(self, start: Pose, stride: float) -> str:
-        """One line on what blocks the way to the goal."""
+    def obstacle(self, start: Pose, stride: float, usual: float) -> str:
+        """One line on what blocks the way to the goal with steps of at most `stride` m; `usual` ones are shorter."""
         world = self._world
         x, y = world.goal.position[:2]
         head = f"{world.path}: nothing leads to the goal at ({x:.3g}, {y:.3g})"
@@ -102,12 +105,12 @@ class TerrainDistance:
         if not grid.supported:
             return f"{head}: no surface within its radius holds a sole; move the goal onto walkable ground"
         open_air = Occupancy(self.occupancy.corner, self.occupancy.cell, np.zeros_like(self.occupancy.below))
-        if np.isfinite(self._at(self._grid(open_air, stride), start)):
+        if np.isfinite(self._at(self._grid(open_air, usual), start)):
             room = f"{2 * self.box.half_width:.2g} m wide and {self.box.top:.2g} m high"
             return f"{head}: walls or a ceiling leave no room for the body ({room}) on any way; make more room"
         return (
             f"{head}: the ground is interrupted by a gap wider than the longest step ({stride:.2g} m) or a rise higher "
-            f"than {CLIMB:.2g} m; bring the surfaces closer together"
+            f"than {self._climb:.2g} m; bring the surfaces closer together"
         )
 
     def too_steep(self, friction: float) -> str:

@@ -17,9 +17,10 @@ from toolkit.contacts.transition_model import TransitionModel
 from toolkit.geometry.heading import mean_heading
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
-from toolkit.physics.leg import ReachMargins
 from toolkit.robot.model import RobotModel
+from toolkit.search.moves.drawn import DrawnSteps
 from toolkit.search.moves.legs import legs_of, stances_violated
+from toolkit.search.moves.limits import MARGINS, climb, drops
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.screen import Body, Sole, Soles, StepLimits, screen_palms, screen_steps, screen_swings
@@ -28,14 +29,10 @@ from toolkit.search.states.contact_table import ContactTable
 
 _KEPT = 20_000  # entries of each memory
 _APART = 0.02  # m; least distance between two soles
-_CLIMB = 0.55  # part of thigh and shin together by which the heights of two soles may differ
-_DROP = 0.25  # part of its height at home by which the CoM may be lower
 _PALM_SIDE = 0.15  # m; least distance of a palm to the side of the body's middle
 _PALM_ANGLE = np.radians(65.0)  # largest angle between the arm and the surface's normal
 _PALM_MARGIN = 0.04  # m inside the arm's reach
 _STILL, _STILL_YAW = 0.04, np.radians(10.0)  # m, rad; a foot that would move less does not move
-MARGINS = ReachMargins(length=0.005, ankle=0.05, hip=-0.1)
-"""Margins of the legs; the hips' is negative, as the base, which the closed form keeps upright, may help them."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +58,7 @@ class MoveGenerator:
         occupancy: Occupied cells of the world.
         box: The body.
         arms: The places where each arm can hold its palm.
+        drawn: Landing places for where the steps lead no farther; None: there are none but those of the steps.
 
     Attributes:
         table: The table in which contacts are entered, empty at first.
@@ -77,11 +75,12 @@ class MoveGenerator:
         occupancy: Occupancy,
         box: BodyBox,
         arms: Mapping[Limb, ArmMap],
+        drawn: DrawnSteps | None = None,
     ):
+        self._drawn = drawn
         self.robot, self.arms, self.table = robot, arms, ContactTable(projector.table.friction)
         self._projector, self._model = projector, model
-        leg = robot.legs[Limb.LEFT_FOOT]
-        self._climb = _CLIMB * (leg.thigh + leg.shin)
+        self._climb = climb(robot)
         self.legs, self.shanks = legs_of(robot, MARGINS), shanks_of(robot)
         self.has_palm_surfaces = bool(projector.table.palm.any())
         self._body = Body(self.legs, self.shanks, box, occupancy)
@@ -89,7 +88,7 @@ class MoveGenerator:
             half=robot.half_sizes[Limb.LEFT_FOOT] + _APART / 2,
             climb=self._climb,
             com_height=robot.com_height,
-            drops=np.linspace(0.0, _DROP, 7) * robot.com_height,
+            drops=drops(robot),
         )
         self._steps: dict[tuple, Moves] = {}
         self._palms: dict[tuple, Moves] = {}
@@ -112,6 +111,11 @@ class MoveGenerator:
         codes = self.screen(limb, soles.surface, soles.position, soles.rotation, pose[:, 2], standing)
         passed = codes == 0
         numbers = table.add(limb, soles.select(passed))
+        drawn = self._drawn
+        if drawn is not None and drawn.wanted(stand, stand_yaw, soles.position[passed], pose[passed, 2]):
+            more, yaws = drawn.beside(limb, stand, stand_yaw)
+            codes = self.screen(limb, more.surface, more.position, more.rotation, yaws, standing)
+            numbers = np.concatenate([numbers, table.add(limb, more.select(codes == 0))])
         return Moves(np.unique(numbers), _count(codes))
 
     def screen(

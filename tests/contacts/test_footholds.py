@@ -1,0 +1,58 @@
+"""Footholds: exact regions for whole soles, on surfaces of any shape."""
+
+import numpy as np
+import pytest
+import shapely
+
+from tests.search.worlds import box, make_world
+from toolkit.contacts.footholds import Footholds
+
+HALF = np.array([0.11, 0.065])
+
+
+def footholds(*geoms, margin=0.01):
+    world = make_world(*geoms)
+    return world, Footholds(world.surfaces, HALF, margin)
+
+
+def covered(world, found, row, tolerance=1e-6):
+    """Whether the whole sole of a row lies on its surface."""
+    surface = world.surfaces[found.surface[row]]
+    corners = np.array([[x, y, 0.0] for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))]) * np.append(HALF, 0.0)
+    local = surface.pose.inverse() @ (found.position[row] + corners @ found.rotation[row].T)
+    return surface.region.buffer(tolerance).covers(shapely.Polygon(local[:, :2]))
+
+
+def test_soles_lie_on_the_surface_as_near_to_the_wish_as_they_can():
+    world, holds = footholds(box([0, 0, -0.05], [0.5, 0.3, 0.05], [8, -12, 30]))
+    wishes = np.random.default_rng(0).uniform(-1.0, 1.0, (60, 2))
+    top = int(np.argmax([surface.normal[2] for surface in world.surfaces]))
+    for yaw in (0.0, 0.4, 2.0):
+        found = holds.nearest(top, yaw, wishes)
+        assert found.found.all()
+        assert all(covered(world, found, row) for row in range(len(wishes)))
+        np.testing.assert_allclose(np.arctan2(*found.rotation[:, 1::-1, 0].T), yaw, atol=1e-9)
+        inside = np.hypot(*(found.position[:, :2] - wishes).T) < 1e-9
+        assert inside.any() and not inside.all()
+
+
+def test_a_stone_as_large_as_a_sole_holds_it_in_its_own_direction_only():
+    turn = 25.0
+    world, holds = footholds(box([0, 0, -0.05], [0.112, 0.067, 0.05], [0, 0, turn]))
+    top = int(np.argmax([surface.normal[2] for surface in world.surfaces]))
+    assert not holds.nearest(top, 0.0, np.zeros((1, 2))).found.any()
+    headings = holds.headings(top, 0.0)
+    assert any(abs(heading - np.radians(turn)) < 1e-6 for heading in headings)
+    found = holds.nearest(top, np.radians(turn), np.array([[0.3, 0.0]]))
+    assert found.found.all() and covered(world, found, 0, 1e-4)
+    np.testing.assert_allclose(found.position[0], 0.0, atol=2e-3)
+    assert len(holds.samples(top, 0.1))
+
+
+@pytest.mark.parametrize("length", [0.4, 1.2])
+def test_samples_leave_no_wide_gaps_on_a_beam(length):
+    world, holds = footholds(box([0, 0, -0.05], [length, 0.08, 0.05], [0, 0, 20]))
+    top = int(np.argmax([surface.normal[2] for surface in world.surfaces]))
+    along = np.sort(holds.samples(top, 0.1)[:, :2] @ [np.cos(np.radians(20)), np.sin(np.radians(20))])
+    assert along[0] < -length + 0.15 and along[-1] > length - 0.15
+    assert np.diff(along).max() < 0.11

@@ -1,0 +1,129 @@
+"""Footholds: the places on a surface at which a whole sole has room, found from the surface itself.
+
+A table of steps meets a small stone, a narrow beam or the far edge of a gap by chance. Here the region in which the
+centre of a sole may lie is computed exactly, for regions that are not convex or have holes too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from toolkit.contacts.projection import Projected
+from toolkit.world.surface import Surface
+
+_SHARES = (1.0, 0.5, 0.05)  # of the margin around a sole, tried in turn: a stone may be hardly larger than a sole
+_KEPT = 20_000  # regions that are remembered
+_TURN = np.radians(50.0)  # largest angle between a heading along a surface's edges and the wanted one
+_SAME = np.radians(3.0)  # headings that differ by less are one
+
+
+class Footholds:
+    """Footholds on the surfaces of a world.
+
+    Args:
+        surfaces: The surfaces.
+        half_size: (2,) m; half extents of the sole.
+        margin: Margin around it that should also lie in the surface, in m; less where there is no room for it.
+    """
+
+    def __init__(self, surfaces: Sequence[Surface], half_size: np.ndarray, margin: float):
+        self._surfaces, self._half, self._margin = surfaces, half_size, margin
+        self._regions: dict[tuple[int, int], shapely.Geometry] = {}
+        self._edges: dict[int, float] = {}
+
+    def headings(self, index: int, yaw: float) -> list[float]:
+        """Headings in rad to try on a surface: the wanted one, and those along and across its longest edge."""
+        turns = (self._longest_edge(index) - yaw + np.pi / 2 * np.arange(4) + np.pi) % (2 * np.pi) - np.pi
+        return [yaw, *(yaw + float(turn) for turn in turns if _SAME < abs(turn) < _TURN)]
+
+    def samples(self, index: int, spacing: float) -> np.ndarray:
+        """(n, 3) m; footholds along the longest edge of a surface and across, no farther apart than `spacing` m."""
+        surface, found = self._surfaces[index], []
+        for heading in self._longest_edge(index) + np.array([0.0, np.pi / 2]):
+            region = self._region(index, _sole_axis(surface.normal, heading))
+            if not region.is_empty:
+                low_u, low_v, high_u, high_v = region.bounds
+                across = np.linspace(low_u, high_u, 2 + int((high_u - low_u) / spacing))
+                upwards = np.linspace(low_v, high_v, 2 + int((high_v - low_v) / spacing))
+                grid = [(u, v) for u in across for v in upwards]
+                lines = shapely.shortest_line(shapely.points(grid), region)
+                found.append(shapely.get_coordinates(shapely.get_point(lines, 1)))
+        flat = np.concatenate(found) if found else np.zeros((0, 2))
+        return surface.pose @ np.column_stack([flat, np.zeros(len(flat))])
+
+    def nearest(self, index: int, yaw: float, wishes: np.ndarray) -> Projected:
+        """The footholds on a surface nearest to wanted places.
+
+        Args:
+            index: The surface.
+            yaw: Heading of the sole in rad.
+            wishes: (n, 2) m; places in the world's XY.
+
+        Returns:
+            n contacts; surface -1 where the surface has no room for the sole in this heading.
+        """
+        surface, found = self._surfaces[index], Projected.none(len(wishes))
+        turn, origin = surface.pose.rotation, surface.pose.position
+        axis = _sole_axis(turn[:, 2], yaw)
+        region = self._region(index, axis)
+        if region.is_empty:
+            return found
+        slope = turn[:2, 2] / turn[2, 2]
+        height = origin[2] - (wishes - origin[:2]) @ slope
+        local = (np.column_stack([wishes, height]) - origin) @ turn
+        lines = shapely.shortest_line(shapely.points(local[:, :2]), region)
+        places = shapely.get_coordinates(shapely.get_point(lines, 1))
+        found.surface[:] = index
+        found.position[:] = origin + places @ turn[:, :2].T
+        found.rotation[:] = np.column_stack([axis, np.cross(turn[:, 2], axis), turn[:, 2]])
+        return found
+
+    def _longest_edge(self, index: int) -> float:
+        """Heading in rad of the longest edge of a surface."""
+        if index not in self._edges:
+            surface = self._surfaces[index]
+            ring = surface.boundary[0]
+            sides = np.roll(ring, -1, axis=0) - ring
+            side = surface.pose.rotation[:, :2] @ sides[np.argmax(np.hypot(*sides.T))]
+            self._edges[index] = float(np.arctan2(side[1], side[0]))
+        return self._edges[index]
+
+    def _region(self, index: int, axis: np.ndarray) -> shapely.Geometry:
+        """Where, in the frame of a surface, the centre of a sole with this x axis may be; prepared for queries."""
+        surface = self._surfaces[index]
+        along = axis @ surface.pose.rotation[:, :2]
+        key = index, round(float(np.arctan2(along[1], along[0])) * 1e4)
+        if key not in self._regions:
+            if len(self._regions) >= _KEPT:
+                self._regions.clear()
+            region = shapely.Polygon()
+            for share in _SHARES:
+                region = _eroded(surface, along, self._half + share * self._margin)
+                if not region.is_empty:
+                    break
+            shapely.prepare(region)
+            self._regions[key] = region
+        return self._regions[key]
+
+
+def _sole_axis(normal: np.ndarray, yaw: float) -> np.ndarray:
+    """(3,) x axis of a sole on a plane with this normal: the heading, projected along the vertical."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    axis = np.array([c * normal[2], s * normal[2], -(c * normal[0] + s * normal[1])])
+    return axis / np.linalg.norm(axis)
+
+
+def _eroded(surface: Surface, along: np.ndarray, half: np.ndarray) -> shapely.Geometry:
+    """The part of a surface in which a rectangle with this x axis (2,) and half extents (2,) m may be centred."""
+    across = np.array([-along[1], along[0]])
+    corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half @ np.stack([along, across])
+    swept = []
+    for ring in surface.boundary:
+        ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)  # (edges, 2, 2)
+        swept.append((ends[:, :, None] + corners).reshape(len(ring), -1, 2))
+    points = np.concatenate(swept)
+    hulls = shapely.convex_hull(shapely.multipoints(points))
+    return shapely.difference(surface.region, shapely.union_all(hulls))

@@ -1,0 +1,26 @@
+"""How far the postures of a search may go: margins of the legs and heights of the CoM."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.geometry.limb import Limb
+from toolkit.physics.leg import ReachMargins
+from toolkit.robot.model import RobotModel
+
+_DROP = 0.25  # part of its height at home by which the CoM may be lower
+MARGINS = ReachMargins(length=0.005, ankle=0.05, hip=-0.1)
+"""Margins of the legs; the hips' is negative, as the base, which the closed form keeps upright, may help them."""
+
+_CLIMB = 0.55  # part of thigh and shin together by which the heights of two soles may differ
+
+
+def climb(robot: RobotModel) -> float:
+    """Largest difference of the heights of two soles in m."""
+    leg = robot.legs[Limb.LEFT_FOOT]
+    return _CLIMB * (leg.thigh + leg.shin)
+
+
+def drops(robot: RobotModel) -> np.ndarray:
+    """(k,) m; heights by which the CoM may be lower than at home."""
+    return np.linspace(0.0, _DROP, 7) * robot.com_height
