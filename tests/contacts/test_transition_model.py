@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toolkit.contacts.transition_model import TransitionModel, palm_rays, steps_38, steps_60, running_steps
+from toolkit.contacts.transition_model import TransitionModel, palm_rays, running_steps, steps_38, steps_60
 from toolkit.geometry.limb import Limb
 from toolkit.robot.loader import load_robot
 
