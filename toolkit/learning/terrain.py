@@ -72,6 +72,27 @@ def level(rng: np.random.Generator, friction: float) -> str:
     return world.render()
 
 
+def ledge(rng: np.random.Generator, friction: float) -> str:
+    """MJCF text of level ground with one step up or down across it."""
+    height = rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.4)
+    world = WorldText("ledge", "a step across level ground", friction, (0.6, 0.8), (1.4, 0.0, height), abyss=-1.0)
+    edge = rng.uniform(0.35, 0.7)
+    world.box("before", (edge + 0.8, 1.6, 1.0), ((edge - 0.8) / 2, 0.0, -0.5))
+    world.box("after", (2.2 - edge, 1.6, 1.0), ((2.2 + edge) / 2, 0.0, height - 0.5))
+    return world.render()
+
+
+def beam(rng: np.random.Generator, friction: float) -> str:
+    """MJCF text of a beam between two platforms, about as wide as one foot or two."""
+    length, width = rng.uniform(0.6, 1.8), rng.uniform(0.17, 0.45)
+    end = 0.35 + length
+    world = WorldText("beam", "a beam between platforms", friction, (0.6, 0.8), (end + 0.4, 0.0, 0.0))
+    world.platform("before", (-0.6, 0.35), 1.2)
+    world.platform("beam", (0.35, end), width)
+    world.platform("after", (end, end + 1.0), 1.2)
+    return world.render()
+
+
 Maker = Callable[[np.random.Generator, CollectConfig, float], str]
 WALLED: dict[str, Maker] = {
     "corridor": lambda rng, config, friction: generators.rubble_corridor(
@@ -100,7 +121,8 @@ OPEN: dict[str, Maker] = {
     "stones": lambda rng, config, friction: generators.stepping_stones(
         rng,
         rows=int(rng.integers(2, 6)),
-        gap=rng.uniform(0.02, 0.1),
+        stone=rng.uniform(0.25, 0.4),
+        gap=rng.uniform(0.02, 0.25),
         tilt=rng.uniform(0.0, 15.0),
         rise=rng.uniform(*config.rise),
         friction=friction,
@@ -108,17 +130,19 @@ OPEN: dict[str, Maker] = {
     "stairs": lambda rng, config, friction: regular.stairs(
         rng,
         steps=int(rng.integers(2, 6)),
-        step_height=rng.choice([-1.0, 1.0]) * rng.uniform(0.04, 0.15),
+        step_height=rng.choice([-1.0, 1.0]) * rng.uniform(0.04, 0.25),
         tread=rng.uniform(0.28, 0.4),
         friction=friction,
     ),
-    "gap": lambda rng, config, friction: regular.gap(rng, width=rng.uniform(0.1, 0.5), friction=friction),
+    "gap": lambda rng, config, friction: regular.gap(rng, width=rng.uniform(0.05, 0.6), friction=friction),
     "slope": lambda rng, config, friction: regular.slope(
         rng,
         length=rng.uniform(0.8, 2.5),
         angle=rng.choice([-1.0, 1.0]) * rng.uniform(3.0, 0.8 * np.degrees(np.arctan(friction))),
         friction=friction,
     ),
+    "ledge": lambda rng, config, friction: ledge(rng, friction),
+    "beam": lambda rng, config, friction: beam(rng, friction),
     "level": lambda rng, config, friction: level(rng, friction),
 }
 """Kinds of worlds without walls in reach."""
