@@ -105,11 +105,9 @@ def _kept(folder: Path) -> dict[str, Any]:
     """
     from toolkit.errors import InputError
     from toolkit.report.files import REPORT
-    from toolkit.report.run_report import read_report
+    from toolkit.report.run_report import report_of
 
-    if not (folder / REPORT).is_file():
-        raise InputError(f"{folder}: holds no {REPORT}, so it is not the folder of a run")
-    report = read_report(folder / REPORT)
+    report = report_of(folder)
     try:
         found = {"seed": cli.seed(str(report.seed)), **cli.kept_options(report.options)}
     except (argparse.ArgumentTypeError, InputError) as error:

@@ -10,12 +10,22 @@ from toolkit.report.console import make_console
 from toolkit.world.timing import Timing
 from validation import goals, options
 from validation.ablation_trial import BEST, BY_TIME, LOCAL, RAW, Effort, ablation_trial
-from validation.cases import kind_of, make_cases
+from validation.cases import make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
 from validation.jobs import Job, Record, run_jobs
 from validation.searched import PLANNERS, completed
-from validation.tables import columns, failure_section, markdown_table, median, number, values, write_results
+from validation.tables import (
+    columns,
+    failure_section,
+    in_unit,
+    markdown_table,
+    median,
+    number,
+    show_results,
+    values,
+    write_results,
+)
 from validation.trial_file import TrialFile
 
 DESCRIPTION = """\
@@ -101,7 +111,7 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
             "-" if row["executed"] is None else f"{row['executed']}/{row['feasible']}",
             *(number(row[name], ".0f") for name in ("true cost", "J", "J, paper's weights", "transitions")),
             number(row["palm_contacts"], ".0f"),
-            number(_ms(row["first_feasible_seconds"]), ".0f"),
+            number(in_unit(row["first_feasible_seconds"], 1e3), ".0f"),
             number(row["seconds of walking"], ".1f"),
             number(row["optimised"], ".0f"),
             number(row["spent"], ".1f"),
@@ -160,10 +170,6 @@ def _kept(records: Sequence[Record]) -> list[dict[str, Any]]:
     ]
 
 
-def _ms(seconds: float | None) -> float | None:
-    return None if seconds is None else 1e3 * seconds
-
-
 def main(argv: list[str] | None = None) -> int:
     """Run the experiment; returns the exit code."""
     parser = options.parser("ablation", DESCRIPTION, KINDS, 50)
@@ -202,8 +208,6 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--execute", action="store_true", help="simulate the chosen plans as well, which takes long")
     parser.epilog = options.GOAL_CODES
     args = parser.parse_args(argv)
-    for kind in args.kinds:
-        kind_of(kind)
     console = make_console()
     settings, first = options.settings_of(args), options.first_seed(args, "ablation")
     effort = Effort(args.optimisations, args.seconds, args.local_search)
@@ -244,7 +248,7 @@ def main(argv: list[str] | None = None) -> int:
         goals=found,
         settings={**settings.described(), **chosen, "trials": args.trials, "seed_offset": first},
     )
-    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
+    show_results(console, path)
     return options.goal_code(found)
 
 

@@ -9,7 +9,7 @@ from toolkit import cli
 from toolkit.errors import PlanningError
 from toolkit.report.console import make_console
 from validation import goals, options
-from validation.cases import Case, kind_of, make_cases
+from validation.cases import Case, make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
 from validation.jobs import Job, Record, run_jobs
@@ -17,7 +17,17 @@ from validation.options import TrialSettings
 from validation.path_bounds import BoundCheck
 from validation.run_trial import robot_of
 from validation.searched import Searched, cheapest, completed, favourite, search, with_expansions
-from validation.tables import failure_section, largest, markdown_table, median, number, values, write_results
+from validation.tables import (
+    failure_section,
+    in_unit,
+    largest,
+    markdown_table,
+    median,
+    number,
+    show_results,
+    values,
+    write_results,
+)
 from validation.trial_file import TrialFile
 from validation.truth import Truth
 
@@ -112,7 +122,7 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
                 for end, form in (("", ".0f"), ("_over_smallest", ".3f"), ("_worst", ".3f"))
             ),
             *(
-                number(None if row[name] is None else 1e3 * row[name], ".0f")
+                number(in_unit(row[name], 1e3), ".0f")
                 for name in ("first_feasible_seconds", "first_feasible_processor_seconds", "heuristic_seconds")
             ),
         )
@@ -135,9 +145,8 @@ def goals_of(rows: Sequence[dict[str, Any]], records: Sequence[Record]) -> list[
     found.append(goals.at_most(text, median(values(bounds, "bound")), BOUND))
     for row in rows:
         if row["budget"] == budgets[-1] and row["kind"] in FIRST_FEASIBLE:
-            seconds = row["first_feasible_seconds"]
             name, limit = f"{row['kind']}: first feasible sequence, median", 1e3 * FIRST_FEASIBLE[row["kind"]]
-            found.append(goals.at_most(name, None if seconds is None else 1e3 * seconds, limit, "ms"))
+            found.append(goals.at_most(name, in_unit(row["first_feasible_seconds"], 1e3), limit, "ms"))
     states = sum(record.get("states", 0) for record in records)
     above = sum(record.get("h_violations", 0) for record in records)
     return [*found, goals.every("states on paths whose h is at most the cost to go", states - above, states)]
@@ -159,8 +168,6 @@ def main(argv: list[str] | None = None) -> int:
     parser.epilog = options.GOAL_CODES
     args = parser.parse_args(argv)
     budgets, args.expansions = sorted(set(args.expansions)), None
-    for kind in args.kinds:
-        kind_of(kind)
     console = make_console()
     settings, first = options.settings_of(args), options.first_seed(args, "budgets")
     cases = make_cases(args.kinds, args.trials, first)
@@ -183,7 +190,7 @@ def main(argv: list[str] | None = None) -> int:
         goals=found,
         settings={**settings.described(), "budgets": budgets, "trials": args.trials, "seed_offset": first},
     )
-    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
+    show_results(console, path)
     return options.goal_code(found)
 
 

@@ -12,7 +12,7 @@ from toolkit.report.console import make_console
 from toolkit.report.files import read_json
 from validation import goals, options
 from validation.calibration_figures import PREDICTORS, world_figures
-from validation.cases import DRAWN, Case, kind_of, make_cases
+from validation.cases import DRAWN, Case, make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
 from validation.jobs import Job, Record, run_jobs
@@ -21,7 +21,17 @@ from validation.options import TrialSettings
 from validation.path_bounds import BoundCheck
 from validation.run_trial import robot_of
 from validation.searched import completed, search, with_expansions
-from validation.tables import columns, failure_section, largest, markdown_table, median, number, write_results
+from validation.tables import (
+    columns,
+    failure_section,
+    in_unit,
+    largest,
+    markdown_table,
+    median,
+    number,
+    show_results,
+    write_results,
+)
 from validation.trial_file import TrialFile
 from validation.truth import Truth
 
@@ -150,7 +160,7 @@ def feasibility_table(rows: Sequence[dict[str, Any]]) -> str:
             _share(row["rejected"], row["judged"]),
             str(row["returned"]),
             _share(row["infeasible"], row["returned"]),
-            number(None if row["com_error"] is None else 100 * row["com_error"], ".2f"),
+            number(in_unit(row["com_error"], 100), ".2f"),
             str(row["states"]),
             str(row["h_violations"]),
             number(row["h_part"], ".3f"),
@@ -175,7 +185,7 @@ def goals_of(rows: Sequence[dict[str, Any]]) -> list[Goal]:
             goals.at_least(f"{name}: J over the prediction", row["line"], LINE[0]),
             goals.at_most(f"{name}: J over the prediction", row["line"], LINE[1]),
             goals.at_most(
-                f"{name}: favourite above the truly best, median", _percent(row["regret"]), 100 * REGRET, "%"
+                f"{name}: favourite above the truly best, median", in_unit(row["regret"], 100), 100 * REGRET, "%"
             ),
         ]
     for name, part, whole, limit in (
@@ -214,10 +224,6 @@ def _kept(records: Sequence[Record]) -> list[dict[str, Any]]:
     return [{"kind": kind, "planner": planner, **columns(rows, COLUMNS)} for (kind, planner), rows in groups.items()]
 
 
-def _percent(share: float | None) -> float | None:
-    return None if share is None else 100 * share
-
-
 def main(argv: list[str] | None = None) -> int:
     """Run the experiment; returns the exit code."""
     parser = options.parser("calibration", DESCRIPTION, KINDS, TRIALS)
@@ -249,8 +255,6 @@ def main(argv: list[str] | None = None) -> int:
     )
     parser.epilog = options.GOAL_CODES
     args = parser.parse_args(argv)
-    for kind in args.kinds:
-        kind_of(kind)
     before = None if args.beside is None else _earlier(Path(args.beside))
     console = make_console()
     settings, first = options.settings_of(args), options.first_seed(args, "calibration")
@@ -295,7 +299,7 @@ def main(argv: list[str] | None = None) -> int:
         settings={**settings.described(), "trials": args.trials, "searches": args.searches}
         | {"more_expansions": args.more_expansions, "seed_offset": first},
     )
-    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
+    show_results(console, path)
     return options.goal_code(found)
 
 

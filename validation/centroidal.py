@@ -11,7 +11,6 @@ import argparse
 import math
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
@@ -29,13 +28,12 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.report.console import make_console, progress_bar
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
-from validation import goals
+from validation import goals, options
 from validation.goals import Goal
 from validation.growth import exponent
-from validation.machine import ROOT
 from validation.random_contacts import SamplingConfig, TransitionSample, sample_transition, sample_walk
 from validation.reference.sequence import solve
-from validation.tables import largest, markdown_table, median, number, write_results
+from validation.tables import largest, markdown_table, median, number, show_results, write_results
 
 SETTINGS = {
     "1 s + 1 s, friction 0.5": SamplingConfig(),
@@ -217,7 +215,7 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m validation.centroidal",
         description="The centroidal solver against Ipopt on the same programs, and whole sequences, on one thread.",
-        epilog=cli.EXIT_CODES,
+        epilog=options.GOAL_CODES,
     )
     parser.add_argument(
         "--trials", type=cli.positive(int), default=50, help="trials per category and setting (default: %(default)s)"
@@ -226,13 +224,7 @@ def main(argv: list[str] | None = None) -> int:
         "--walks", type=cli.positive(int), default=5, help="random walks of each length (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of every random draw (default: %(default)s)")
-    parser.add_argument(
-        "--results",
-        type=Path,
-        default=ROOT / "validation" / "results",
-        metavar="DIR",
-        help="where centroidal.json and centroidal.md go (default: validation/results)",
-    )
+    options.add_results_option(parser, "centroidal")
     cli.add_robot_options(parser)
     args = parser.parse_args(argv)
     robot = load_robot(args.robot, args.robots)
@@ -267,8 +259,8 @@ def main(argv: list[str] | None = None) -> int:
         goals=found,
         settings={"robot": robot.name, "trials": args.trials, "walks": args.walks, "seed": args.seed},
     )
-    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
-    return 1 if any(goal.result == goals.NOT_MET for goal in found) else 0
+    show_results(console, path)
+    return options.goal_code(found)
 
 
 def _transitions(

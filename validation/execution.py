@@ -15,11 +15,13 @@ from validation.jobs import Job, Record, run_jobs
 from validation.run_trial import execution_trial
 from validation.tables import (
     failure_section,
+    in_unit,
     largest,
     markdown_table,
     mean,
     median,
     number,
+    show_results,
     values,
     write_results,
 )
@@ -78,23 +80,19 @@ def summarise(kind: str, records: Sequence[Record]) -> dict[str, Any]:
 
 def table(summaries: Sequence[dict[str, Any]]) -> str:
     """The table in Markdown."""
-
-    def scaled(value: float | None, factor: float, form: str = ".2f") -> str:
-        return number(None if value is None else value * factor, form)
-
     rows = [
         (
             row["kind"],
             *(str(row[name]) for name in ("trials", "planned", "feasible", "wholebody", "arrived", "held", "passed")),
-            scaled(row["max_slip"], 100),
+            number(in_unit(row["max_slip"], 100), ".2f"),
             number(row["max_torque_ratio"], ".2f"),
             number(row["max_velocity_ratio"], ".2f"),
             f"{row['unplanned_contacts']:.0f}",
             "-" if row["palm_force_error"] is None else f"{row['palm_force_error']:.0%} ({row['palm_runs']} runs)",
-            scaled(row["com_rms_error"], 1e3, ".1f"),
+            number(in_unit(row["com_rms_error"], 1e3), ".1f"),
             number(row["real_time_factor"], ".2f"),
-            scaled(row["tick_median"], 1e3),
-            scaled(row["tick_99"], 1e3),
+            number(in_unit(row["tick_median"], 1e3), ".2f"),
+            number(in_unit(row["tick_99"], 1e3), ".2f"),
         )
         for row in summaries
     ]
@@ -127,8 +125,6 @@ def main(argv: list[str] | None = None) -> int:
     parser = options.parser("execution", DESCRIPTION, list(KINDS), 50)
     cli.add_execution_options(parser)
     args = parser.parse_args(argv)
-    for kind in args.kinds:
-        kind_of(kind)
     console = make_console()
     settings = options.settings_of(args)
     cases = make_cases(args.kinds, args.trials, args.seed_offset)
@@ -146,7 +142,7 @@ def main(argv: list[str] | None = None) -> int:
         goals=goals_of(summaries),
         settings={**settings.described(), "trials": args.trials, "seed_offset": args.seed_offset},
     )
-    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
+    show_results(console, path)
     return 0 if all(record["passed"] for record in records) else 1
 
 

@@ -15,7 +15,7 @@ from validation.goals import Goal
 from validation.jobs import Job, Record
 from validation.options import TrialSettings
 from validation.plan_trial import growth_trial
-from validation.tables import largest, markdown_table, median, number, values
+from validation.tables import in_unit, largest, markdown_table, median, number, values
 
 KIND = "rubble_field"
 TILE = 0.4  # m; edge of the generator's tiles
@@ -95,12 +95,9 @@ def table(summary: dict[str, Any], time_limit: float) -> str:
             number(row["way"], ".1f"),
             str(row["trials"]),
             str(row["found"]),
-            *(
-                number(None if row[name] is None else 1e3 * row[name], ".0f")
-                for name in ("first_seconds", "first_processor_seconds")
-            ),
+            *(number(in_unit(row[name], 1e3), ".0f") for name in ("first_seconds", "first_processor_seconds")),
             number(row["first_expansions"], ".0f"),
-            number(None if row["heuristic_seconds"] is None else 1e3 * row["heuristic_seconds"], ".0f"),
+            number(in_unit(row["heuristic_seconds"], 1e3), ".0f"),
             *(
                 number(row[name], ".0f")
                 for name in ("expansions_per_second", "memory_before", "first_memory", "peak_memory")

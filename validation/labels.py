@@ -32,9 +32,8 @@ from toolkit.search.planner_config import PlannerConfig
 from toolkit.world.generators import rubble_corridor, rubble_field, stepping_stones
 from toolkit.world.loader import load_world
 from toolkit.world.world import Goal, World
-from validation import goals
-from validation.machine import ROOT
-from validation.tables import goal_table, markdown_table, number, write_results
+from validation import goals, options
+from validation.tables import markdown_table, number, show_results, write_results
 
 DESCRIPTION = """\
 Measure what a transition's label depends on. Searches with random goals draw sequences in random worlds;
@@ -232,7 +231,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     made = argparse.ArgumentParser(
         prog="python -m validation.labels",
         description=DESCRIPTION,
-        epilog="exit codes: 0 every goal that was checked is met, 1 one is not (see the results), 2 bad input",
+        epilog=options.GOAL_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     cli.add_robot_options(made)
@@ -241,7 +240,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     made.add_argument("--worlds", type=cli.positive(int), default=12, help="random worlds (default: %(default)s)")
     made.add_argument("--prefixes", type=cli.positive(int), default=3, help="of each world (default: %(default)s)")
     made.add_argument("--seed", type=cli.seed, default=1001, help="seed of worlds and searches (default: %(default)s)")
-    made.add_argument("--results", type=Path, default=ROOT / "validation" / "results", help="for the report")
+    options.add_results_option(made, "labels")
     return made.parse_args(argv)
 
 
@@ -296,10 +295,8 @@ def main(argv: list[str] | None = None) -> int:
         goals=wanted,
         settings=settings,
     )
-    for title, text in [("Goals", goal_table(wanted)), *sections]:
-        console.print(f"\n{title}\n{text}", markup=False, highlight=False)
-    console.print(str(path))
-    return int(any(goal.result == goals.NOT_MET for goal in wanted))
+    show_results(console, path)
+    return options.goal_code(wanted)
 
 
 def _percentiles(figures: np.ndarray) -> str:

@@ -13,6 +13,7 @@ from toolkit.execution.config import ExecutionConfig
 from toolkit.pipeline import planner_kind
 from toolkit.prediction.networks import load_networks
 from toolkit.robot.loader import load_robot
+from validation.cases import kind_of
 from validation.fresh_seeds import fresh_seed
 from validation.goals import NOT_MET, Goal
 from validation.jobs import PoolOptions
@@ -53,14 +54,19 @@ def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> 
         metavar="DIR",
         help="trials and the runs of those that failed; trials found there are not run again (default: %(default)s)",
     )
-    made.add_argument(
+    add_results_option(made, module)
+    return made
+
+
+def add_results_option(target: argparse.ArgumentParser, module: str) -> None:
+    """Add `--results`."""
+    target.add_argument(
         "--results",
         type=Path,
         default=ROOT / "validation" / "results",
         metavar="DIR",
         help=f"where {module}.json and {module}.md go (default: validation/results)",
     )
-    return made
 
 
 def count(text: str) -> int:
@@ -117,8 +123,11 @@ def settings_of(args: argparse.Namespace) -> TrialSettings:
     """Settings of the trials.
 
     Raises:
-        InputError: the robot cannot be loaded, or the networks that were asked for are not there.
+        InputError: a kind of world is unknown, the robot cannot be loaded, or the networks that were asked for are not
+            there.
     """
+    for kind in args.kinds:
+        kind_of(kind)
     robot = load_robot(args.robot, args.robots)
     planner = planner_kind(robot, args.planner)
     if planner == "learned":

@@ -13,7 +13,17 @@ from validation.goals import Goal
 from validation.jobs import Job, Record, run_jobs
 from validation.motion_figures import MotionFigures, pooled
 from validation.plan_trial import plan_trial
-from validation.tables import failure_section, markdown_table, mean, median, number, values, write_results
+from validation.tables import (
+    failure_section,
+    in_unit,
+    markdown_table,
+    mean,
+    median,
+    number,
+    show_results,
+    values,
+    write_results,
+)
 from validation.trial_file import TrialFile
 
 DESCRIPTION = """\
@@ -127,18 +137,16 @@ def time_table(rows: Sequence[dict[str, Any]]) -> str:
     lines = []
     for row in rows:
         paper = PAPER_FIRST.get(row["kind"]) if row["planner"] != BASELINE else None
-        scaled = ("first_seconds", "first_processor_seconds", "heuristic_seconds", "heuristic_processor_seconds")
-        first, processor, heuristic, heuristic_processor = (
-            number(None if row[name] is None else 1e3 * row[name], ".0f") for name in scaled
-        )
+        names = ("first_seconds", "first_processor_seconds", "heuristic_seconds", "heuristic_processor_seconds")
+        first, processor, heuristic, heuristic_processor = (number(in_unit(row[name], 1e3), ".0f") for name in names)
         lines.append(
             (
                 row["kind"],
                 row["planner"],
                 first,
                 processor,
-                number(_ms(row["first_optimiser_seconds"]), ".0f"),
-                number(None if paper is None else 1e3 * paper, ".0f"),
+                number(in_unit(row["first_optimiser_seconds"], 1e3), ".0f"),
+                number(in_unit(paper, 1e3), ".0f"),
                 heuristic,
                 heuristic_processor,
                 number(row["expansions_per_second"], ".0f"),
@@ -161,8 +169,8 @@ def goals_of(rows: Sequence[dict[str, Any]]) -> list[Goal]:
         found.append(goals.at_most(f"{kind}: sequences optimised for each feasible one, average", row["tested"], 1.1))
         if kind in FIRST_SEQUENCE:
             name, limit = f"{kind}: time to first feasible sequence, median", 1e3 * FIRST_SEQUENCE[kind]
-            found.append(goals.at_most(name, _ms(row["first_seconds"]), limit, "ms"))
-        found.append(goals.at_most(f"{kind}: heuristic, median", _ms(row["heuristic_seconds"]), 150.0, "ms"))
+            found.append(goals.at_most(name, in_unit(row["first_seconds"], 1e3), limit, "ms"))
+        found.append(goals.at_most(f"{kind}: heuristic, median", in_unit(row["heuristic_seconds"], 1e3), 150.0, "ms"))
     corridor = ours.get("rubble_corridor")
     if corridor is not None:
         found.append(goals.at_least("rubble_corridor: palm contacts, average", corridor["palm_contacts"], 0.5))
@@ -194,10 +202,6 @@ def _comparison(figures: dict[str, float] | None, other: dict[str, float] | None
     return found
 
 
-def _ms(seconds: float | None) -> float | None:
-    return None if seconds is None else 1e3 * seconds
-
-
 def main(argv: list[str] | None = None) -> int:
     """Run the experiment; returns the exit code."""
     parser = options.parser("planning", DESCRIPTION, KINDS, 50)
@@ -207,8 +211,6 @@ def main(argv: list[str] | None = None) -> int:
         "--growth-trials", type=cli.positive(int), default=24, metavar="N", help="trials of each length"
     )
     args = parser.parse_args(argv)
-    for kind in args.kinds:
-        kind_of(kind)
     console = make_console()
     settings = options.settings_of(args)
     planners: list[str] = list(dict.fromkeys([settings.planner, *([] if args.no_baseline else [BASELINE])]))
@@ -244,7 +246,7 @@ def main(argv: list[str] | None = None) -> int:
         goals=[*goals_of(rows), *(growth.goals_of(summary, limit) if growing else [])],
         settings={**settings.described(), "trials": args.trials, "seed_offset": args.seed_offset},
     )
-    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
+    show_results(console, path)
     ours = [record for record, (_, planner) in zip(records, cases, strict=True) if planner == settings.planner]
     return 0 if all(record["passed"] for record in ours) else 1
 

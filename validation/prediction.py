@@ -21,15 +21,14 @@ from toolkit.prediction.networks import load_networks
 from toolkit.report.console import make_console
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
-from validation import goals
+from validation import goals, options
 from validation.encodings import EncodingScore, compare_encodings
 from validation.fresh_seeds import fresh_seed
 from validation.fresh_transitions import DEFAULT, fresh, seed_of, test_sets
 from validation.goals import Goal
-from validation.machine import ROOT
 from validation.score_sets import TAILS, Scores
 from validation.sequence_objective import Relation, draw_relation, relation
-from validation.tables import goal_table, markdown_table, write_results
+from validation.tables import markdown_table, show_results, write_results
 
 DESCRIPTION = """\
 Score the trained networks on transitions that they have not seen, beside the paper's table: at 1 s + 1 s and friction
@@ -152,7 +151,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     made = argparse.ArgumentParser(
         prog="python -m validation.prediction",
         description=DESCRIPTION,
-        epilog="exit codes: 0 every goal that was checked is met, 1 one is not (see the results), 2 bad input",
+        epilog=options.GOAL_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     cli.add_robot_options(made)
@@ -175,7 +174,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     made.add_argument("--encoding-epochs", type=cli.positive(int), default=20)
     made.add_argument("--workers", type=cli.positive(int), default=cli.cores(), help="processes (default: all cores)")
     made.add_argument("--out", type=Path, default=Path("runs") / "validation" / "prediction", help="for collected data")
-    made.add_argument("--results", type=Path, default=ROOT / "validation" / "results", help="for report and plot")
+    options.add_results_option(made, "prediction")
     return made.parse_args(argv)
 
 
@@ -241,10 +240,8 @@ def main(argv: list[str] | None = None) -> int:
         goals=found,
         settings=settings,
     )
-    for title, text in [("Goals", goal_table(found)), *sections]:
-        console.print(f"\n{title}\n{text}", markup=False, highlight=False)
-    console.print(str(path))
-    return int(any(goal.result == goals.NOT_MET for goal in found))
+    show_results(console, path)
+    return options.goal_code(found)
 
 
 def _sets(

@@ -16,12 +16,22 @@ from toolkit.pipeline import PipelineConfig, PipelineResult
 from toolkit.report.console import make_console
 from toolkit.wholebody.plan import WholeBodyPlan
 from validation import goals, options
-from validation.cases import Case, kind_of, make_cases
+from validation.cases import Case, make_cases
 from validation.goals import Goal
 from validation.jobs import Job, Record, run_jobs
 from validation.options import TrialSettings
 from validation.run_trial import held_within, keep_run, run_pipeline
-from validation.tables import failure_counts, largest, markdown_table, mean, number, values, write_results
+from validation.tables import (
+    failure_counts,
+    in_unit,
+    largest,
+    markdown_table,
+    mean,
+    number,
+    show_results,
+    values,
+    write_results,
+)
 from validation.trial_file import TrialFile
 
 DESCRIPTION = """\
@@ -161,8 +171,8 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
                 f"{row['survived']} of {row['trials']}",
                 f"{row['held']} of {row['trials']}",
                 f"{row['passed']} of {row['trials']}",
-                number(None if row["max_slip"] is None else 100 * row["max_slip"], ".1f"),
-                number(None if row["com_rms_error"] is None else 1e3 * row["com_rms_error"], ".1f"),
+                number(in_unit(row["max_slip"], 100), ".1f"),
+                number(in_unit(row["com_rms_error"], 1e3), ".1f"),
                 "; ".join(row["reasons"]),
             )
             for row in rows
@@ -189,8 +199,6 @@ def main(argv: list[str] | None = None) -> int:
         help="multiples of each disturbance to try (default: 1)",
     )
     args = parser.parse_args(argv)
-    for kind in args.kinds:
-        kind_of(kind)
     console = make_console()
     settings = options.settings_of(args)
     names = list(sweep(args.levels))
@@ -212,7 +220,7 @@ def main(argv: list[str] | None = None) -> int:
         goals=goals_of(rows),
         settings={**described, "trials": args.trials, "seed_offset": args.seed_offset},
     )
-    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
+    show_results(console, path)
     return 0 if all(record["passed"] for record in records) else 1
 
 

@@ -8,11 +8,22 @@ from typing import Any
 from toolkit import cli
 from toolkit.report.console import make_console
 from validation import goals, options
-from validation.cases import kind_of, make_cases
+from validation.cases import make_cases
 from validation.goals import Goal
 from validation.jobs import Job, Record, run_jobs
 from validation.scan_trial import ScanSettings, scan_trial
-from validation.tables import failure_section, largest, markdown_table, mean, median, number, values, write_results
+from validation.tables import (
+    failure_section,
+    in_unit,
+    largest,
+    markdown_table,
+    mean,
+    median,
+    number,
+    show_results,
+    values,
+    write_results,
+)
 from validation.trial_file import TrialFile
 
 DESCRIPTION = """\
@@ -71,19 +82,15 @@ def summarise(kind: str, records: Sequence[Record]) -> dict[str, Any]:
 
 def table(summaries: Sequence[dict[str, Any]]) -> str:
     """The table in Markdown."""
-
-    def scaled(value: float | None, factor: float, form: str) -> str:
-        return number(None if value is None else value * factor, form)
-
     rows = [
         (
             row["kind"],
             *(str(row[name]) for name in ("trials", "surfaces", "found", "invented")),
             *(number(row[name], ".2f") for name in ("angle_median", "angle_max")),
-            *(scaled(row[name], 1e3, ".1f") for name in ("offset_median", "offset_max")),
+            *(number(in_unit(row[name], 1e3), ".1f") for name in ("offset_median", "offset_max")),
             *(number(row[name], ".1%") for name in ("share", "explained")),
             *(str(row[name]) for name in ("planned", "passed")),
-            scaled(row["max_slip"], 100, ".2f"),
+            number(in_unit(row["max_slip"], 100), ".2f"),
             number(row["scan_processor_seconds"], ".1f"),
             number(row["triangles"], ".0f"),
         )
@@ -120,8 +127,6 @@ def main(argv: list[str] | None = None) -> int:
     )
     parser.add_argument("--surfaces-only", action="store_true", help="make no plans")
     args = parser.parse_args(argv)
-    for kind in args.kinds:
-        kind_of(kind)
     console = make_console()
     settings = options.settings_of(args)
     scanning = ScanSettings(args.spacing, args.noise, args.holes, not args.surfaces_only)
@@ -141,7 +146,7 @@ def main(argv: list[str] | None = None) -> int:
         goals=goals_of(summaries),
         settings={**settings.described(), **own, "trials": args.trials, "seed_offset": args.seed_offset},
     )
-    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
+    show_results(console, path)
     return 0 if all(record["passed"] for record in records) else 1
 
 

@@ -15,7 +15,7 @@ from toolkit.errors import PlanningError
 from toolkit.report.console import make_console
 from toolkit.world.timing import Timing
 from validation import goals, options
-from validation.cases import DRAWN, Case, kind_of, make_cases
+from validation.cases import DRAWN, Case, make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
 from validation.growth import exponent
@@ -25,7 +25,7 @@ from validation.plan_trial import WarmUp, warm_up
 from validation.random_contacts import sample_walk
 from validation.run_trial import make_planner, robot_of
 from validation.sequence_solvers import Solution, solve
-from validation.tables import failure_section, markdown_table, median, number, write_results
+from validation.tables import failure_section, in_unit, markdown_table, median, number, show_results, write_results
 from validation.trial_file import TrialFile
 
 DESCRIPTION = """\
@@ -183,7 +183,7 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
             number(row["ratio_95"], ".4f"),
             number(row["margins_kept"], ".1%"),
             number(row["iterations"], ".0f"),
-            *(number(None if row[name] is None else 1e3 * row[name], ".3g") for name in ("median", "quantile_95")),
+            *(number(in_unit(row[name], 1e3), ".3g") for name in ("median", "quantile_95")),
             number(row["speed"], ".1f"),
         )
         for row in rows
@@ -219,10 +219,9 @@ def goals_of(rows: Sequence[dict[str, Any]], records: Sequence[Record], fit: flo
     """Never worse than the reference, fast, and linear."""
     whole = rows[-1]
     feasible = whole["reference_feasible"]
-    share = None if whole["same_or_better"] is None else 100 * whole["same_or_better"]
     found = [
         goals.every("feasible where the reference is", feasible - whole["missed"], feasible),
-        goals.at_least("same or better objective", share, 100 * AGREES, "%", 4),
+        goals.at_least("same or better objective", in_unit(whole["same_or_better"], 100), 100 * AGREES, "%", 4),
     ]
     for contacts, limit in LIMITS.items():
         times = [
@@ -230,10 +229,7 @@ def goals_of(rows: Sequence[dict[str, Any]], records: Sequence[Record], fit: flo
             for record in records
             if record["kind"] == GROWTH and record["contacts"] == contacts
         ]
-        seconds = median(times)
-        found.append(
-            goals.at_most(f"{contacts} contacts, median", None if seconds is None else 1e3 * seconds, 1e3 * limit, "ms")
-        )
+        found.append(goals.at_most(f"{contacts} contacts, median", in_unit(median(times), 1e3), 1e3 * limit, "ms"))
     return [*found, goals.at_most("exponent of time over contacts", fit, EXPONENT)]
 
 
@@ -263,8 +259,6 @@ def main(argv: list[str] | None = None) -> int:
     )
     parser.epilog = options.GOAL_CODES
     args = parser.parse_args(argv)
-    for kind in args.kinds:
-        kind_of(kind)
     console = make_console()
     settings, first = options.settings_of(args), options.first_seed(args, "sequences")
     store = TrialFile(args.out / "trials.jsonl", settings.deciding())
@@ -300,7 +294,7 @@ def main(argv: list[str] | None = None) -> int:
         goals=found,
         settings={**settings.described(), "trials": args.trials, "walks": args.walks, "seed_offset": first},
     )
-    console.print(path.read_text(encoding="utf-8"), markup=False, soft_wrap=True)
+    show_results(console, path)
     return options.goal_code(found)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 
 from toolkit.errors import InputError
 from toolkit.report.files import write_json
@@ -34,6 +35,11 @@ def goal_table(goals: Sequence[Goal]) -> str:
 def number(value: float | None, format_spec: str = ".3g") -> str:
     """A number, or "-" where there is none."""
     return "-" if value is None or not np.isfinite(value) else format(value, format_spec)
+
+
+def in_unit(value: float | None, factor: float) -> float | None:
+    """A number in another unit, None where there is none."""
+    return None if value is None else factor * value
 
 
 def values(records: Iterable[Record], *path: str) -> list[float]:
@@ -152,3 +158,9 @@ def write_results(
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); choose another --results") from error
     return path
+
+
+def show_results(console: Console, path: Path) -> None:
+    """Print what `write_results` wrote, and where it lies."""
+    console.print(path.read_text(encoding="utf-8"), markup=False, highlight=False, soft_wrap=True)
+    console.print(str(path), markup=False, soft_wrap=True)

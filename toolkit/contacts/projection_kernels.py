@@ -34,6 +34,12 @@ def sole_axis(table, q, c, s):
 
 
 @compiled
+def in_plane(r, x, y, z):
+    """The two coordinates of a vector (x, y, z) along a surface whose axes are the columns of r."""
+    return r[0, 0] * x + r[1, 0] * y + r[2, 0] * z, r[0, 1] * x + r[1, 1] * y + r[2, 1] * z
+
+
+@compiled
 def cell_of(table, x, y):
     """Index of the cell of the table's grid at (x, y), or -1 outside."""
     i, j = int(np.floor((x - table.corner[0]) / table.cell)), int(np.floor((y - table.corner[1]) / table.cell))
@@ -46,14 +52,14 @@ def sole_fits(table, cell, entry, x, y, c, s, half):
     q = table.entry_surface[entry]
     r, origin, edges = table.rotation[q], table.origin[q], table.edges
     ax, ay, az = sole_axis(table, q, c, s)
-    cx, sx = r[0, 0] * ax + r[1, 0] * ay + r[2, 0] * az, r[0, 1] * ax + r[1, 1] * ay + r[2, 1] * az
+    cx, sx = in_plane(r, ax, ay, az)
     # p and d are taken to the surface frame: the centre, and the way to it from the cell's reference point.
     px, py, pz = x - origin[0], y - origin[1], plane_height(table, q, x, y) - origin[2]
     i, j = cell // table.shape[1], cell % table.shape[1]
     rx, ry = table.corner[0] + (i + 0.5) * table.cell, table.corner[1] + (j + 0.5) * table.cell
     dx, dy, dz = px - rx + origin[0], py - ry + origin[1], pz - plane_height(table, q, rx, ry) + origin[2]
-    u, v = r[0, 0] * px + r[1, 0] * py + r[2, 0] * pz, r[0, 1] * px + r[1, 1] * py + r[2, 1] * pz
-    du, dv = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz, r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
+    u, v = in_plane(r, px, py, pz)
+    du, dv = in_plane(r, dx, dy, dz)
     inside = table.entry_inside[entry]
     for k in range(table.near_start[entry], table.near_start[entry + 1]):
         e = table.near[k]
@@ -130,8 +136,8 @@ def project_palms(shoulder, rays, yaw, reach, half, chosen, table, surface, dist
             az = -ny * s - nx * c
             ax, ay = c + nx * az / (1.0 + nz), s + ny * az / (1.0 + nz)
             px, py, pz = ox + t * dx, oy + t * dy, oz + t * dz
-            u, v = r[0, 0] * px + r[1, 0] * py + r[2, 0] * pz, r[0, 1] * px + r[1, 1] * py + r[2, 1] * pz
-            cx, sx = r[0, 0] * ax + r[1, 0] * ay + r[2, 0] * az, r[0, 1] * ax + r[1, 1] * ay + r[2, 1] * az
+            u, v = in_plane(r, px, py, pz)
+            cx, sx = in_plane(r, ax, ay, az)
             inside = False
             free = True
             for e in range(table.edge_start[q], table.edge_start[q + 1]):

@@ -80,6 +80,11 @@ class ContactSchedule:
         """Length in s."""
         return self.phases[-1].end
 
+    @property
+    def stance_times(self) -> tuple[float, ...]:
+        """(transitions + 1,) s at which each stance is complete: 0, then the end of each swing."""
+        return 0.0, *(phase.end for phase in self.phases if phase.swing is not None)
+
     def phase_at(self, time: float) -> Phase:
         """The phase at a time in s, clamped at the ends."""
         for phase in self.phases:

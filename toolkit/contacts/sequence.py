@@ -61,6 +61,11 @@ class ContactSequence:
         return tuple(stances)
 
     @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """Every contact: those of the start, then what each transition makes."""
+        return *self.start.contacts, *(t.contact for t in self.transitions if t.contact is not None)
+
+    @property
     def identity(self) -> bytes:
         """Bytes that are equal for equal sequences: limbs, places, surfaces and timings, to the last bit."""
         parts = [_bytes_of(contact) for contact in self.start.contacts]

@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 
 from toolkit.geometry.pose import Pose
+from toolkit.geometry.triangles import field_heights, mesh_triangles, mesh_vertices
 from toolkit.report.meshes import mesh_of_geom, static_bodies
 from toolkit.world.scene import WORLD_PREFIX
 
@@ -108,17 +109,12 @@ def _text(values: np.ndarray) -> str:
 def _asset(scene: mujoco.MjModel, kind: str, index: int) -> dict[str, str]:
     """Attributes of a mesh or a height field as text."""
     if kind == "mesh":
-        first, count = int(scene.mesh_vertadr[index]), int(scene.mesh_vertnum[index])
-        vertices = scene.mesh_vert[first : first + count]
-        first, count = int(scene.mesh_faceadr[index]), int(scene.mesh_facenum[index])
-        return {"vertex": _text(vertices), "face": _text(scene.mesh_face[first : first + count])}
-    rows, columns = int(scene.hfield_nrow[index]), int(scene.hfield_ncol[index])
-    first = int(scene.hfield_adr[index])
-    heights = scene.hfield_data[first : first + rows * columns].reshape(rows, columns)
+        return {"vertex": _text(mesh_vertices(scene, index)), "face": _text(mesh_triangles(scene, index))}
+    heights = field_heights(scene, index)
     # MJCF lists the rows of a height field from the top of the map, the compiled model from its bottom.
     return {
-        "nrow": str(rows),
-        "ncol": str(columns),
+        "nrow": str(heights.shape[0]),
+        "ncol": str(heights.shape[1]),
         "size": _text(scene.hfield_size[index]),
         "elevation": _text(heights[::-1]),
     }

@@ -28,7 +28,7 @@ class Recorder:
         count: Number of rows that are filled.
         fall: One line once the robot has fallen; "" before.
         tick_seconds, qpos, qvel, com, momentum, wrench, cop_margin, torque: See `Samples`.
-        com_aim, may_touch: See `Samples`; the loop of the run fills them.
+        com_aim, may_touch: See `Samples`; `expect` fills them.
         normal_force, limb_position, limb_rotation: (C, 4) N, (C, 4, 3) m and (C, 4, 3, 3) world_from_limb.
     """
 
@@ -46,6 +46,11 @@ class Recorder:
         self.limb_rotation = np.full((ticks, 4, 3, 3), np.nan)
         self.torque = np.zeros((ticks, scene.nu))
         self._mass = float(scene.body_subtreemass[index.base])
+
+    def expect(self, com_aim: np.ndarray, may_touch: np.ndarray) -> None:
+        """Note, before a tick, where its CoM (3,) in m is to be, and which limbs (4,) may touch in it."""
+        self.com_aim[self.count] = com_aim
+        self.may_touch[self.count] = self.meter.expected[:] = may_touch
 
     def record(self, data: mujoco.MjData, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Take a sample after the physics step that began in the state (qpos, qvel) and whose contacts were read."""

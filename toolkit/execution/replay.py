@@ -14,6 +14,7 @@ from toolkit.execution.measure import Planned, measure
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution
 from toolkit.execution.scene_index import SceneIndex
+from toolkit.execution.simulation import Simulation
 from toolkit.mjcf import mujoco_warnings
 from toolkit.replanning.replanner import ReplanCounts
 
@@ -53,34 +54,24 @@ def replay_run(execution: Execution, *, observer: Callable[[float], None] = lamb
             f"the run has {len(controls.ctrl)} steps in {ticks} control ticks of {standard.decimation}"
         )
     recorder = Recorder(ticks, scene, standard.robot, index)
-    data = mujoco.MjData(scene)
-    data.qpos[:], data.qvel[:] = controls.qpos0, controls.qvel0
-    qpos, qvel = controls.qpos0.copy(), controls.qvel0.copy()
+    simulation = Simulation(recorder, controls.qpos0, controls.qvel0)
     report_every = max(round(0.1 / standard.period), 1)
-    began, step = perf_counter(), 0
+    began = perf_counter()
     with mujoco_warnings() as warnings:
         for tick in range(ticks):
-            recorder.com_aim[tick] = samples.com_aim[tick]
-            recorder.may_touch[tick] = recorder.meter.expected[:] = samples.may_touch[tick]
-            for part in range(standard.decimation):
-                data.ctrl[:] = controls.ctrl[step]
-                if controls.push is not None:
-                    data.xfrc_applied[index.base, :3] = controls.push[step]
-                step += 1
-                mujoco.mj_step(scene, data)
-                recorder.meter.read(data)
-                if part == 0:
-                    recorder.record(data, qpos, qvel)
-                qpos[:], qvel[:] = data.qpos, data.qvel
+            recorder.expect(samples.com_aim[tick], samples.may_touch[tick])
+            steps = slice(simulation.steps, simulation.steps + standard.decimation)
+            simulation.run_tick(controls.ctrl[steps], None if controls.push is None else controls.push[steps])
             recorder.note_warnings(warnings)
             if recorder.fall:
                 break
             if tick % report_every == 0:
                 observer(tick / ticks)
-    push = None if controls.push is None else controls.push[:step]
+    done = slice(simulation.steps)
+    push = None if controls.push is None else controls.push[done]
     return measure(
         recorder,
-        Controls(controls.timestep, controls.qpos0, controls.qvel0, controls.ctrl[:step], qpos, push),
+        Controls(controls.timestep, controls.qpos0, controls.qvel0, controls.ctrl[done], simulation.qpos, push),
         standard,
         Planned(samples.com_planned, samples.momentum_planned, samples.wrench_planned),
         solver_failures=execution.solver_failures,

@@ -18,6 +18,7 @@ from toolkit.execution.measure import Planned, measure
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution
 from toolkit.execution.scene_index import SceneIndex
+from toolkit.execution.simulation import Simulation
 from toolkit.execution.standard import Standard
 from toolkit.mjcf import mujoco_warnings
 from toolkit.replanning.replanner import MAX_FRICTION, ReplanCounts, Replanner
@@ -73,42 +74,32 @@ def execute(
     recorder = Recorder(ticks, scene, standard.robot, index)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(plan.schedule.duration, rng)
-    data = mujoco.MjData(scene)
-    data.qpos[:], data.qvel[:] = qpos0, qvel0
+    simulation = Simulation(recorder, qpos0, qvel0)
     ctrl = np.zeros((ticks * config.control_decimation, scene.nu))
-    pushes = np.zeros((len(ctrl), 3)) if push.any() else None
-    step = 0
+    pushes = None
+    if push.any():
+        pushed = (push_time <= reference.times) & (reference.times < push_time + config.disturbance.push_duration)
+        pushes = np.repeat(np.where(pushed[:, None], push, 0.0), config.control_decimation, axis=0)
     report_every = max(round(0.1 / period), 1)
-    qpos, qvel = qpos0.copy(), qvel0.copy()
     started = perf_counter()
     with mujoco_warnings() as warnings:
         for tick in range(ticks):
             tick_started = perf_counter()
-            torque = controller.tick(tick, *told(qpos, qvel), recorder.meter.normal_force)
+            torque = controller.tick(tick, *told(simulation.qpos, simulation.qvel), recorder.meter.normal_force)
             recorder.tick_seconds[tick] = perf_counter() - tick_started
-            recorder.com_aim[tick] = controller.aim.com
-            recorder.may_touch[tick] = recorder.meter.expected[:] = reference.authority[tick] > 0.0
-            if pushes is not None:
-                pushed = push_time <= reference.times[tick] < push_time + config.disturbance.push_duration
-                pushes[step : step + config.control_decimation] = push if pushed else 0.0
-            for part in range(config.control_decimation):
-                ctrl[step] = data.ctrl[:] = torque  # in every step, since MuJoCo clears it where a state diverges
-                if pushes is not None:
-                    data.xfrc_applied[index.base, :3] = pushes[step]
-                step += 1
-                mujoco.mj_step(scene, data)
-                recorder.meter.read(data)
-                if part == 0:
-                    recorder.record(data, qpos, qvel)
-                qpos[:], qvel[:] = data.qpos, data.qvel
+            recorder.expect(controller.aim.com, reference.authority[tick] > 0.0)
+            steps = slice(simulation.steps, simulation.steps + config.control_decimation)
+            ctrl[steps] = torque
+            simulation.run_tick(ctrl[steps], None if pushes is None else pushes[steps])
             recorder.note_warnings(warnings)
             if recorder.fall:
                 break
             if observer is not None and tick % report_every == 0:
                 observer(tick / ticks, f"{reference.times[tick]:.1f} s")
+    done = slice(simulation.steps)
     return measure(
         recorder,
-        Controls(config.timestep, qpos0, qvel0, ctrl[:step], qpos, None if pushes is None else pushes[:step]),
+        Controls(config.timestep, qpos0, qvel0, ctrl[done], simulation.qpos, None if pushes is None else pushes[done]),
         standard,
         _planned(reference, float(scene.body_subtreemass[0])),
         solver_failures=controller.failures,

@@ -7,6 +7,7 @@ import numpy as np
 
 from toolkit.errors import ExecutionError
 from toolkit.execution.standard import Subject
+from toolkit.geometry.triangles import mesh_vertices
 from toolkit.robot.model import RobotModel
 
 PATCH_TOLERANCE = 5e-3  # m; a geom belongs to the patch if its lowest point is that near to the patch's plane
@@ -102,9 +103,7 @@ def _lowest(scene: mujoco.MjModel, data: mujoco.MjData, geom: int, site: int) ->
     elif kind == types.mjGEOM_ELLIPSOID:
         reach = np.linalg.norm(local * size)
     elif kind == types.mjGEOM_MESH:
-        mesh = scene.geom_dataid[geom]
-        first = scene.mesh_vertadr[mesh]
-        reach = (scene.mesh_vert[first : first + scene.mesh_vertnum[mesh]] @ local).max()
+        reach = (mesh_vertices(scene, scene.geom_dataid[geom]) @ local).max()
     else:
         return np.inf
     return float((data.site_xpos[site] - data.geom_xpos[geom]) @ down - reach)

@@ -9,7 +9,7 @@ import numpy as np
 from toolkit.control.sampled_plan import Swing
 from toolkit.execution.config import ExecutionConfig
 from toolkit.geometry.limb import Limb
-from toolkit.robot.model import LimbModel, RobotModel
+from toolkit.robot.model import LimbModel, RobotModel, half_sizes_of
 from toolkit.wholebody.plan import WholeBodyPlan
 from toolkit.world.world import Goal
 
@@ -46,10 +46,7 @@ class Subject:
     @property
     def half_sizes(self) -> np.ndarray:
         """Half extents (4, 2) of the patches by limb, m; zeros for a limb that the robot does not have."""
-        sizes = np.zeros((4, 2))
-        for limb, model in self.limbs.items():
-            sizes[limb] = model.half_size
-        return sizes
+        return half_sizes_of(self.limbs)
 
 
 @dataclass(frozen=True)

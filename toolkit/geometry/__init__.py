@@ -1,1 +1,1 @@
-"""Rigid transforms and planar convex polygons; NumPy only."""
+"""Rigid transforms, triangles and the limbs; NumPy only."""

@@ -124,11 +124,6 @@ def shard_path(folder: Path, index: int) -> Path:
     return folder / f"shard-{index:06d}.npz"
 
 
-def shard_index(path: Path) -> int:
-    """Number of the shard in a file."""
-    return int(path.stem.split("-")[1])
-
-
 def write_shard(folder: Path, index: int, samples: dict[Category, Samples]) -> None:
     """Write a shard, whole or not at all."""
     arrays = {f"{part}_{int(category)}": getattr(group, part) for category, group in samples.items() for part in PARTS}

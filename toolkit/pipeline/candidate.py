@@ -23,8 +23,8 @@ class Source(StrEnum):
 
 def refined_solution(plan: MotionPlan, cost: PlanCost, seconds: float) -> Solution:
     """The sequence of an optimised plan as a solution whose prediction is its motion; `seconds` as in `Solution`."""
-    ends = [0.0, *(phase.end for phase in plan.schedule.phases if phase.swing is not None)]
-    com, velocity = (np.array(part) for part in list(zip(*map(plan.motion.sample, ends), strict=True))[:2])
+    samples = map(plan.motion.sample, plan.schedule.stance_times)
+    com, velocity = (np.array(part) for part in list(zip(*samples, strict=True))[:2])
     unknown = np.full(len(plan.sequence.transitions), np.nan)
     return Solution(plan.sequence, cost.total, np.inf, seconds, com, velocity, unknown)
 

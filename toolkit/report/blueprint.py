@@ -7,7 +7,7 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from toolkit.report.motion_scene import TIMELINE
-from toolkit.report.views import best_direction
+from toolkit.report.views import ahead_of, best_direction
 
 
 def blueprint(
@@ -63,9 +63,8 @@ def _curves(entity: str, name: str) -> rrb.TimeSeriesView:
 
 def _eye(model: mujoco.MjModel, way: np.ndarray) -> rrb.EyeControls3D:
     """A camera that sees the whole way, from the side where the world hides least."""
-    ahead = way[-1, :2] - way[0, :2]
-    length = float(np.linalg.norm(ahead))
-    heading = float(np.arctan2(ahead[1], ahead[0])) if length > 0.1 else 0.0
+    ahead, length = ahead_of(way)
+    heading = float(np.arctan2(ahead[1], ahead[0]))
     middle = (way.min(0) + way.max(0)) / 2 + [0.0, 0.0, 0.7]
     distance = 2.3 + 0.75 * length
     seen = np.concatenate([way + [0.0, 0.0, 0.9], way + [0.0, 0.0, 0.1]])

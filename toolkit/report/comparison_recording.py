@@ -21,6 +21,7 @@ from toolkit.report.meshes import static_bodies
 from toolkit.report.motion_scene import TIMELINE, draw_com, draw_motion, frames
 from toolkit.report.saved_run import SavedRun
 from toolkit.report.series import plot, thinned
+from toolkit.report.views import ahead_of
 
 APPLICATION = "comparison of runs"
 RATE = 30.0  # Hz of everything drawn in 3D
@@ -114,10 +115,7 @@ class _Place(NamedTuple):
 
 def _places(executions: Sequence[Execution]) -> list[_Place]:
     """A place for each run, one beside the other at a right angle to the way of the first one."""
-    way = _way(executions[0])
-    ahead = way[-1, :2] - way[0, :2]
-    length = float(np.linalg.norm(ahead))
-    ahead = ahead / length if length > 0.1 else np.array([1.0, 0.0])
+    ahead, _ = ahead_of(_way(executions[0]))
     aside = np.array([ahead[1], -ahead[0]])
     places, end = [], 0.0
     for execution in executions:
@@ -182,9 +180,7 @@ def _blueprint(executions: Sequence[Execution], places: Sequence[_Place]) -> rrb
 
 def _eye(way: np.ndarray, seen: np.ndarray) -> rrb.EyeControls3D:
     """A camera ahead of the first run's way, to its left and above, that sees all of (k, 3) m."""
-    ahead = way[-1, :2] - way[0, :2]
-    length = float(np.linalg.norm(ahead))
-    x, y = ahead / length if length > 0.1 else (1.0, 0.0)
+    (x, y), _ = ahead_of(way)
     middle, size = (seen.min(0) + seen.max(0)) / 2, float(np.linalg.norm(np.ptp(seen[:, :2], axis=0)))
     direction = np.array([0.8 * x - 0.35 * y, 0.8 * y + 0.35 * x, 0.6])
     return rrb.EyeControls3D(

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from toolkit.geometry.triangles import height_field_triangles, mesh_triangles, mesh_vertices
+
 SHOWN_GROUPS = range(3)  # MuJoCo's viewer shows geom groups 0-2; collision-only geoms are usually in group 3
 FLAT_SHADED = 2000  # triangles; a finer mesh is shaded smoothly
 
@@ -74,7 +76,7 @@ def mesh_of_geom(model: mujoco.MjModel, geom: int, *, plane_extent: float = 10.0
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         return _compiled_mesh(model, model.geom_dataid[geom])
     if kind == mujoco.mjtGeom.mjGEOM_HFIELD:
-        return _height_field(model, model.geom_dataid[geom])
+        return _flat_shaded(*height_field_triangles(model, model.geom_dataid[geom]))
     angles = np.linspace(-np.pi / 2, np.pi / 2, 13)
     arc, rise = np.cos(angles), np.sin(angles)
     if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
@@ -154,21 +156,5 @@ def _smooth_shaded(vertices: np.ndarray, triangles: np.ndarray) -> TriangleMesh:
 
 def _compiled_mesh(model: mujoco.MjModel, mesh: int) -> TriangleMesh:
     """A mesh asset as MuJoCo compiled it."""
-    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-    vertices = np.array(model.mesh_vert[first : first + count], float)
-    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    triangles = np.array(model.mesh_face[first : first + count], int)
-    return _flat_shaded(vertices, triangles) if count <= FLAT_SHADED else _smooth_shaded(vertices, triangles)
-
-
-def _height_field(model: mujoco.MjModel, field: int) -> TriangleMesh:
-    """The top of a height field."""
-    rows, columns = model.hfield_nrow[field], model.hfield_ncol[field]
-    half_x, half_y, top, _ = model.hfield_size[field]
-    first = model.hfield_adr[field]
-    z = np.array(model.hfield_data[first : first + rows * columns], float).reshape(rows, columns) * top
-    x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
-    row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
-    a = (row * columns + column).ravel()
-    halves = np.stack([a, a + 1, a + columns + 1], -1), np.stack([a, a + columns + 1, a + columns], -1)
-    return _flat_shaded(np.stack([x, y, z], -1).reshape(-1, 3), np.concatenate(halves))
+    vertices, triangles = mesh_vertices(model, mesh).astype(float), mesh_triangles(model, mesh).astype(int)
+    return _flat_shaded(vertices, triangles) if len(triangles) <= FLAT_SHADED else _smooth_shaded(vertices, triangles)

@@ -98,7 +98,7 @@ def draw_centres(
 ) -> None:
     """Draw the CoM as predicted by the search, as optimised, and as executed, at `rate` Hz."""
     if predicted is not None:
-        times = stance_times(schedule) if schedule is not None else None
+        times = np.array(schedule.stance_times) if schedule is not None else None
         if times is not None and len(times) == len(predicted):
             grid = np.arange(0.0, times[-1] + 1 / rate, 1 / rate)
             moving = np.column_stack([np.interp(grid, times, predicted[:, axis]) for axis in range(3)])
@@ -113,11 +113,6 @@ def draw_centres(
     if execution is not None and len(execution.samples.tick_times):
         rows = frames(execution.samples.tick_times, rate)
         draw_com(stream, "executed", EXECUTED, execution.samples.com[rows], execution.samples.tick_times[rows])
-
-
-def stance_times(schedule: ContactSchedule) -> np.ndarray:
-    """(transitions + 1,) s at which each stance of the schedule is complete: 0, then the end of each swing."""
-    return np.array([0.0, *(phase.end for phase in schedule.phases if phase.swing is not None)])
 
 
 def draw_plan(

@@ -18,8 +18,7 @@ def write_replay_video(path: Path, again: Execution, sequence: ContactSequence) 
     Raises:
         InputError: This machine cannot render, or the file cannot be written.
     """
-    contacts = [*sequence.start.contacts, *(t.contact for t in sequence.transitions if t.contact is not None)]
-    patches = Patches(contacts, again.standard.robot.half_sizes)
+    patches = Patches(sequence.contacts, again.standard.robot.half_sizes)
     with tempfile.TemporaryDirectory(prefix="toolkit-video-") as folder:
         draft = Path(folder) / "video.mp4"
         video(again.scene, again.samples.qpos, again.samples.tick_times, draft, patches=patches)

@@ -86,8 +86,7 @@ def _render(folder: Path, trial: Trial, options: RunOptions) -> None:
     execution, sequence = trial.execution, trial.plan.sequence
     if execution is None or not len(execution.samples.tick_times):
         return
-    contacts = [*sequence.start.contacts, *(t.contact for t in sequence.transitions if t.contact is not None)]
-    patches, samples = Patches(contacts, trial.plan.robot.half_sizes), execution.samples
+    patches, samples = Patches(sequence.contacts, trial.plan.robot.half_sizes), execution.samples
     if options.pictures:
         strip(execution.scene, samples.qpos, samples.tick_times, folder / "strip.png", patches=patches)
     if options.video:

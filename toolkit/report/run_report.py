@@ -17,7 +17,7 @@ from toolkit.execution.check import Check
 from toolkit.execution.result import Execution
 from toolkit.pipeline.candidate import Candidate
 from toolkit.pipeline.loop import PipelineResult
-from toolkit.report.files import check_entries, read_check, read_json, write_json
+from toolkit.report.files import REPORT, check_entries, read_check, read_json, write_json
 from toolkit.world.world import World
 
 SCHEMA = 3
@@ -156,6 +156,17 @@ class RunReport:
 def write_report(path: Path, report: RunReport) -> None:
     """Write report.json; a number that is not finite, such as a failed check's value, becomes null."""
     write_json(path, report.as_dict())
+
+
+def report_of(folder: Path) -> RunReport:
+    """The report in the folder of a run.
+
+    Raises:
+        InputError: The folder has none, or it is broken; see `read_report`.
+    """
+    if not (folder / REPORT).is_file():
+        raise InputError(f"{folder}: holds no {REPORT}, so it is not the folder of a run")
+    return read_report(folder / REPORT)
 
 
 def read_report(path: Path) -> RunReport:

@@ -21,7 +21,7 @@ from toolkit.execution.scene_index import SceneIndex
 from toolkit.execution.standard import Standard
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.report.files import EXECUTION, REPORT, SCENE, digest, read_check
-from toolkit.report.run_report import RunReport, read_report
+from toolkit.report.run_report import RunReport, report_of
 from toolkit.report.standard_entry import read_standard
 
 _AGAIN = "run it again to have a whole one"
@@ -68,9 +68,7 @@ def read_run(folder: Path) -> SavedRun:
     if not folder.is_dir():
         what = "is no folder" if folder.exists() else "no such folder"
         raise InputError(f"{folder}: {what}; name the folder of a run")
-    if not (folder / REPORT).is_file():
-        raise InputError(f"{folder}: holds no {REPORT}, so it is not the folder of a run")
-    report = read_report(folder / REPORT)
+    report = report_of(folder)
     if report.stages["execution"]["simulated_seconds"] is None:
         return SavedRun(folder, report, None)
     for name in (EXECUTION, SCENE):

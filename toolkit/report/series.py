@@ -13,7 +13,7 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.execution.result import Execution
 from toolkit.geometry.limb import Limb
 from toolkit.report.colors import AXES, EXECUTED, LIMB_COLORS, LIMIT, Color
-from toolkit.report.motion_scene import LEAST_FORCE, TIMELINE, at, stance_times
+from toolkit.report.motion_scene import LEAST_FORCE, TIMELINE, at
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 RATE = 100.0  # Hz; to which series are thinned
@@ -123,7 +123,7 @@ def limb_errors(execution: Execution, trajectory: WholeBodyTrajectory) -> dict[L
 def slip_steps(execution: Execution, schedule: ContactSchedule) -> tuple[np.ndarray, np.ndarray]:
     """Slip of k stances: (k + 1,) s with the begin of each and the end of the run; (k + 1,) m, the last one twice."""
     end = float(execution.samples.tick_times[-1])
-    edges = np.clip([*stance_times(schedule), end], 0.0, end)
+    edges = np.clip([*schedule.stance_times, end], 0.0, end)
     count = min(len(execution.slip), len(edges) - 1)
     return edges[: count + 1], np.array([*execution.slip[:count], execution.slip[count - 1]])
 

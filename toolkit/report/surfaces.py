@@ -16,6 +16,7 @@ from rich.text import Text
 from toolkit.drafts import write_whole
 from toolkit.report.colors import FOOT_SURFACE, PALM_SURFACE, START
 from toolkit.report.draw import draw_goal, draw_scene, draw_surfaces, recording
+from toolkit.report.views import ahead_of
 from toolkit.world.world import World
 
 
@@ -92,8 +93,7 @@ def write_surface_recording(
 def _eye(world: World) -> rrb.EyeControls3D:
     """A camera above and to the right of the way from start to goal."""
     start, goal = world.start.position, world.goal.position
-    middle, length = (start + goal) / 2, float(np.linalg.norm((goal - start)[:2]))
-    ahead = (goal - start)[:2] / length if length > 0.1 else np.array([1.0, 0.0])
+    middle, (ahead, length) = (start + goal) / 2, ahead_of(np.array([start, goal]))
     side = np.array([ahead[1], -ahead[0]])
     position = middle + (2.0 + 0.7 * length) * np.array([*(0.7 * side - 0.4 * ahead), 0.7])
     return rrb.EyeControls3D(position=position, look_target=middle, eye_up=(0.0, 0.0, 1.0))

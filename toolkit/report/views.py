@@ -1,4 +1,4 @@
-"""The side of the camera from which the world hides least."""
+"""Where a camera stands: beside the way that a robot goes, and on the side from which the world hides least."""
 
 from __future__ import annotations
 
@@ -8,6 +8,16 @@ import numpy as np
 from toolkit.report.meshes import SHOWN_GROUPS, static_bodies
 
 ANGLES = (65.0, 110.0, 150.0, 25.0)  # degrees from the heading to the camera, by preference; on either side
+
+
+def ahead_of(way: np.ndarray) -> tuple[np.ndarray, float]:
+    """Unit vector (2,) from the first to the last point of a way (k, 3) m seen from above, and their distance in m.
+
+    The vector is along x where the way ends where it began.
+    """
+    ahead = way[-1, :2] - way[0, :2]
+    length = float(np.linalg.norm(ahead))
+    return (ahead / length if length > 0.1 else np.array([1.0, 0.0])), length
 
 
 def best_direction(

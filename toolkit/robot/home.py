@@ -8,6 +8,7 @@ import numpy as np
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import Pose, yaw_of
+from toolkit.geometry.triangles import mesh_vertices
 from toolkit.robot.assemble import Assembly
 from toolkit.robot.description import RobotDescription, match_joints
 
@@ -159,9 +160,7 @@ def _check_lowest(description: RobotDescription, model: mujoco.MjModel, data: mu
         centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
         points = centre + half * (np.stack(np.meshgrid(*[[-1, 1]] * 3), -1).reshape(-1, 3))
         if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
-            mesh = model.geom_dataid[geom]
-            first = model.mesh_vertadr[mesh]
-            points = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
+            points = mesh_vertices(model, model.geom_dataid[geom])
         lowest = float((points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])[:, 2].min())
         if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_BOX:
             lowest = max(lowest, float(data.geom_xpos[geom][2] - model.geom_rbound[geom]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -71,6 +71,14 @@ class ArmGeometry:
     max_reach: float
 
 
+def half_sizes_of(limbs: Mapping[Limb, LimbModel]) -> np.ndarray:
+    """Half extents (4, 2) float of patches by limb, m; zeros for a limb that is not there."""
+    sizes = np.zeros((4, 2))
+    for limb, model in limbs.items():
+        sizes[limb] = model.half_size
+    return sizes
+
+
 @dataclass(frozen=True)
 class RobotModel:
     """A robot, loaded and checked. Joint arrays are in MuJoCo's order of the robot compiled alone (`joint_names`).
@@ -124,10 +132,7 @@ class RobotModel:
     @property
     def half_sizes(self) -> np.ndarray:
         """Half extents (4, 2) float of the patches by limb, m; zeros for a limb that the robot does not have."""
-        sizes = np.zeros((4, 2))
-        for limb, model in self.limbs.items():
-            sizes[limb] = model.half_size
-        return sizes
+        return half_sizes_of(self.limbs)
 
     def joints_to(self, limb: Limb) -> np.ndarray:
         """Indices (k,) int into `joint_names` of the joints from the base to a limb, in order."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import imageio.v3
 import numpy as np
 
+from toolkit.geometry.triangles import grid_triangles
 from toolkit.scanning.samples import Scan
 
 _MOST_HEIGHTS = 1_000_000
@@ -46,9 +47,7 @@ class Heights:
         dx, dy = (cell, cell) if cell is not None else self.cell or (1.0, 1.0)
         x, y = np.meshgrid(dx * np.arange(columns), dy * np.arange(rows))
         vertices = np.column_stack([x.ravel(), y.ravel(), scale * values.ravel()])
-        corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-        right, up, across = corner + 1, corner + columns, corner + columns + 1
-        return Scan(vertices, np.column_stack([corner, right, across, corner, across, up]).reshape(-1, 3))
+        return Scan(vertices, grid_triangles(rows, columns))
 
 
 def npy_heights(path: Path) -> Heights:

@@ -102,8 +102,7 @@ class SequenceScreen:
     def reach_codes(self, plan: MotionPlan) -> np.ndarray:
         """(transitions,) int; the `Reason` why limbs do not reach in the motion of a plan, 0 where they do."""
         sequence, numbers = plan.sequence, self.numbers(plan.sequence)
-        ends = [0.0, *(phase.end for phase in plan.schedule.phases if phase.swing is not None)]
-        samples = [plan.motion.sample(time) for time in ends]
+        samples = [plan.motion.sample(time) for time in plan.schedule.stance_times]
         codes = []
         for index, transition in enumerate(sequence.transitions):
             (com, velocity, _), (end, end_velocity, _) = samples[index : index + 2]

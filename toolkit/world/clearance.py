@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from toolkit.geometry.triangles import field_heights, mesh_vertices
 from toolkit.world.world import World
 
 _FAR = (0.0, 0.0, 1e4)  # m; unused boxes are put there
@@ -76,20 +77,18 @@ def free_boxes(world: mujoco.MjModel, batch: int) -> mujoco.MjSpec:
         geom.quat = quat
         source = int(world.geom_dataid[index])
         if world.geom_type[index] == mujoco.mjtGeom.mjGEOM_MESH:
-            first, count = int(world.mesh_vertadr[source]), int(world.mesh_vertnum[source])
             if spec.mesh(f"mesh{source}") is None:
-                spec.add_mesh(name=f"mesh{source}", uservert=world.mesh_vert[first : first + count].ravel())
+                spec.add_mesh(name=f"mesh{source}", uservert=mesh_vertices(world, source).ravel())
             geom.meshname = f"mesh{source}"
         elif world.geom_type[index] == mujoco.mjtGeom.mjGEOM_HFIELD:
-            rows, columns = int(world.hfield_nrow[source]), int(world.hfield_ncol[source])
-            first = int(world.hfield_adr[source])
+            heights = field_heights(world, source)
             if spec.hfield(f"field{source}") is None:
                 spec.add_hfield(
                     name=f"field{source}",
-                    nrow=rows,
-                    ncol=columns,
+                    nrow=heights.shape[0],
+                    ncol=heights.shape[1],
                     size=world.hfield_size[source],
-                    userdata=world.hfield_data[first : first + rows * columns],
+                    userdata=heights.ravel(),
                 )
             geom.hfieldname = f"field{source}"
         else:

@@ -11,9 +11,10 @@ import trimesh
 from shapely.geometry import Polygon
 
 from toolkit.geometry.pose import Pose
+from toolkit.geometry.triangles import height_field_triangles
 from toolkit.world.decomposition import FACET_ANGLE, FACET_DISTANCE
 from toolkit.world.facets import find_facets
-from toolkit.world.solids import height_field_triangles, plane_rectangle
+from toolkit.world.solids import plane_rectangle
 from toolkit.world.source import Source, mesh_of_geom
 
 _CAP_SIDES = 64  # corners of a cylinder's cap; they lie on the circle

@@ -13,6 +13,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from toolkit.geometry.pose import Pose
+from toolkit.geometry.triangles import height_field_triangles, mesh_vertices
 
 _WIDE = 100.0  # m; width and depth of the half space under a plane beyond the square
 _SIDES = 48  # sides of a prism that replaces a cylinder
@@ -166,9 +167,7 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
         ball = _ball() * size[0]
         return [_hull(np.concatenate([ball + [0, 0, size[1]], ball - [0, 0, size[1]]]))]
     if kind == types.mjGEOM_MESH:
-        mesh = int(model.geom_dataid[index])
-        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-        return [_hull(model.mesh_vert[first : first + count].astype(float))]
+        return [_hull(mesh_vertices(model, int(model.geom_dataid[index])).astype(float))]
     if kind == types.mjGEOM_HFIELD:
         points, triangles = height_field_triangles(model, int(model.geom_dataid[index]))
         top = points[triangles]
@@ -202,16 +201,3 @@ _CUBE = np.array([[x, y, z] for z in (-1.0, 1.0) for x, y in ((-1, -1), (1, -1),
 _CUBE_EDGES = np.array([[i, (i + 1) % 4] for i in range(4)] * 2 + [[i, i + 4] for i in range(4)])
 _CUBE_EDGES[4:8] += 4
 _PRISM_EDGES = np.array([[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]])
-
-
-def height_field_triangles(model: mujoco.MjModel, field: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points (r * c, 3) and upward triangles (k, 3) of a height field in its geom's frame, split as MuJoCo does."""
-    rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
-    half_x, half_y, top, _ = model.hfield_size[field]
-    first = int(model.hfield_adr[field])
-    height = model.hfield_data[first : first + rows * columns].astype(float) * top
-    y, x = np.meshgrid(np.linspace(-half_y, half_y, rows), np.linspace(-half_x, half_x, columns), indexing="ij")
-    points = np.column_stack([x.ravel(), y.ravel(), height])
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    right, up, across = corner + 1, corner + columns, corner + columns + 1
-    return points, np.column_stack([corner, right, across, corner, across, up]).reshape(-1, 3)

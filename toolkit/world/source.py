@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from toolkit.errors import InputError, WorldError
+from toolkit.geometry.triangles import mesh_triangles, mesh_vertices
 from toolkit.mjcf import SIZES, compile_spec, one_line, read_spec
 from toolkit.world.decomposition import Decomposition, decompose_mesh
 from toolkit.world.facets import Facet
@@ -172,11 +173,9 @@ def _decompositions(
 def mesh_of_geom(model: mujoco.MjModel, data: mujoco.MjData, index: int) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) in the world frame and triangles (k, 3) of a mesh geom."""
     mesh = int(model.geom_dataid[index])
-    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-    vertices = model.mesh_vert[first : first + count].astype(float)
-    first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    vertices = mesh_vertices(model, mesh).astype(float)
     rotation, position = data.geom_xmat[index].reshape(3, 3), data.geom_xpos[index]
-    return vertices @ rotation.T + position, model.mesh_face[first : first + count].copy()
+    return vertices @ rotation.T + position, mesh_triangles(model, mesh).copy()
 
 
 def _normalise(geom, model: mujoco.MjModel, index: int, collides: bool) -> None:

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from toolkit.geometry.pose import Pose
-from toolkit.world.solids import height_field_triangles
+from toolkit.geometry.triangles import height_field_triangles, mesh_triangles, mesh_vertices
 
 _SIDES = 16  # sides of a prism around a cylinder
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
@@ -40,10 +40,7 @@ def _local(model: mujoco.MjModel, index: int) -> np.ndarray:
     kind, size, types = model.geom_type[index], model.geom_size[index], mujoco.mjtGeom
     if kind == types.mjGEOM_MESH:
         mesh = int(model.geom_dataid[index])
-        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-        face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
-        vertices = model.mesh_vert[first : first + count].astype(float)
-        return vertices[model.mesh_face[face : face + faces]]
+        return mesh_vertices(model, mesh).astype(float)[mesh_triangles(model, mesh)]
     if kind == types.mjGEOM_HFIELD:
         points, faces = height_field_triangles(model, int(model.geom_dataid[index]))
         return points[faces]
