@@ -198,3 +198,34 @@ def test_a_finished_search_leaves_nothing_behind():
         assert [reference() for reference in gone] == [None, None]
     finally:
         gc.enable()
+
+
+def test_an_assumed_cost_that_is_far_too_low_grows_until_something_is_found():
+    """Two arms of a comb: many cheap dead ends near the start, and one way that costs far more than was assumed."""
+
+    class Comb:
+        def start(self):
+            return (0, 0)
+
+        def expand(self, state, slack):
+            x, y = state
+            ahead = [Edge((x + 1, 0), 10.0)] if y == 0 else []
+            return [*ahead, *(Edge((x, y + k), 0.01) for k in (1, 2, 3) if y < 400)]
+
+        def heuristic(self, states):
+            return np.array([0.1 * (60 - x) for x, _ in states])
+
+        def is_goal(self, states):
+            return np.array([x == 60 for x, _ in states])
+
+        def crowd(self, states):
+            return [0] * len(states)
+
+    def search(patience):
+        config = AnaStarConfig(
+            epsilon=0.0, initial_cost=20.0, crowding=0.0, patience=patience, max_expansions=3000, first_only=True
+        )
+        return AnaStar(Comb(), np.random.default_rng(0), config).run()
+
+    assert not search(10_000).paths
+    assert search(100).paths

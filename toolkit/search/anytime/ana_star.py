@@ -44,7 +44,8 @@ class AnaStarConfig:
         layer: Width of the intervals of h, in units. A random draw takes the best state of a random interval; inf: any
             state.
         initial_cost: Stands for G before there is a solution, for the order of expansion only; nothing is pruned by it.
-            inf expands the least h (depth first, fastest); a smaller value weighs the cost so far as well.
+            inf expands the least h (depth first, fastest); a smaller value weighs the cost so far as well. It doubles
+            as often as `patience` expansions, and then twice as many each time, have found no solution.
         crowding: Added to h for the order of expansion, in units, per state already expanded in the same crowd. While
             there is no solution it grows by the same amount with every `patience` expansions.
         patience: See `crowding`.
@@ -107,6 +108,7 @@ class AnaStar(Generic[State]):
         self._problem, self._rng, self._judge = problem, rng, judge
         self._config = config or AnaStarConfig()
         self._best = math.inf  # G
+        self._assumed, self._doubled_at = self._config.initial_cost, self._config.patience
         self._index: dict[State, int] = {}
         self._edge: list[Edge[State]] = []  # by which each node was reached
         self._g: list[float] = []
@@ -151,6 +153,9 @@ class AnaStar(Generic[State]):
                 stopped_by = "memory"
             if stopped_by != "exhausted":
                 break
+            if not paths and len(expanded) >= self._doubled_at and self._assumed < math.inf:
+                self._assumed, self._doubled_at = 2.0 * self._assumed, 2 * self._doubled_at
+                self._prune()
             node = self._next()
             goals = self._expand(node)
             if goals is None:
@@ -218,7 +223,7 @@ class AnaStar(Generic[State]):
         g, h = self._g[node], self._h[node] + self._edge[node].delay
         if self._config.crowding > 0:
             h += self._crowding * self._config.unit * self._expanded_in.get(self._crowd[node], 0)
-        target = self._best if self._best < math.inf else self._config.initial_cost
+        target = self._best if self._best < math.inf else self._assumed
         if target == math.inf:
             return h
         margin = target - g
