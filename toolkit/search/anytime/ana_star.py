@@ -108,6 +108,7 @@ class AnaStar(Generic[State]):
         self._problem, self._rng, self._judge = problem, rng, judge
         self._config = config or AnaStarConfig()
         self._best = math.inf  # G
+        self._missing = 0.0  # cost that the judge added to the last edge to a goal out of the same state
         self._assumed, self._doubled_at = self._config.initial_cost, self._config.patience
         self._index: dict[State, int] = {}
         self._edge: list[Edge[State]] = []  # by which each node was reached
@@ -167,6 +168,7 @@ class AnaStar(Generic[State]):
             self._expanded_in[crowd] = self._expanded_in.get(crowd, 0) + 1
             if not paths:
                 self._crowding = config.crowding * (1.0 + len(expanded) / config.patience)
+            self._missing = 0.0
             for edge in sorted(goals, key=lambda goal: goal.cost):
                 path = self._reach(node, edge, began, len(expanded))
                 if path is not None:
@@ -256,8 +258,12 @@ class AnaStar(Generic[State]):
         self._g[node] = math.inf  # other ways to it may be longer
 
     def _reach(self, node: int, edge: Edge[State], began: float, expansions: int) -> Path[State] | None:
-        """Take an edge to a goal if it improves on the best solution and the judge agrees."""
-        if not self._g[node] + edge.cost < self._best:
+        """Take an edge to a goal if it improves on the best solution and the judge agrees.
+
+        Edges to goals out of one state are judged in the order of their costs. What the judge added to the one before
+        is assumed to be missing in the next one too.
+        """
+        if not self._g[node] + edge.cost + self._missing < self._best:
             return None
         states, payloads, cost = self._trail(node)
         if self._judge is not None:
@@ -272,6 +278,7 @@ class AnaStar(Generic[State]):
                 self._forbidden.add(key)
                 self._refuse(node, edge)
                 return None
+            self._missing = max(judged.cost - edge.cost, 0.0)
             edge = judged
         cost += edge.cost
         if not cost < self._best:
