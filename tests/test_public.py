@@ -42,7 +42,8 @@ LATE = (
 
 
 def test_the_pipeline_and_the_worlds_import_nothing_that_a_function_can_import_when_it_is_called():
-    code = f"import sys, toolkit.pipeline, toolkit.world.loader; print([name for name in {LATE!r} if name in sys.modules])"
+    late = f"[name for name in {LATE!r} if name in sys.modules]"
+    code = f"import sys, toolkit.pipeline, toolkit.world.loader; print({late})"
     run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
 
