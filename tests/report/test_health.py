@@ -9,7 +9,15 @@ import pytest
 from toolkit import doctor
 from toolkit.pipeline import Observer
 from toolkit.report import health
-from toolkit.report.health import State, check_cache, check_packages, check_renderers, check_robots, check_walk
+from toolkit.report.health import (
+    State,
+    check_cache,
+    check_kernels,
+    check_packages,
+    check_renderers,
+    check_robots,
+    check_walk,
+)
 from toolkit.robot.loader import default_robot, load_robot
 
 
