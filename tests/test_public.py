@@ -34,6 +34,29 @@ def test_the_package_itself_imports_nothing_heavy():
     assert run.stdout.strip() == "[]"
 
 
+LATE = (
+    *("casadi", "contourpy", "imageio", "matplotlib", "networkx", "pandas", "pinocchio", "placo", "rerun", "rich"),
+    *("scipy.optimize", "scipy.sparse", "scipy.spatial", "scipy.special", "scipy.stats", "torch", "trimesh"),
+)
+"""What the pipeline and the reader of worlds leave to the functions that need it."""
+
+
+def test_the_pipeline_and_the_worlds_import_nothing_that_a_function_can_import_when_it_is_called():
+    late = f"[name for name in {LATE!r} if name in sys.modules]"
+    code = f"import sys, toolkit.pipeline, toolkit.world.loader; print({late})"
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
+
+
+def test_the_options_of_a_command_are_read_before_anything_heavy_is_imported():
+    code = (
+        "import sys, toolkit.validate as command; command.arguments(); "
+        "print([m for m in ('numpy', 'mujoco', 'numba', 'multiprocessing') if m in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
+
+
 def test_the_package_says_that_it_is_typed():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
     assert settings["tool"]["setuptools"]["package-data"]["toolkit"] == ["py.typed"]

@@ -42,6 +42,7 @@ def main(argv: list[str] | None = None) -> int:
     from toolkit.report.health import (
         State,
         check_cache,
+        check_kernels,
         check_packages,
         check_renderers,
         check_robots,
@@ -53,7 +54,9 @@ def main(argv: list[str] | None = None) -> int:
     table = Table("what", "", "", box=box.SIMPLE, pad_edge=False, show_header=False)
     with console.status("looking at packages, robots and renderers"):
         findings = list(
-            itertools.chain(check_packages(), check_robots(args.robots), [check_cache()], check_renderers())
+            itertools.chain(
+                check_packages(), check_robots(args.robots), [check_cache()], check_kernels(), check_renderers()
+            )
         )
     if not args.quick:
         findings.append(check_walk(args.robot, args.robots, StageConsole(console)))

@@ -46,6 +46,20 @@ def end_when_stopped() -> None:
             signal.signal(number, stop)
 
 
+def end_with_parent() -> None:
+    """Let this process of a pool end as soon as the one that started it does, even if that is killed."""
+    from multiprocessing import parent_process  # here, since every command imports this module
+
+    parent = parent_process()
+    if parent is not None:
+
+        def watch() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=watch, daemon=True).start()
+
+
 @contextmanager
 def undisturbed() -> Iterator[None]:
     """Hold signals back while a short block runs; they take effect after it."""

@@ -42,6 +42,7 @@ def main(argv: list[str] | None = None) -> int:
     args = arguments().parse_args(argv)
     # Heavy imports come after the options, so that --help and mistakes in them answer at once.
     from toolkit.pipeline import PipelineConfig, make_planner, run
+    from toolkit.pipeline.warmup import warm_up
     from toolkit.report.console import StageConsole, sequence_table
     from toolkit.report.files import RunFolder
     from toolkit.report.run import RunOptions, write_run
@@ -51,9 +52,10 @@ def main(argv: list[str] | None = None) -> int:
     began, options = time.perf_counter(), cli.PlanningOptions.of(args)
     display = StageConsole()
     display.started("surfaces")
-    world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
-    surface_seconds = time.perf_counter() - began
-    robot = load_robot(args.robot, args.robots)
+    with warm_up(display):
+        world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
+        surface_seconds = time.perf_counter() - began
+        robot = load_robot(args.robot, args.robots)
     with RunFolder(args.out, world.name, robot.name) as folder:  # one that cannot be written is noticed here
         display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
         planner = make_planner(robot, world, options.planner, options.planner_config())

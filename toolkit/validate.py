@@ -48,6 +48,7 @@ def main(argv: list[str] | None = None) -> int:
     args = arguments().parse_args(argv)
     # Heavy imports come after the options, so that --help and mistakes in them answer at once.
     from toolkit.pipeline import PipelineConfig, make_planner, run
+    from toolkit.pipeline.warmup import warm_up
     from toolkit.report.console import StageConsole
     from toolkit.report.files import RunFolder
     from toolkit.report.offscreen import require_rendering
@@ -59,9 +60,10 @@ def main(argv: list[str] | None = None) -> int:
     display = StageConsole()
     options, execution = cli.PlanningOptions.of(args), cli.execution_config(args)
     display.started("surfaces")
-    world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
-    surface_seconds = time.perf_counter() - began
-    robot = load_robot(args.robot, args.robots)
+    with warm_up(display, execution):
+        world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
+        surface_seconds = time.perf_counter() - began
+        robot = load_robot(args.robot, args.robots)
     with RunFolder(args.out, world.name, robot.name) as folder:  # one that cannot be written is noticed here
         if args.pictures or args.video:
             require_rendering()

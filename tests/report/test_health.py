@@ -9,7 +9,15 @@ import pytest
 from toolkit import doctor
 from toolkit.pipeline import Observer
 from toolkit.report import health
-from toolkit.report.health import State, check_cache, check_packages, check_renderers, check_robots, check_walk
+from toolkit.report.health import (
+    State,
+    check_cache,
+    check_kernels,
+    check_packages,
+    check_renderers,
+    check_robots,
+    check_walk,
+)
 from toolkit.robot.loader import default_robot, load_robot
 
 
@@ -57,6 +65,17 @@ def test_the_folder_of_kernels(monkeypatch):
     assert check_cache().state is State.GOOD and Path(check_cache().detail).is_dir()
     monkeypatch.setattr(health, "kept_folder", lambda: None)
     assert check_cache().state is State.NOTE and "NUMBA_CACHE_DIR" in check_cache().detail
+
+
+def test_kernels_that_are_not_compiled_yet_are_a_note(monkeypatch):
+    known = health.listed()
+    monkeypatch.setattr(health, "lacking", lambda *, disturbed: [])
+    assert [finding.state for finding in check_kernels()] == [State.GOOD]
+    monkeypatch.setattr(health, "lacking", lambda *, disturbed: known[:2])
+    (finding,) = check_kernels()
+    assert finding.state is State.NOTE and finding.detail.startswith(f"{len(known) - 2} of {len(known)} are compiled;")
+    monkeypatch.setattr(health, "kept_folder", lambda: None)
+    assert list(check_kernels()) == []
 
 
 def test_renderers_that_do_not_work_are_notes(monkeypatch):

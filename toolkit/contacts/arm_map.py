@@ -9,15 +9,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-from scipy.spatial import cKDTree
-from scipy.stats import qmc
 
 from toolkit.geometry.limb import Limb
 from toolkit.robot.chain import arm_joints
 from toolkit.robot.model import RobotModel
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 SAMPLES = 2**17  # joint angles of a map
 MARGIN = 0.15  # rad; distance from both ends of each joint's range, at most a fifth of the range
@@ -41,6 +43,8 @@ class ArmMap:
     @staticmethod
     def of(robot: RobotModel, limb: Limb) -> ArmMap:
         """Map of one arm. The other joints stay at home, and the angles are the same every time (a Sobol sequence)."""
+        from scipy.stats import qmc  # here, since it takes long to import
+
         model = robot.mujoco_model
         data = mujoco.MjData(model)
         data.qpos[:] = robot.home
@@ -83,6 +87,8 @@ class ArmMap:
 
     @cached_property
     def _tree(self) -> cKDTree:
+        from scipy.spatial import cKDTree
+
         return cKDTree(self._scaled(self.positions, self.normals))
 
     def _scaled(self, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:

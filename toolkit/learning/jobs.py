@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -15,10 +13,11 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from typing import TypeVar
 
 from toolkit.errors import WorkerError
+from toolkit.interruption import end_with_parent
 from toolkit.learning.cluster import cluster_executor
 
 Result = TypeVar("Result")
@@ -40,20 +39,8 @@ def executor(workers: int, cluster: str | None = None, *, unencrypted: bool = Fa
         with cluster_executor(cluster, unencrypted=unencrypted) as pool:
             yield pool
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=end_with_parent) as pool:
         yield pool
-
-
-def _end_with_parent() -> None:
-    """Let this process end as soon as the one that started it does, even if that is killed."""
-    parent = parent_process()
-    if parent is not None:
-
-        def watch() -> None:
-            parent.join()
-            os._exit(1)
-
-        threading.Thread(target=watch, daemon=True).start()
 
 
 def run_jobs(

@@ -16,6 +16,7 @@ from packaging.requirements import Requirement
 from toolkit.compiled import kept_folder
 from toolkit.errors import NetworkError, RobotError, ToolkitError
 from toolkit.pipeline import Observer, PipelineConfig, make_planner, run
+from toolkit.pipeline.warmup import lacking, listed, warm_up
 from toolkit.prediction.networks import load_networks
 from toolkit.report.offscreen import REMEDY, why_not
 from toolkit.robot.loader import default_robot, find_robots, load_robot, robots_folder
@@ -126,6 +127,15 @@ def check_cache() -> Finding:
     return Finding("kernel cache", State.GOOD, str(folder))
 
 
+def check_kernels() -> Iterator[Finding]:
+    """Whether the kernels that a run needs are compiled; nothing where they cannot be kept."""
+    if kept_folder() is not None:
+        number, left = len(listed()), len(lacking(disturbed=True))
+        detail = f"{number - left} of {number} are compiled"
+        detail += "; the next run that needs the others compiles them" if left else ""
+        yield Finding("kernels", State.NOTE if left else State.GOOD, detail)
+
+
 def check_renderers() -> Iterator[Finding]:
     """Which of MuJoCo's renderers work; pictures and videos need the first or the second."""
     # MuJoCo sets this variable for the renderer that this process uses; the others would refuse it.
@@ -141,8 +151,9 @@ def check_walk(name: str | None, folder: Path | None, observer: Observer) -> Fin
     """Whether a robot walks over a flat world of its own size for some ten seconds."""
     began = perf_counter()
     try:
-        robot = load_robot(name, folder)
-        world = load_world(Path("walk.xml"), mjcf=_WALK.format(ahead=STRIDES * robot.com_height))
+        with warm_up(observer):
+            robot = load_robot(name, folder)
+            world = load_world(Path("walk.xml"), mjcf=_WALK.format(ahead=STRIDES * robot.com_height))
         planner = make_planner(robot, world, config=PlannerConfig(search=AnaStarConfig(max_expansions=EXPANSIONS)))
         result = run(robot, world, planner, PipelineConfig(), observer)
     except ToolkitError as error:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio
-import placo
 
 from toolkit.geometry.pose import rotation_from_quaternion
 from toolkit.robot.model import RobotModel
+
+if TYPE_CHECKING:
+    import pinocchio
+    import placo
 
 _WXYZ = [3, 4, 5, 6]
 _XYZW = [4, 5, 6, 3]
@@ -94,6 +97,8 @@ def placo_wrapper(robot: RobotModel) -> placo.RobotWrapper:
 
     `wrapper.model` is its pinocchio.Model; the frames have the names of bodies and contact sites.
     """
+    import placo  # here, since it takes long to import
+
     wrapper = placo.RobotWrapper("", placo.Flags.ignore_collisions, robot.urdf)
     wrapper.model.armature = _armature(robot, pinocchio_map(robot, wrapper.model))
     return wrapper
@@ -101,6 +106,8 @@ def placo_wrapper(robot: RobotModel) -> placo.RobotWrapper:
 
 def pinocchio_model(robot: RobotModel) -> pinocchio.Model:
     """A Pinocchio model of the robot alone, with its armature (lighter than a placo wrapper)."""
+    import pinocchio
+
     model = pinocchio.buildModelFromXML(robot.urdf, pinocchio.JointModelFreeFlyer())
     model.armature = _armature(robot, pinocchio_map(robot, model))
     return model

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-import trimesh
 from shapely.geometry import Polygon
 
 from toolkit.world.convex import convex_partition
 from toolkit.world.facets import Facet, facet_of, flat_groups
+
+if TYPE_CHECKING:
+    import trimesh
 
 FACET_ANGLE = np.radians(3.0)  # triangles of one facet have normals within this angle of the first triangle's
 FACET_DISTANCE = 1.5e-3  # m; their corners are within this distance of its plane
@@ -52,6 +55,8 @@ def decompose_mesh(vertices: np.ndarray, triangles: np.ndarray) -> Decomposition
     Raises:
         ValueError: No triangle has an area, or there would be too many solids.
     """
+    import trimesh  # here, since it takes long to import
+
     mesh = trimesh.Trimesh(vertices, triangles, process=True)
     components = _components(mesh)
     if not components:
@@ -93,6 +98,8 @@ def _check_count(parts: int) -> None:
 
 def _components(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
     """Connected components, each wound outwards (closed) or upwards (open)."""
+    import trimesh
+
     labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
     order = np.argsort(labels, kind="stable")
     members = np.split(order, np.flatnonzero(np.diff(labels[order])) + 1)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from scipy.sparse import coo_array
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
@@ -126,6 +125,8 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
     outlines = [face.frame @ _with_zeros(shapely.get_coordinates(face.polygon)) for face in faces]
     first, second = _near_pairs(faces, normals, outlines, config)
     size = (len(faces), len(faces))
+    from scipy.sparse import coo_array  # here, since it takes long to import
+
     graph = coo_array((np.ones(len(first), bool), (first, second)), shape=size).tocsr()
     used = np.zeros(len(faces), bool)
     result: dict[int, Face] = {}

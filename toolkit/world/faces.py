@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 import shapely
-import trimesh
 from shapely.geometry import Polygon
 
 from toolkit.geometry.pose import Pose
@@ -81,6 +80,8 @@ def _local_faces(
         cap = Polygon(size[0] * np.column_stack([np.cos(angle), np.sin(angle)]))
         down = np.diag([1.0, -1.0, -1.0])
         return [(pose @ Pose(turn, turn[:, 2] * size[1]), cap) for turn in (np.eye(3), down)]
+    import trimesh  # here, since it takes long to import
+
     if kind == types.mjGEOM_MESH:
         vertices, _ = mesh_of_geom(model, data, index)
         hull = trimesh.convex.convex_hull(vertices)

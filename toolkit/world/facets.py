@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-import trimesh
 from shapely.geometry import Polygon
 
 from toolkit.compiled import compiled
 from toolkit.geometry.pose import Pose
 from toolkit.world.overlay import united
+
+if TYPE_CHECKING:
+    import trimesh
 
 _MANY = 100  # more triangles are merged along edges; for fewer the general union is as quick and allows overlaps
 

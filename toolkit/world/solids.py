@@ -9,8 +9,6 @@ from functools import cached_property
 import mujoco
 import numpy as np
 import shapely
-import trimesh
-from scipy.spatial import ConvexHull
 
 from toolkit.geometry.pose import Pose
 from toolkit.geometry.triangles import height_field_triangles, mesh_vertices
@@ -178,6 +176,8 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
 
 def _ball() -> np.ndarray:
     """Corners (642, 3) of a polyhedron around the unit sphere."""
+    import trimesh  # here, since it takes long to import
+
     ball = trimesh.creation.icosphere(subdivisions=3)
     inside = (ball.triangles[:, 0] * ball.face_normals).sum(axis=1).min()
     return np.asarray(ball.vertices) / inside
@@ -190,6 +190,8 @@ def _extruded(ring: np.ndarray, low: float, high: float) -> np.ndarray:
 
 def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The convex hull of points (n, 3) as a block of one solid: vertices (1, m, 3) and edges (k, 2)."""
+    from scipy.spatial import ConvexHull  # here, since it takes long to import
+
     hull = ConvexHull(points)
     index = np.full(len(points), -1)
     index[hull.vertices] = np.arange(len(hull.vertices))

@@ -128,7 +128,9 @@ def evaluate(steps, prices, all_blocks, size, y, floor, work):
 @compiled(reordered=True)
 def direction(all_blocks, size, goal, corrected, work):
     """Newton step towards complementarities of `goal`; also fills the changes of slacks and multipliers."""
-    work.condensed[:] = work.gradient
+    for t in range(work.gradient.shape[0]):
+        for k in range(work.gradient.shape[1]):
+            work.condensed[t, k] = work.gradient[t, k]
     for block in all_blocks:
         blocks.add_gradient(block, goal, corrected, work.condensed)
     newton.solve(size, work.following, work.defect, work.condensed, work.sweep, work.change)
@@ -149,7 +151,10 @@ def longest_steps(all_blocks, keep):
 @compiled(reordered=True)
 def residual(all_blocks, y, rest, work):
     """Largest violation of dynamics, rows, and rest at the end if wanted."""
-    worst = np.abs(work.defect).max()
+    worst = 0.0
+    for t in range(work.defect.shape[0]):
+        for k in range(work.defect.shape[1]):
+            worst = max(worst, abs(work.defect[t, k]))
     for block in all_blocks:
         worst = max(worst, blocks.largest_residual(block))
     if rest:
@@ -198,7 +203,8 @@ def minimise(steps, prices, all_blocks, size, y, work, options):
                 work.hessian[last, a, a] += REST_STIFFNESS
         newton.factor(size, work.hessian, work.following, work.sweep)
 
-        direction(all_blocks, size, 0.0, False, work)
+        goal = 0.0
+        direction(all_blocks, size, goal, goal > 0.0, work)
         accepted, decrease = options.tolerance * (abs(value) + SMALL), 0.0
         for t in range(last + 1):
             for k in range(size[t]):
@@ -211,7 +217,7 @@ def minimise(steps, prices, all_blocks, size, y, work, options):
             after += blocks.product_after(block, primal, dual)
         goal = max(min(1.0, (after / gap) ** 3) * gap, 0.1 * accepted) / count
 
-        direction(all_blocks, size, goal, True, work)
+        direction(all_blocks, size, goal, goal > 0.0, work)
         primal, dual = longest_steps(all_blocks, max(0.99, 1.0 - gap / count))
         if options.at_rest:
             for a in range(3):

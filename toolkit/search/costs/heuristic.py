@@ -11,8 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
 from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projector
@@ -86,6 +84,9 @@ class GridDistance:
             edges = link_nodes(*grid, none.astype(np.int32), none)
             end, weight = np.empty(edges, np.int32), np.empty(edges)
             link_nodes(*grid, end, weight)
+            from scipy.sparse import csr_matrix  # here, since they take long to import
+            from scipy.sparse.csgraph import dijkstra
+
             graph = csr_matrix((weight, end, start), shape=(count, count))
             distance = dijkstra(graph, directed=True, indices=targets, min_only=True)
             self._distance[nodes >= 0] = distance[nodes[nodes >= 0]]
