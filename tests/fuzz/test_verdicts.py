@@ -19,7 +19,7 @@ from toolkit.errors import ToolkitError, WorldError
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.execution.recorder import MAX_TILT, MIN_HEIGHT
-from toolkit.execution.verdict import RANGE_TOLERANCE
+from toolkit.execution.verdict import RANGE_TOLERANCE, SCUFF_LIMIT
 from toolkit.robot.loader import find_robots, load_robot
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.planner import PlannerConfig
@@ -103,14 +103,16 @@ def check_verdict(seed):
         assert goal <= world.goal.radius and seen.tilt < MAX_TILT and seen.sink > low, f"{seen}: {what}"
         assert max(seen.torque, seen.velocity) <= 1.0 and seen.excess <= RANGE_TOLERANCE, f"{seen}: {what}"
         assert not seen.touched and seen.slip <= execution.slip_limit + SLIP_MARGIN, f"{seen}: {what}"
-        return "PASS" if not seen.brushed else "PASS, but a foot brushed the ground"
+        assert seen.scuff <= SCUFF_LIMIT, f"{seen}: {what}"
+        assert seen.scuff == pytest.approx(run.max_scuff, rel=1e-6, abs=1e-9), f"{run.scuffs} {seen}: {what}"
+        return "PASS" if not seen.scuff else "PASS with a graze"
     assert run.failure is not None and run.failure.reason, what
     return "FAIL"
 
 
 def test_a_verdict_holds():
     """One case of the long run that is executed."""
-    assert check_verdict(1) in ("PASS", "FAIL")
+    assert check_verdict(1) in ("PASS", "PASS with a graze", "FAIL")
 
 
 def test_a_verdict_that_lies_is_noticed(walked, walking):

@@ -21,7 +21,7 @@ from toolkit import compare, execute, replay
 
 def check(folder, whole, rng) -> tuple[str, int]:
     """Damage one part of a run and call a command that reads it; the part, and the command's exit code."""
-    part = str(rng.choice(["report.json", "plan.json", "standard", "touchdowns", "checks"]))
+    part = str(rng.choice(["report.json", "plan.json", "standard", "touchdowns", "scuffs", "checks"]))
     if part.endswith(".json"):
         content = damaged(json.loads((whole / part).read_text()), rng)
         (folder / part).write_text(json.dumps(content))

@@ -52,7 +52,7 @@ def replay_run(execution: Execution, *, observer: Callable[[float], None] = lamb
         raise ExecutionError(
             f"the run has {len(controls.ctrl)} steps in {ticks} control ticks of {standard.decimation}"
         )
-    recorder = Recorder(ticks, scene, standard.robot, index)
+    recorder = Recorder(standard, ticks, scene, index)
     data = mujoco.MjData(scene)
     data.qpos[:], data.qvel[:] = controls.qpos0, controls.qvel0
     qpos, qvel = controls.qpos0.copy(), controls.qvel0.copy()
@@ -68,7 +68,7 @@ def replay_run(execution: Execution, *, observer: Callable[[float], None] = lamb
                     data.xfrc_applied[index.base, :3] = controls.push[step]
                 step += 1
                 mujoco.mj_step(scene, data)
-                recorder.meter.read(data)
+                recorder.read(data)
                 if part == 0:
                     recorder.record(data, qpos, qvel)
                 qpos[:], qvel[:] = data.qpos, data.qvel

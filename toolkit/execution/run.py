@@ -70,7 +70,7 @@ def execute(
         replanner = Replanner(reference, plan)
     controller = Controller(robot, reference, margins, period, replanner)
     standard = Standard.of(plan, config, reference.swings, ticks)
-    recorder = Recorder(ticks, scene, standard.robot, index)
+    recorder = Recorder(standard, ticks, scene, index)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(plan.schedule.duration, rng)
     data = mujoco.MjData(scene)
@@ -97,7 +97,7 @@ def execute(
                     data.xfrc_applied[index.base, :3] = pushes[step]
                 step += 1
                 mujoco.mj_step(scene, data)
-                recorder.meter.read(data)
+                recorder.read(data)
                 if part == 0:
                     recorder.record(data, qpos, qvel)
                 qpos[:], qvel[:] = data.qpos, data.qvel

@@ -18,6 +18,7 @@ from toolkit.contacts.failure import Failure
 from toolkit.errors import ExecutionError, InputError
 from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.execution.scene_index import SceneIndex
+from toolkit.execution.scuff import Scuff
 from toolkit.execution.standard import Standard
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.report.files import EXECUTION, REPORT, SCENE, digest, read_check
@@ -37,7 +38,14 @@ _SAMPLES = {
 }  # fmt: skip
 """Shape of one row of each measurement, a row per control tick."""
 _UNDEFINED = ("cop_margin", "limb_pose")  # NaN without contact, and for a limb that the robot does not have
-_FIGURES = ("final_goal_distance", "max_slip", "max_touchdown_error", "max_torque_ratio", "max_velocity_ratio")
+_FIGURES = (
+    "final_goal_distance",
+    "max_slip",
+    "max_scuff",
+    "max_touchdown_error",
+    "max_torque_ratio",
+    "max_velocity_ratio",
+)
 _FIGURES += ("com_rms_error", "simulated_seconds")
 _FLAGS = ("completed", "goal_reached", "replayable")
 _COUNTS = ("replans", "replan_failures", "replan_departures", "replan_landings")
@@ -151,6 +159,7 @@ def _execution(arrays: Mapping[str, np.ndarray], scene: mujoco.MjModel, reason: 
         samples=Samples(tick_seconds=np.full(ticks, np.nan), qpos=qpos[:-1], **samples),
         touchdowns=tuple(_read_touchdown(entry, standard) for entry in json.loads(str(arrays["touchdowns"]))),
         slip=tuple(float(value) for value in arrays["slip"]),
+        scuffs=tuple(_read_scuff(entry, standard) for entry in json.loads(str(arrays["scuffs"]))),
         fall=fall,
         solver_failures=int(arrays["solver_failures"]),
         unplanned_contacts=tuple(
@@ -182,6 +191,15 @@ def _read_touchdown(entry: dict[str, Any], standard: Standard) -> dict[str, Any]
         raise ValueError(f"there is no transition {transition}")
     numbers = {name: float(entry[name]) for name in ("time", "planned_time", "position_error")}
     return {"transition": transition, "limb": standard.moves[transition].limb.label, **numbers}
+
+
+def _read_scuff(entry: dict[str, Any], standard: Standard) -> Scuff:
+    """One scuff."""
+    transition = int(entry["transition"])
+    if not 0 <= transition < len(standard.moves):
+        raise ValueError(f"there is no transition {transition}")
+    numbers = {name: float(entry[name]) for name in ("time", "duration", "peak", "impulse")}
+    return Scuff(transition, standard.moves[transition].limb, **numbers)
 
 
 def _first_line(error: BaseException) -> str:
