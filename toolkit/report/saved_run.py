@@ -20,6 +20,7 @@ from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.execution.scene_index import SceneIndex
 from toolkit.execution.scuff import Scuff
 from toolkit.execution.standard import Standard
+from toolkit.mjcf import mujoco_warnings
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.report.files import EXECUTION, REPORT, SCENE, digest, read_check
 from toolkit.report.run_report import RunReport, read_report
@@ -96,15 +97,11 @@ def read_run(folder: Path) -> SavedRun:
 def _read_execution(folder: Path, reason: str) -> Execution:
     """The execution in a folder; `reason` is the verdict's."""
     path = folder / EXECUTION
-    try:
-        with np.load(io.BytesIO(path.read_bytes())) as file:  # of a path it would leave a broken file open
-            arrays = {name: file[name] for name in file.files}
-    except _UNREADABLE as error:
-        raise InputError(f"{path}: is cut off or broken ({_first_line(error)}); {_AGAIN}") from error
+    arrays = read_arrays(path)
     for name in ("standard", "scene_digest"):
         if name not in arrays:
             raise InputError(f"{path}: lacks {name}: a version before this one wrote it, or no run; {_AGAIN}")
-    scene = _read_scene(folder / SCENE, str(arrays["scene_digest"]))
+    scene = read_scene(folder / SCENE, str(arrays["scene_digest"]))
     try:
         return _execution(arrays, scene, reason)
     except KeyError as error:
@@ -113,13 +110,30 @@ def _read_execution(folder: Path, reason: str) -> Execution:
         raise InputError(f"{path}: is broken: {_first_line(error)}; {_AGAIN}") from error
 
 
-def _read_scene(path: Path, expected: str) -> mujoco.MjModel:
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Every array of an npz file.
+
+    Raises:
+        InputError: It is none, or is broken.
+    """
+    try:
+        content = path.read_bytes()
+        if not content.startswith(b"PK"):  # of which NumPy would say that it may hold pickled objects
+            raise ValueError("no npz archive")
+        with np.load(io.BytesIO(content)) as file:  # of a path it would leave a broken file open
+            return {name: file[name] for name in file.files}
+    except _UNREADABLE as error:
+        raise InputError(f"{path}: is cut off or broken ({_first_line(error)}); {_AGAIN}") from error
+
+
+def read_scene(path: Path, expected: str) -> mujoco.MjModel:
     """The compiled scene. MuJoCo itself may crash on a damaged one, so that only what the run wrote is given to it."""
     content = path.read_bytes()
     if digest(content) != expected:
         raise InputError(f"{path}: is cut off, was changed, or is of another run than {EXECUTION}; {_AGAIN}")
     try:
-        return mujoco.MjModel.from_binary_path(str(path))
+        with mujoco_warnings():
+            return mujoco.MjModel.from_binary_path(str(path))
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(
             f"{path}: this MuJoCo ({mujoco.__version__}) cannot read it ({_first_line(error)}); "
