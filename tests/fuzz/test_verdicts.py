@@ -1,18 +1,18 @@
 """Verdicts of runs on random terrain under random disturbances hold against a replay in plain MuJoCo.
 
-For a long run:
-
-    FUZZ_SECONDS=3600 FUZZ_SEED=7 python -m pytest tests/fuzz/test_verdicts.py -m slow -s
+For a long run see `tests/fuzz/budget.py`.
 """
 
-import os
 import time
+import traceback
 from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from tests.fuzz.budget import SEED, seconds
+from tests.fuzz.children import run_in_child
 from tests.fuzz.verdict_oracle import replayed
 from toolkit import pipeline
 from toolkit.errors import ToolkitError, WorldError
@@ -26,8 +26,8 @@ from toolkit.search.planner import PlannerConfig
 from toolkit.world.generators import KINDS
 from toolkit.world.loader import load_world
 
-SECONDS = float(os.environ.get("FUZZ_SECONDS", 300))
-SEED = int(os.environ.get("FUZZ_SEED", 0))
+BLOCK = 10  # cases of one process
+LIMIT = 600  # s; a case that takes longer hangs
 SLIP_MARGIN = 4e-3  # m; the oracle counts by the plan's times, the verdict by measured forces
 SHORT = {
     "rubble_field": {"rows": (1, 2), "tilt": (0.0, 20.0)},
@@ -126,16 +126,28 @@ def test_a_verdict_that_lies_is_noticed(walked, walking):
     assert fallen.slip > 0.05 and fallen.sink < seen.sink and (fallen.final_qpos != seen.final_qpos).any()
 
 
+def check_block(block):
+    """Check some cases; how many ended in each way, and the failures."""
+    ends, failures = Counter(), []
+    for number in block:
+        try:
+            ends[check_verdict(number)] += 1
+        except Exception:
+            failures.append(f"case {number}: {traceback.format_exc()[-3000:]}")
+    return dict(ends), failures
+
+
 @pytest.mark.slow
 def test_many_verdicts_hold(capfd):
-    began, seed, ends, failures = time.monotonic(), SEED * 1_000_000, Counter(), []
-    while time.monotonic() - began < SECONDS:
-        try:
-            ends[check_verdict(seed)] += 1
-        except AssertionError as error:
-            failures.append(f"seed {seed}: {error}")
-        seed += 1
+    began, first, ends, failures = time.monotonic(), SEED * 1_000_000, Counter(), []
+    number = first
+    while time.monotonic() - began < seconds("verdicts"):
+        block = range(number, number + BLOCK)
+        found, failed = run_in_child(lambda block=block: check_block(block), BLOCK * LIMIT)
+        ends.update(found)
+        failures += failed
+        number += BLOCK
     with capfd.disabled():
-        print(f"\n{seed - SEED * 1_000_000} verdicts, {dict(ends)}, {len(failures)} failures, seed {SEED}")  # noqa: T201
+        print(f"\n{number - first} verdicts, {dict(ends)}, {len(failures)} failures, seed {SEED}")  # noqa: T201
     assert not failures, "\n\n".join(failures[:20])
     assert ends["PASS"] and ends["FAIL"]

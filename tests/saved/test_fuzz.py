@@ -1,8 +1,6 @@
 """Damaged reports, plans and standards of runs end in one line and exit code 2, or are taken; nothing else happens.
 
-A few cases run by default. For a long run:
-
-    FUZZ_SECONDS=3600 FUZZ_SEED=7 python -m pytest tests/saved/test_fuzz.py -m slow -s
+A few cases run by default. For a long run see `tests/fuzz/budget.py`.
 """
 
 import json
@@ -13,7 +11,8 @@ import time
 import numpy as np
 import pytest
 
-from tests.fuzz.test_commands import SECONDS, SEED, damaged
+from tests.fuzz.budget import SEED, seconds
+from tests.fuzz.test_commands import damaged
 from tests.saved import damage
 from tests.saved.conftest import called
 from toolkit import compare, execute, replay
@@ -53,7 +52,7 @@ def test_some_damaged_runs(copy, walk_folder, capsys):
 
 @pytest.mark.slow
 def test_damaged_runs_for_long(copy, walk_folder, capsys):
-    end, number = time.monotonic() + SECONDS / 5, 0
+    end, number = time.monotonic() + seconds("runs"), 0
     counts: dict[tuple[str, int], int] = {}
     while time.monotonic() < end:
         try:
