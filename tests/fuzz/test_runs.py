@@ -59,6 +59,7 @@ def test_damaged_runs_for_long(copy, walk_folder, capsys):
             key = check(copy, walk_folder, np.random.default_rng([SEED, number]))
         except Exception as error:
             raise AssertionError(f"case {number} of seed {SEED}: {error}") from error
+        capsys.readouterr()
         counts[key] = counts.get(key, 0) + 1
         number += 1
     with capsys.disabled():
