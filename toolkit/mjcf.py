@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from toolkit.errors import InputError
+from toolkit.errors import InputError, ToolkitError
 
 LARGEST = 1e4
 """Largest length or distance in a world or a robot, m."""
@@ -187,6 +187,18 @@ def mujoco_warnings() -> Iterator[list[str]]:
         yield found
     finally:
         mujoco.set_mju_user_warning(before)
+
+
+@contextmanager
+def warnings_refused(subject: str, error: type[ToolkitError] = InputError) -> Iterator[None]:
+    """Make an error of MuJoCo's first warning, in one line that begins with the subject; also a decorator.
+
+    What MuJoCo only warns of, such as contacts that it leaves out where its memory is full, makes a result worthless.
+    """
+    with mujoco_warnings() as found:
+        yield
+    if found:
+        raise error(f"{subject}: MuJoCo warns: {found[0]}")
 
 
 @contextmanager

@@ -79,6 +79,9 @@ def arguments() -> argparse.ArgumentParser:
     return parser
 
 
+_FARTHEST = 1e9  # m or degrees; farther than any coordinate of a survey
+
+
 def _place(least: int, most: int):
     """An argparse type: numbers with commas between them."""
 
@@ -87,9 +90,10 @@ def _place(least: int, most: int):
             values = tuple(float(part) for part in text.split(","))
         except ValueError:
             values = ()
-        if not least <= len(values) <= most or not all(math.isfinite(value) for value in values):
+        if not least <= len(values) <= most or not all(abs(value) <= _FARTHEST for value in values):
             raise argparse.ArgumentTypeError(
-                f"{text!r} is not {least}{f' or {most}' * (most > least)} numbers with commas"
+                f"{text!r} is not {least}{f' or {most}' * (most > least)} numbers with commas, "
+                f"each at most {_FARTHEST:g}"
             )
         return values
 

@@ -113,6 +113,7 @@ def disturbed_run(
         "reason": reason,
         "fell": execution.fell,
         "max_slip": execution.max_slip,
+        "max_scuff": execution.max_scuff,
         "max_torque_ratio": execution.max_torque_ratio,
         "max_velocity_ratio": execution.max_velocity_ratio,
         "com_rms_error": execution.com_rms_error,

@@ -15,6 +15,7 @@ from toolkit.errors import ToolkitError
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.replay import replay_controls
 from toolkit.execution.result import Execution
+from toolkit.execution.verdict import SCUFF_LIMIT
 from toolkit.geometry.limb import PALMS
 from toolkit.report.files import REPORT, RunFolder
 from toolkit.report.run import RunOptions, write_run
@@ -132,6 +133,7 @@ def executed(execution: Execution) -> dict[str, Any]:
         "fall_reason": "" if execution.fall is None else execution.fall.reason,
         "simulated_seconds": execution.simulated_seconds,
         "max_slip": execution.max_slip,
+        "max_scuff": execution.max_scuff,
         "max_torque_ratio": execution.max_torque_ratio,
         "max_velocity_ratio": execution.max_velocity_ratio,
         "unplanned_contacts": len(execution.unplanned_contacts),
@@ -150,7 +152,7 @@ def executed(execution: Execution) -> dict[str, Any]:
 
 
 def holds(figures: dict[str, Any]) -> bool:
-    """Whether a run arrived, is replayable, and kept slip, contacts, torques and velocities within bounds."""
+    """Whether a run arrived, is replayable, and kept slip, scuffs, contacts, torques and velocities within bounds."""
     return figures["arrived"] and figures["replays"] and held_within(figures)
 
 
@@ -158,6 +160,7 @@ def held_within(figures: dict[str, Any]) -> bool:
     """The bounds alone."""
     return (
         figures["max_slip"] <= ExecutionConfig().slip_limit
+        and figures["max_scuff"] <= SCUFF_LIMIT
         and figures["unplanned_contacts"] == 0
         and figures["max_torque_ratio"] <= 1.0
         and figures["max_velocity_ratio"] <= 1.0

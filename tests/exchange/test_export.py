@@ -172,8 +172,8 @@ def test_planned_states_are_exported_where_asked_for(run_folder, walking, tmp_pa
     ("file", "content", "message"),
     [
         ("report.json", b"{}", "report.json: has no valid world; it is not the report of a run"),
-        ("scene.mjb", b"12", "scene.mjb: MuJoCo .* cannot read it"),
-        ("execution.npz", b"12", "execution.npz: cannot be read"),
+        ("scene.mjb", b"12", "scene.mjb: is cut off, was changed"),
+        ("execution.npz", b"12", "execution.npz: is cut off or broken"),
         ("motion.npz", None, "has no motion.npz; only a run that came to its execution"),
     ],
 )

@@ -7,6 +7,7 @@ where the limit in seconds was passed. Standard output and error go into the fil
 import importlib
 import json
 import os
+import resource
 import signal
 import sys
 import time
@@ -14,13 +15,19 @@ import time
 PRELOADED = (
     "toolkit.cli toolkit.pipeline toolkit.report.run toolkit.report.recording toolkit.report.surfaces "
     "toolkit.report.console toolkit.report.top_view toolkit.robot.loader toolkit.robot.picture toolkit.world.loader "
-    "toolkit.world.generators toolkit.prediction.optimiser toolkit.search.quasi_static"
+    "toolkit.world.generators toolkit.prediction.optimiser toolkit.search.quasi_static toolkit.report.saved_run "
+    "toolkit.report.comparison toolkit.report.health toolkit.report.replay_recording toolkit.report.scan "
+    "toolkit.exchange.folder toolkit.exchange.frames toolkit.scanning.building toolkit.scanning.files "
+    "toolkit.scanning.world toolkit.execution.replay"
 ).split()
+
+MOST_MEMORY = 12 * 2**30  # bytes of a command's address space; one that wants more is at fault
 
 
 def child(request: dict) -> None:
     """Run one command line as `python -m` does; does not return."""
     os.setpgid(0, 0)
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
     os.chdir(request["folder"])
     for descriptor, name in ((1, "out"), (2, "err")):
         opened = os.open(f"{request['folder']}/../{name}", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)

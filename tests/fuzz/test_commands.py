@@ -1,8 +1,6 @@
 """Odd command lines and damaged plan files end in one line and a code of 0, 1 or 2, and leave nothing behind.
 
-A few cases run by default. For a long run:
-
-    FUZZ_SECONDS=3600 FUZZ_SEED=7 python -m pytest tests/fuzz/test_commands.py -m slow -s
+A few cases run by default. For a long run see `tests/fuzz/budget.py`.
 """
 
 import json
@@ -17,15 +15,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.fuzz.budget import SEED, seconds
+from tests.fuzz.run_commands import hurt, make_inputs, run_command
 from tests.report.conftest import make_run
 from toolkit.errors import InputError
+from toolkit.exchange.formats import FORMATS
 from toolkit.report.plan_file import read_plan, write_plan
 from toolkit.robot.loader import find_robots
 from toolkit.world.generators import KINDS
 
 ROOT = Path(__file__).resolve().parents[2]
-SECONDS = float(os.environ.get("FUZZ_SECONDS", 300))
-SEED = int(os.environ.get("FUZZ_SEED", 0))
 LIMIT = 60  # s; a case that takes longer hangs
 
 WORLD = """
@@ -49,7 +48,7 @@ ODD = [
 PLANNING = ["--seed", "--planner", "--timing", "--no-palms", "--steps", "--heuristic", "--robot", "--robots"]
 DISTURBANCES = ["--push", "--mass-error", "--friction-error", "--terrain-error", "--state-noise", "--delay"]
 VALIDATE = ["--candidates", "--no-replanning", *DISTURBANCES]
-FLAGS = {"--no-palms", "--no-replanning", "--no-recording"}
+FLAGS = {"--no-palms", "--no-replanning", "--no-recording", "--planned", "--viewer"}
 
 
 def make_surroundings(folder: Path) -> None:
@@ -109,8 +108,9 @@ def command_line(rng: np.random.Generator) -> tuple[str, list[str]]:
 class Commands:
     """Runs command lines one after another, and looks at what they say and leave."""
 
-    def __init__(self, folder: Path):
-        self.folder = folder / "here"
+    def __init__(self, folder: Path, whole: Path | None = None):
+        """Run them in a folder, where runs and scans lie if there is a `whole` run."""
+        self.folder, self._whole = folder / "here", whole
         environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
         server = [sys.executable, str(Path(__file__).with_name("fork_server.py"))]
         self._server = subprocess.Popen(server, stdin=-1, stdout=-1, text=True, env=environment)
@@ -119,10 +119,18 @@ class Commands:
         """End the server."""
         self._server.communicate()
 
-    def check(self, module: str, arguments: list[str], limit: float = LIMIT) -> int:
-        """Run one, assert that it ended as it should within `limit` seconds, and return its exit code."""
+    def check(
+        self, module: str, arguments: list[str], limit: float = LIMIT, hurting: np.random.Generator | None = None
+    ) -> int:
+        """Run one, assert that it ended as it should within `limit` seconds, and return its exit code.
+
+        With a generator in `hurting`, a run and scans are there, some of them damaged.
+        """
         make_surroundings(self.folder)
-        before = self._listing()
+        if hurting is not None and self._whole is not None:
+            make_inputs(self.folder, self._whole)
+            hurt(self.folder, hurting, damaged)
+        before, content = self._listing(), self._content()
         request = dict(module=module, arguments=arguments, folder=str(self.folder), limit=limit)
         assert self._server.stdin is not None and self._server.stdout is not None
         self._server.stdin.write(json.dumps(request) + "\n")
@@ -136,13 +144,16 @@ class Commands:
         if code == 2 and module != "toolkit.robots":
             assert len(lines) == 1 and lines[0].startswith("error: "), what
         elif code == 1:
-            assert any(line.startswith(("error: ", "FAIL: ")) for line in [*lines, *out.splitlines()]), what
+            assert any(line.startswith(("error: ", "FAIL: ", "DIFFERS: ")) for line in [*lines, *out.splitlines()]), (
+                what
+            )
         new = self._listing() - before
         assert not [name for name in new if name.endswith(".tmp")], f"{new} {what}"
-        assert not (code == 2 and new), f"{new} {what}"
-        assert {name.split("/")[0] for name in new} <= {"runs", "surfaces.rrd"} | self._allowed(arguments), (
-            f"{new} {what}"
-        )
+        assert not (code == 2 and (new or self._content() != content)), f"{new} {what}"
+        if "." not in arguments:  # which may name the working directory itself
+            allowed = {"runs", "scans", "surfaces.rrd"} | self._allowed(arguments)
+            assert {name.split("/")[0] for name in new} <= allowed, f"{new} {what}"
+        assert not {"MUJOCO_LOG.TXT"} & new, what
         assert (self.folder / "taken.xml").is_file() and (self.folder / "pipe").is_fifo(), what
         assert (self.folder / "foreign" / "report.json").exists() and Path("/dev/null").is_char_device(), what
         return code
@@ -151,17 +162,24 @@ class Commands:
         """Every path below the working directory."""
         return {str(path.relative_to(self.folder)) for path in self.folder.rglob("*")}
 
+    def _content(self) -> dict[str, tuple[int, int]]:
+        """Size and time of change of every plain file below the working directory."""
+        files = [path for path in self.folder.rglob("*") if path.is_file() and not path.is_symlink()]
+        return {str(path): (path.stat().st_size, path.stat().st_mtime_ns) for path in files}
+
     def _allowed(self, arguments: list[str]) -> set[str]:
         """First parts of the paths that the arguments name as outputs."""
         named = {word.partition("=")[2] if word.startswith("--picture=") else word for word in arguments}
+        if "--to" in arguments:  # where nothing else is named, an export lies beside its run
+            named |= {f"{word}-{form}" for word in arguments for form in FORMATS}
         places = [Path(os.path.realpath(self.folder / name)) for name in named]
         below = [place.relative_to(self.folder) for place in places if self.folder in place.parents]
         return {place.parts[0] for place in below}
 
 
 @pytest.fixture
-def commands(tmp_path):
-    made = Commands(tmp_path)
+def commands(tmp_path, walk_folder):
+    made = Commands(tmp_path, walk_folder)
     yield made
     made.close()
 
@@ -221,6 +239,12 @@ def test_some_odd_command_lines(commands):
         commands.check(module, arguments)
 
 
+def test_some_odd_command_lines_on_runs_and_scans(commands):
+    for number in range(16):
+        rng = np.random.default_rng([20, number])
+        commands.check(*run_command(rng, odd, odd_options), hurting=rng)
+
+
 def test_some_damaged_plans(tmp_path):
     rng, plan = np.random.default_rng(SEED), some_plan(tmp_path)
     taken = sum(check_plan(plan, tmp_path / "plan.json", rng) for _ in range(300))
@@ -234,11 +258,13 @@ def test_odd_command_lines_for_long(commands):
     for planner in ("auto", "optimiser", "kinematic", "quasi-static"):  # compiles what is not on the disk yet
         words = ["world.xml", "--no-recording", "--candidates=1", "--expansions=20", f"--planner={planner}"]
         commands.check("toolkit.validate", words, limit=1800)
-    end, number = time.monotonic() + SECONDS, 0
+    end, number = time.monotonic() + seconds("commands"), 0
     while time.monotonic() < end:
-        line = command_line(np.random.default_rng([SEED, number]))
+        rng = np.random.default_rng([SEED, number])
+        on_runs = number % 2 == 1
+        line = run_command(rng, odd, odd_options) if on_runs else command_line(rng)
         try:
-            counts[line[0], commands.check(*line)] += 1
+            counts[line[0], commands.check(*line, hurting=rng if on_runs else None)] += 1
         except AssertionError as error:
             failures.append(f"case {number} of seed {SEED}: {error}")
         number += 1
@@ -249,7 +275,7 @@ def test_odd_command_lines_for_long(commands):
 @pytest.mark.slow
 def test_damaged_plans_for_long(tmp_path):
     plan = some_plan(tmp_path)
-    end, number, taken = time.monotonic() + SECONDS / 10, 0, 0
+    end, number, taken = time.monotonic() + seconds("plans"), 0, 0
     while time.monotonic() < end:
         taken += check_plan(plan, tmp_path / "plan.json", np.random.default_rng([SEED, number]))
         number += 1

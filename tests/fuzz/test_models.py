@@ -1,29 +1,24 @@
 """Damaged worlds and robots are refused in one line, or are what MuJoCo says they are.
 
-A few cases run by default. For a long run:
-
-    FUZZ_SECONDS=3600 FUZZ_SEED=7 python -m pytest tests/fuzz -m slow -s
+A few cases run by default. For a long run see `tests/fuzz/budget.py`.
 """
 
 import faulthandler
-import os
 import shutil
 import time
-import traceback
-import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.fuzz.budget import SEED, seconds
+from tests.fuzz.children import run_in_child
 from tests.fuzz.mutation import ROOT, damaged_toml, damaged_xml
 from tests.world.probe import random_points, ray_gap
 from toolkit.errors import RobotError, WorldError
 from toolkit.robot.loader import find_robots, load_robot
 from toolkit.world.loader import load_world
 
-SECONDS = float(os.environ.get("FUZZ_SECONDS", 300))
-SEED = int(os.environ.get("FUZZ_SEED", 0))
 LIMIT = 60  # s; a case that takes longer hangs
 BLOCK = 100  # cases of one process
 TOLERANCE = 1.7e-3  # m; triangles lie up to 1.5 mm off their facet's plane
@@ -102,34 +97,19 @@ def test_a_few_damaged_models(check, tmp_path, capfd, monkeypatch):
         run_case(check, seed, tmp_path, capfd)
 
 
-def run_in_child(work, capfd) -> int:
-    """The number that some work returns in a child: placo keeps about 2 MB of every robot that it has read."""
-    reading, writing = os.pipe()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of forks beside the threads of libraries, which the child does not use
-        child = os.fork()
-    if child == 0:
-        try:
-            os.write(writing, str(work()).encode())
-        except BaseException:
-            os.write(writing, traceback.format_exc()[-4000:].encode())
-        os._exit(0)
-    os.close(writing)
-    with os.fdopen(reading) as pipe:
-        said = pipe.read()
-    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    assert said.isdigit(), f"ended with {status}: {said} {capfd.readouterr()}"
-    return int(said)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("check", [check_world, check_robot])
 def test_many_damaged_models(check, tmp_path, capfd, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    time_given = seconds("worlds" if check is check_world else "robots")
     began, seed, accepted = time.monotonic(), SEED * 1_000_000, 0
-    while time.monotonic() - began < SECONDS / 2:
+    while time.monotonic() - began < time_given:
         block = range(seed, seed + BLOCK)
-        accepted += run_in_child(lambda block=block: sum(run_case(check, n, tmp_path, capfd) for n in block), capfd)
+
+        def work(block=block) -> int:
+            return sum(run_case(check, number, tmp_path, capfd) for number in block)
+
+        accepted += run_in_child(work, BLOCK * LIMIT)
         seed += BLOCK
     with capfd.disabled():
         count = seed - SEED * 1_000_000

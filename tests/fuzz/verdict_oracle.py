@@ -26,7 +26,7 @@ class Replay:
         excess: Largest angle beyond a joint's range, rad.
         slip: Largest tangential displacement of a patch's corner while its limb is planned to stand, m.
         touched: Names of bodies other than the limbs' ends that touched the world.
-        brushed: Feet whose patches touched it in the middle of a swing, which a verdict allows.
+        scuff: Largest impulse of the touches of a swing between lift-off and touchdown, over the robot's mass, m/s.
     """
 
     final_qpos: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -38,7 +38,7 @@ class Replay:
     excess: float = 0.0
     slip: float = 0.0
     touched: set[str] = field(default_factory=set)
-    brushed: set[Limb] = field(default_factory=set)
+    scuff: float = 0.0
 
 
 def replayed(scene: mujoco.MjModel, robot: RobotModel, controls: Controls, schedule: ContactSchedule) -> Replay:
@@ -48,7 +48,7 @@ def replayed(scene: mujoco.MjModel, robot: RobotModel, controls: Controls, sched
     base = scene.body(robot.base).id
     own = scene.body_rootid == scene.body_rootid[base]
     ends = {scene.body_weldid[scene.body(model.body).id]: limb for limb, model in robot.limbs.items()}
-    standing = Standing(robot, schedule)
+    standing, swinging = Standing(robot, schedule), Swinging(schedule)
     bound, lower, upper = robot.torque_limit, robot.lower, robot.upper
     for ctrl in controls.ctrl:
         found.velocity = max(found.velocity, float((np.abs(data.qvel[6:]) / robot.velocity_limit).max()))
@@ -61,7 +61,9 @@ def replayed(scene: mujoco.MjModel, robot: RobotModel, controls: Controls, sched
         soles = [data.site(robot.limbs[foot].site).xpos[2] for foot in FEET]
         found.sink = min(found.sink, float(data.subtree_com[base, 2] - min(soles)))
         found.slip = max(found.slip, standing.slip(data, time))
-        for first, second in data.contact.geom[data.contact.efc_address >= 0] if data.ncon else ():
+        forces = dict.fromkeys(Limb, np.zeros(3))
+        for number in np.flatnonzero(data.contact.efc_address >= 0) if data.ncon else ():
+            first, second = data.contact.geom[number]
             bodies = scene.geom_bodyid[[first, second]]
             if own[bodies[0]] == own[bodies[1]]:
                 continue
@@ -69,12 +71,58 @@ def replayed(scene: mujoco.MjModel, robot: RobotModel, controls: Controls, sched
             limb = ends.get(scene.body_weldid[body])
             if limb is None:
                 found.touched.add(scene.body(body).name)
-            elif limb.is_foot and limb in standing.lifted(time):
-                found.brushed.add(limb)
+            else:
+                forces[limb] = forces[limb] + (1.0 if own[bodies[1]] else -1.0) * force_on_second(scene, data, number)
+        swinging.note(time, {limb: scene.opt.timestep * float(np.linalg.norm(forces[limb])) for limb in forces})
+    found.scuff = swinging.largest / float(scene.body_subtreemass[base])
     mujoco.mj_kinematics(scene, data)
     found.final_qpos = data.qpos.copy()
     found.feet = np.mean([data.site(robot.limbs[foot].site).xpos[:2] for foot in FEET], axis=0)
     return found
+
+
+def force_on_second(scene: mujoco.MjModel, data: mujoco.MjData, number: int) -> np.ndarray:
+    """Force (3,) N of a contact on its second geom in the world, put together from the constraints' own forces."""
+    contact = data.contact[number]
+    rows, tangents = data.efc_force[contact.efc_address :], min(contact.dim - 1, 2)
+    if scene.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC or contact.dim == 1:
+        parts = rows[: 1 + tangents]
+    else:
+        edges = rows[: 2 * (contact.dim - 1)].reshape(-1, 2)
+        parts = np.r_[edges.sum(), (contact.friction[:tangents] * (edges[:tangents, 0] - edges[:tangents, 1]))]
+    return parts @ contact.frame.reshape(3, 3)[: len(parts)]
+
+
+class Swinging:
+    """The impulses on limbs in their planned swings."""
+
+    PAUSE = 0.03 + 1e-9  # s; touches that are closer are one contact
+
+    def __init__(self, schedule: ContactSchedule):
+        self._swings = [(p.swing, p.start, p.end, []) for p in schedule.phases if p.swing is not None]
+
+    def note(self, time: float, impulses: dict[Limb, float]) -> None:
+        """Keep the impulses in N s of the step that begins at a time in s."""
+        for limb, start, end, touches in self._swings:
+            if start <= time < end and impulses[limb] > 0.0:
+                touches.append((time, impulses[limb]))
+
+    @property
+    def largest(self) -> float:
+        """Largest impulse on one limb in one swing after it left its contact and before it made the next, N s."""
+        sums = [0.0]
+        for _, start, end, touches in self._swings:
+            left, met = start, end
+            for time, _ in touches:
+                left = time if time - left <= self.PAUSE else left
+            for time, _ in reversed(touches):
+                met = time if met - time <= self.PAUSE else met
+            early, middle = start + 0.25 * (end - start), start + 0.5 * (end - start)
+            leaving = [time <= left and left > start and time < early for time, _ in touches]
+            landing = [time >= met and met < end and time >= middle for time, _ in touches]
+            both = zip(touches, leaving, landing, strict=True)
+            sums.append(sum(impulse for (_, impulse), leaves, lands in both if not leaves and not lands))
+        return max(sums)
 
 
 class Standing:
@@ -87,10 +135,6 @@ class Standing:
             (contact.limb, phase.start, phase.end) for phase in schedule.phases for contact in phase.contacts
         ]
         self._settled: dict[Limb, np.ndarray] = {}
-
-    def lifted(self, time: float) -> set[Limb]:
-        """Limbs in the middle half of their swing."""
-        return {limb for limb, start, end in self._swings if 0.25 < (time - start) / (end - start) < 0.75}
 
     def slip(self, data: mujoco.MjData, time: float) -> float:
         """Largest displacement of a corner along its patch since it settled, m."""

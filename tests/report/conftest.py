@@ -17,6 +17,7 @@ from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.execution.check import Check
 from toolkit.execution.result import Controls, Execution, Samples
+from toolkit.execution.scuff import Scuff
 from toolkit.execution.standard import Move, Standard, Subject
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_from_quaternion
@@ -278,11 +279,13 @@ def make_run(steps: int = 4) -> MadeUpRun:
         ),
         touchdowns=touchdowns,
         slip=tuple(np.linspace(0, 0.01, len(sequence.transitions) + 1)),
+        scuffs=(Scuff(0, sequence.transitions[0].limb, 0.5, 0.004, 80.0, 0.2),),
         completed=True,
         fall=None,
         goal_reached=True,
         final_goal_distance=0.1,
         max_slip=0.01,
+        max_scuff=0.003,
         max_touchdown_error=0.002,
         max_torque_ratio=0.6,
         max_velocity_ratio=0.3,

@@ -278,6 +278,9 @@ def test_the_report_keeps_every_figure_and_every_result(run, tmp_path):
     results = [check["result"] for check in content["checks"]]
     assert results == ["PASS", "FAIL", "FAIL", "NOT_CHECKED"]
     assert content["stages"]["execution"]["tick_seconds"] == pytest.approx({"median": 1e-3, "p99": 1e-3, "max": 1e-3})
+    entry = {"transition": 0, "limb": "left_foot", "time": 0.5, "duration": 0.004, "peak": 80.0, "impulse": 0.2}
+    assert content["stages"]["execution"]["scuffs"] == [entry]
+    assert content["stages"]["execution"]["max_scuff_impulse"] == 0.2
 
 
 def test_a_report_of_a_run_without_a_search_has_every_figure(run):
@@ -415,6 +418,7 @@ def test_the_execution_is_written_with_its_scene(run, tmp_path):
     np.testing.assert_array_equal(arrays["tick_times"], run.execution.samples.tick_times)
     np.testing.assert_array_equal(arrays["qpos"], [*run.execution.samples.qpos, run.execution.controls.final_qpos])
     np.testing.assert_allclose(arrays["wrench"], run.execution.samples.wrench, rtol=1e-6)  # kept in single precision
+    assert [entry["peak"] for entry in json.loads(arrays["scuffs"].item())] == [80.0]
     assert json.loads(arrays["touchdowns"].item()) == list(run.execution.touchdowns)
     assert not arrays["fell"] and arrays["fall_reason"] == "" and "failure_time" not in arrays
 

@@ -101,6 +101,7 @@ DAMAGES = {
     "controls that are no numbers": (array("ctrl", nan_at_the_end), "ctrl has numbers that are not finite"),
     "a start of another robot": (array("qpos0", lambda value: value[:-1]), "qpos0 has shape"),
     "odd touchdowns": (array("touchdowns", lambda value: np.asarray('[{"transition": 99}]')), "no transition 99"),
+    "odd scuffs": (array("scuffs", lambda value: np.asarray('[{"transition": 99}]')), "no transition 99"),
     "checks that are no JSON": (array("checks", lambda value: np.asarray("[{")), "execution.npz: is broken"),
     "no ticks": (standard(ticks=0), "are no run"),
     "another step": (standard(timestep=0.001), "are not of this run"),

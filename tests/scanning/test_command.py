@@ -114,6 +114,10 @@ def test_two_hundred_thousand_triangles(tmp_path):
         (["wall.stl"], "error: no flat place of at least 0.01 m^2 for a foot was found"),
         (["steps.stl", "--start", "9,9"], "error: --start 9,9: no surface for feet there; the nearest has a corner at"),
         (["steps.stl", "--start", "1"], "error: argument --start: '1' is not 2 or 3 numbers with commas"),
+        (
+            ["steps.stl", "--goal", "1,1e300"],
+            "error: argument --goal: '1,1e300' is not 2 numbers with commas, each at most",
+        ),
         (["steps.stl", "--goal", "1,x"], "error: argument --goal: '1,x' is not 2 numbers with commas"),
         (["steps.stl", "--timing", "auto"], "error: argument --timing: auto is for planners"),
         (["steps.stl", "--friction", "0"], "error: argument --friction: 0 is not above zero"),

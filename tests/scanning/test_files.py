@@ -91,6 +91,7 @@ def test_a_geotiff_knows_its_cells_and_its_holes(tmp_path):
         ("scan.xyz", b"0 0 0", {}, r"files that end in .xyz are not known; known are obj, stl"),
         ("text.obj", b"hello", {}, "holds no triangles"),
         ("text.stl", b"hello", {}, "holds no triangles|is damaged"),
+        ("latin.stl", b"solid \xfcber\nfacet\nvertex 0 0 \xff\nendsolid\n", {}, "is damaged"),
         ("text.ply", b"hello", {}, "is damaged"),
         ("text.glb", b"hello, this is text", {}, "is damaged"),
         ("text.pcd", b"hello", {}, "is damaged|needs the package pypcd4"),

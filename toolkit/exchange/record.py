@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,10 @@ from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import InputError
 from toolkit.report.files import EXECUTION, MOTION, PLAN, REPORT, SCENE, read_json
 from toolkit.report.plan_file import read_plan
+from toolkit.report.saved_run import read_arrays, read_scene
 from toolkit.robot.model import RobotModel
 
-_EXECUTED = ("tick_times", "qpos", "qvel", "torque", "wrench", "wrench_planned", "limb_pose")
+_EXECUTED = ("scene_digest", "tick_times", "qpos", "qvel", "torque", "wrench", "wrench_planned", "limb_pose")
 _TRAJECTORY = ("times", "qpos", "qvel", "torque")
 _MOTION = (
     *(f"wholebody_{name}" for name in _TRAJECTORY),
@@ -67,7 +67,8 @@ def read_run(folder: Path) -> RunRecord:
             raise InputError(f"{folder}: has no {name}; only a run that came to its execution can be exported")
     report = _report(folder / REPORT)
     sequence, motion = read_plan(folder / PLAN), _arrays(folder / MOTION, _MOTION)
-    execution, scene = _arrays(folder / EXECUTION, _EXECUTED), _scene(folder / SCENE)
+    execution = _arrays(folder / EXECUTION, _EXECUTED)
+    scene = read_scene(folder / SCENE, str(execution.pop("scene_digest")))
     execution["qpos"] = execution["qpos"][: len(execution["tick_times"])]  # the last row is the state after the run
     _check_arrays(folder, scene, execution, motion)
     return RunRecord(folder, report, sequence, _schedule(folder, sequence, motion), scene, execution, motion)
@@ -109,26 +110,11 @@ def _report(path: Path) -> dict[str, Any]:
 
 def _arrays(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
     """Some arrays of an npz file."""
-    try:
-        with np.load(path) as content:
-            missing = [name for name in names if name not in content]
-            if missing:
-                raise InputError(f"{path}: lacks {missing[0]}; it is not the record of a run that was executed")
-            return {name: content[name] for name in names}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: cannot be read ({error})") from error
-
-
-def _scene(path: Path) -> mujoco.MjModel:
-    """A compiled model."""
-    try:
-        return mujoco.MjModel.from_binary_path(str(path))
-    except (ValueError, mujoco.FatalError) as error:
-        message = " ".join(str(error).split())
-        raise InputError(
-            f"{path}: MuJoCo {mujoco.__version__} cannot read it ({message}); export with the release that ran it, "
-            "or run it again"
-        ) from error
+    content = read_arrays(path)
+    missing = [name for name in names if name not in content]
+    if missing:
+        raise InputError(f"{path}: lacks {missing[0]}; it is not the record of a run that was executed")
+    return {name: content[name] for name in names}
 
 
 def _check_arrays(

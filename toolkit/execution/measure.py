@@ -10,9 +10,10 @@ import numpy as np
 from toolkit.contacts.failure import Failure
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution, Samples
+from toolkit.execution.scuff import Scuff, scuffs
 from toolkit.execution.slip import SETTLE_TIME, ContactInterval, contact_intervals
 from toolkit.execution.standard import Move, Standard
-from toolkit.execution.verdict import execution_checks, failure_reason
+from toolkit.execution.verdict import SCUFF_LIMIT, execution_checks, failure_reason
 from toolkit.replanning.replanner import ReplanCounts
 
 
@@ -55,6 +56,7 @@ def measure(
         rotation = recorder.limb_rotation[:count, limb]
         intervals += contact_intervals(limb, force, position, rotation, model.half_size, standard.period)
     slip = _slip_by_stance(intervals, times, standard.moves)
+    scuffed = scuffs(standard.moves, recorder.force[: recorder.steps], standard.timestep)
     touchdowns = _touchdowns(intervals, recorder, standard)
     missing = sum(move.target is not None for move in standard.moves) - len(touchdowns)
     error = recorder.com[:count] - recorder.com_aim[:count]
@@ -72,6 +74,7 @@ def measure(
         "goal_distance": distance,
         "unplanned_contacts": float(len(recorder.meter.unplanned)),
         "friction": float(recorder.meter.friction_mismatches),
+        "scuff": max((each.impulse for each in scuffed), default=0.0) / recorder.mass,
         "slip": max(slip) if slip else float("inf"),
         "com_rms_error": float(np.sqrt((error**2).sum(1).mean())),
         "torque_ratio": float(torque_ratio.max()),
@@ -79,7 +82,7 @@ def measure(
         "velocity_ratio": float((speed / robot.velocity_limit).max()),
     }
     checks = execution_checks(values, goal.radius, standard)
-    when = _failure_time(fell, recorder, slip, times, standard)
+    when = _failure_time(fell, recorder, scuffed, slip, times, standard)
     reason = failure_reason(checks, recorder.fall)
     transition = None if when is None else standard.transition_at(when)
     simulated = len(controls.ctrl) * standard.timestep
@@ -107,11 +110,13 @@ def measure(
         ),
         touchdowns=touchdowns,
         slip=slip,
+        scuffs=scuffed,
         completed=completed,
         fall=Failure(recorder.fall, float(times[-1])) if fell else None,
         goal_reached=not fell and distance <= goal.radius,
         final_goal_distance=distance,
         max_slip=values["slip"],
+        max_scuff=values["scuff"],
         max_touchdown_error=max((touchdown["position_error"] for touchdown in touchdowns), default=0.0),
         max_torque_ratio=values["torque_ratio"],
         max_velocity_ratio=values["velocity_ratio"],
@@ -130,15 +135,19 @@ def measure(
 def _failure_time(
     fell: bool,
     recorder: Recorder,
+    scuffed: tuple[Scuff, ...],
     slip: tuple[float, ...],
     times: np.ndarray,
     standard: Standard,
 ) -> float | None:
-    """Time in s at which the run went wrong: a fall, an unplanned contact, or the swing before the worst slip."""
+    """Time in s at which the run went wrong: a fall, an unplanned contact, a scuff, or the swing before most slip."""
     if fell:
         return float(times[-1])
     if recorder.meter.unplanned_time is not None:
         return recorder.meter.unplanned_time
+    worst_scuff = max(scuffed, key=lambda each: each.impulse, default=None)
+    if worst_scuff is not None and worst_scuff.impulse > SCUFF_LIMIT * recorder.mass:
+        return worst_scuff.time
     if slip and max(slip) > standard.slip_limit:
         worst = int(np.argmax(slip))
         return standard.moves[worst].start if worst < len(standard.moves) else float(times[-1])

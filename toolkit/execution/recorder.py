@@ -10,7 +10,7 @@ import numpy as np
 from toolkit.execution.contact_meter import ContactMeter
 from toolkit.execution.scene_index import SceneIndex
 from toolkit.execution.slip import BEARING_FORCE
-from toolkit.execution.standard import Subject
+from toolkit.execution.standard import Standard
 from toolkit.geometry.pose import quaternion_from_rotation
 
 MAX_TILT = np.radians(60.0)  # rad; tilt of the base beyond which the robot has fallen
@@ -25,17 +25,22 @@ class Recorder:
 
     Attributes:
         scene, index, meter: The scene that runs, the robot in it, and its contacts.
+        mass: The robot's in the scene, kg.
         count: Number of rows that are filled.
         fall: One line once the robot has fallen; "" before.
         tick_seconds, qpos, qvel, com, momentum, wrench, cop_margin, torque: See `Samples`.
         com_aim, may_touch: See `Samples`; `expect` fills them.
         normal_force, limb_position, limb_rotation: (C, 4) N, (C, 4, 3) m and (C, 4, 3, 3) world_from_limb.
+        steps: Number of physics steps that were read.
+        force: (S, 4) N; magnitude of the contact force on each limb in each physics step.
     """
 
-    def __init__(self, ticks: int, scene: mujoco.MjModel, robot: Subject, index: SceneIndex):
+    def __init__(self, standard: Standard, ticks: int, scene: mujoco.MjModel, index: SceneIndex):
+        robot = standard.robot
         self.scene, self.index, self._robot = scene, index, robot
         self.meter = ContactMeter(index)
-        self.count, self.fall = 0, ""
+        self.count, self.steps, self.fall = 0, 0, ""
+        self.force = np.zeros((ticks * standard.decimation, 4))
         self.tick_seconds, self.com_aim = np.zeros(ticks), np.zeros((ticks, 3))
         self.may_touch = np.zeros((ticks, 4), bool)
         self.qpos, self.qvel = np.zeros((ticks, scene.nq)), np.zeros((ticks, scene.nv))
@@ -45,7 +50,13 @@ class Recorder:
         self.limb_position = np.full((ticks, 4, 3), np.nan)
         self.limb_rotation = np.full((ticks, 4, 3, 3), np.nan)
         self.torque = np.zeros((ticks, scene.nu))
-        self._mass = float(scene.body_subtreemass[index.base])
+        self.mass = float(scene.body_subtreemass[index.base])
+
+    def read(self, data: mujoco.MjData) -> None:
+        """Read the contacts of the physics step just made."""
+        self.meter.read(data)
+        self.force[self.steps] = np.linalg.norm(self.meter.wrench[:, :3], axis=1)
+        self.steps += 1
 
     def expect(self, com_aim: np.ndarray, may_touch: np.ndarray) -> None:
         """Note, before a tick, where its CoM (3,) in m is to be, and which limbs (4,) may touch in it."""
@@ -59,7 +70,7 @@ class Recorder:
         self.qpos[k], self.qvel[k] = qpos, qvel
         mujoco.mj_subtreeVel(self.scene, data)
         self.com[k] = data.subtree_com[index.base]
-        self.momentum[k, :3] = self._mass * data.subtree_linvel[index.base]
+        self.momentum[k, :3] = self.mass * data.subtree_linvel[index.base]
         self.momentum[k, 3:] = data.subtree_angmom[index.base]
         self.wrench[k], self.normal_force[k] = meter.wrench, meter.normal_force
         self.torque[k] = data.qfrc_actuator[6:]

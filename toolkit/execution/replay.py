@@ -53,7 +53,7 @@ def replay_run(execution: Execution, *, observer: Callable[[float], None] = lamb
         raise ExecutionError(
             f"the run has {len(controls.ctrl)} steps in {ticks} control ticks of {standard.decimation}"
         )
-    recorder = Recorder(ticks, scene, standard.robot, index)
+    recorder = Recorder(standard, ticks, scene, index)
     simulation = Simulation(recorder, controls.qpos0, controls.qvel0)
     report_every = max(round(0.1 / standard.period), 1)
     began = perf_counter()

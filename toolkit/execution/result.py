@@ -10,6 +10,7 @@ import numpy as np
 
 from toolkit.contacts.failure import Failure
 from toolkit.execution.check import Check
+from toolkit.execution.scuff import Scuff
 from toolkit.execution.standard import Standard
 from toolkit.replanning.replanner import ReplanCounts
 
@@ -77,15 +78,17 @@ class Execution:
         standard: What the run is held against.
         touchdowns: One dict per transition: `transition`, `limb`, `time`, `planned_time`, `position_error` in m.
         slip: For each stance, the largest tangential displacement of any patch while it was in contact, in m.
+        scuffs: The swings in which a limb touched between lift-off and touchdown.
         completed: Whether the plan was run to its end.
         fall: How the robot fell: base too low, tilted, or body contact with the world. None where it did not.
         solver_failures: Number of control ticks whose QP was not solved.
         com_rms_error: Distance in m from the plan as replanned, so that a push does not count for ever.
         unplanned_contacts: Distinct (robot geom, world geom) names that touched outside the patches.
+        max_scuff: Largest change of the CoM's velocity by the touches of one swing, m/s.
         simulated_seconds, real_time_factor: Of the whole loop.
         checks: Every check of the verdict that execution decides.
         failure: The first check that did not pass, or the fall; its time is that of the fall, the first unplanned
-            contact or the stance that slipped too far. None where every check passed.
+            contact, the worst scuff or the stance that slipped too far. None where every check passed.
         replayable: Whether the controls alone reproduce the run; False where it was pushed.
     """
 
@@ -95,11 +98,13 @@ class Execution:
     samples: Samples
     touchdowns: tuple[dict, ...]
     slip: tuple[float, ...]
+    scuffs: tuple[Scuff, ...]
     completed: bool
     fall: Failure | None
     goal_reached: bool
     final_goal_distance: float
     max_slip: float
+    max_scuff: float
     max_touchdown_error: float
     max_torque_ratio: float
     max_velocity_ratio: float
@@ -125,6 +130,16 @@ class Execution:
             elif item.name not in ("scene", "standard", "fall", "failure"):
                 values[item.name] = value
         return values
+
+    @property
+    def max_scuff_impulse(self) -> float:
+        """Largest impulse of the touches of one swing between lift-off and touchdown, N s."""
+        return max((each.impulse for each in self.scuffs), default=0.0)
+
+    @property
+    def max_scuff_force(self) -> float:
+        """Largest force of such a touch, N."""
+        return max((each.peak for each in self.scuffs), default=0.0)
 
     @property
     def fell(self) -> bool:

@@ -71,7 +71,7 @@ def execute(
         replanner = Replanner(reference, plan)
     controller = Controller(robot, reference, margins, period, replanner)
     standard = Standard.of(plan, config, reference.swings, ticks)
-    recorder = Recorder(ticks, scene, standard.robot, index)
+    recorder = Recorder(standard, ticks, scene, index)
     told = StateFilter(config.disturbance, period, rng)
     push_time, push = config.disturbance.draw_push(plan.schedule.duration, rng)
     simulation = Simulation(recorder, qpos0, qvel0)

@@ -36,7 +36,7 @@ class Simulation:
             if push is not None:
                 data.xfrc_applied[recorder.index.base, :3] = push[part]
             mujoco.mj_step(recorder.scene, data)
-            recorder.meter.read(data)
+            recorder.read(data)
             if part == 0:
                 recorder.record(data, self.qpos, self.qvel)
             self.qpos[:], self.qvel[:] = data.qpos, data.qvel

@@ -8,7 +8,8 @@ import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
-from toolkit.errors import InputError
+from toolkit.errors import InputError, PlanningError
+from toolkit.mjcf import warnings_refused
 from toolkit.pipeline.candidate import Candidate, Source
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.pipeline.loop import PipelineResult
@@ -22,6 +23,7 @@ from toolkit.world.world import World
 NEAR = 0.02  # m; a patch farther from its surface was planned for another world
 
 
+@warnings_refused("the run", PlanningError)
 def carry_out(
     robot: RobotModel,
     world: World,

@@ -10,7 +10,9 @@ import numpy as np
 from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.sequence import ContactSequence
+from toolkit.errors import PlanningError
 from toolkit.execution.check import Check
+from toolkit.mjcf import warnings_refused
 from toolkit.pipeline.candidate import Candidate, Source, refined_solution
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.pipeline.observer import Observer
@@ -78,6 +80,7 @@ class PipelineResult:
         return self.trial.execution.checks if self.trial is not None and self.trial.execution is not None else ()
 
 
+@warnings_refused("the run", PlanningError)
 def run(
     robot: RobotModel,
     world: World,

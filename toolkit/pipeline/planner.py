@@ -12,6 +12,8 @@ import numpy as np
 from toolkit.centroidal.plan import plan_motion
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.sequence import ContactSequence
+from toolkit.errors import PlanningError
+from toolkit.mjcf import warnings_refused
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.prediction.networks import SLIDING, NetworkEvaluator, load_networks
@@ -46,6 +48,7 @@ def planner_kind(robot: RobotModel, kind: str) -> str:
     return "learned" if (robot.folder / "networks").is_dir() else "kinematic"
 
 
+@warnings_refused("the planner", PlanningError)
 def make_planner(
     robot: RobotModel, world: World, kind: str = "auto", config: PlannerConfig | None = None
 ) -> ContactPlanner:

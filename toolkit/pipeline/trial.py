@@ -137,9 +137,18 @@ class Tester:
             observer=lambda fraction, detail="": observer.progress("execution", fraction, detail),
         )
         trial = Trial(candidate, plan, execution, execution.failure)
-        reason = "" if trial.failure is None else trial.failure.reason
+        reason = _grazes(execution) if trial.failure is None else trial.failure.reason
         observer.finished("execution", trial.passed, time.perf_counter() - began, reason)
         return trial
+
+
+def _grazes(execution: Execution) -> str:
+    """What limbs touched in the midst of their swings, "" where none did."""
+    if not execution.scuffs:
+        return ""
+    worst = max(execution.scuffs, key=lambda each: each.impulse)
+    swings = f"{len(execution.scuffs)} swing{'s' if len(execution.scuffs) > 1 else ''} graze"
+    return f"{swings}, worst the {worst.limb.label} at {worst.time:.2f} s: {worst.impulse:.2g} N s, {worst.peak:.0f} N"
 
 
 def _because(reason: str, failure: Failure | None) -> Failure:

@@ -14,7 +14,7 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.failure import Failure
 from toolkit.execution.result import Execution
-from toolkit.report.files import check_entries, digest, plain, scene_bytes
+from toolkit.report.files import check_entries, digest, plain, scene_bytes, scuff_entries
 from toolkit.report.standard_entry import standard_entry
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
@@ -71,8 +71,8 @@ def write_execution(path: Path, execution: Execution) -> None:
 
     The replay: set `qpos0` and `qvel0` on the model of scene.mjb, apply `ctrl` row by row, one `mj_step` each, and
     `qpos[-1]` comes out. `qpos` has a row per control tick (`tick_times`) and the one after the last step. Where there
-    is a `push`, its rows are forces at the base beside the controls. Touchdowns, unplanned contacts, checks and the
-    standard that the run is held against are JSON text. `scene_digest` is that of scene.mjb.
+    is a `push`, its rows are forces at the base beside the controls. Touchdowns, scuffs, unplanned contacts, checks
+    and the standard that the run is held against are JSON text. `scene_digest` is that of scene.mjb.
     """
     arrays = {
         "standard": np.asarray(json.dumps(standard_entry(execution.standard))),
@@ -85,6 +85,8 @@ def write_execution(path: Path, execution: Execution) -> None:
             value = np.concatenate([np.atleast_2d(value), execution.controls.final_qpos[None]])
         elif name == "checks":
             value = json.dumps(plain(check_entries(value)))
+        elif name == "scuffs":
+            value = json.dumps(plain(scuff_entries(value)))
         elif name in ("touchdowns", "unplanned_contacts"):
             value = json.dumps(plain(value))
         array = np.asarray(value)

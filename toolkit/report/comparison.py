@@ -214,6 +214,7 @@ FIGURES = (
     Figure("simulated", "s", ("execution", "simulated_seconds", 1.0)),
     Figure("distance to the goal", "m", ("execution", "final_goal_distance", 1.0)),
     Figure("largest slip", "mm", ("execution", "max_slip", 1e3)),
+    Figure("largest impulse of a scuff", "N s", ("execution", "max_scuff_impulse", 1.0)),
     Figure("CoM error, RMS", "mm", ("execution", "com_rms_error", 1e3)),
     Figure("touchdown error", "mm", ("execution", "max_touchdown_error", 1e3)),
     Figure("torque / limit", "", ("execution", "max_torque_ratio", 1.0)),

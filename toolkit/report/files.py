@@ -10,6 +10,7 @@ import os
 import time
 import weakref
 from collections.abc import Collection, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -20,6 +21,7 @@ import numpy as np
 from toolkit.drafts import clear_drafts, draft_in, is_draft, is_left, make_folders, remove, remove_folders
 from toolkit.errors import InputError
 from toolkit.execution.check import Check, Result
+from toolkit.execution.scuff import Scuff
 from toolkit.interruption import undisturbed
 
 REPORT = "report.json"
@@ -239,6 +241,11 @@ def check_entries(checks: Sequence[Check]) -> list[dict[str, Any]]:
     return [
         {"name": c.name, "value": c.value, "limit": c.limit, "unit": c.unit, "result": c.result.value} for c in checks
     ]
+
+
+def scuff_entries(scuffs: Sequence[Scuff]) -> list[dict[str, Any]]:
+    """Scuffs as JSON holds them."""
+    return [{**asdict(each), "limb": each.limb.label} for each in scuffs]
 
 
 def read_check(entry: dict[str, Any]) -> Check:

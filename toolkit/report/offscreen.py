@@ -110,7 +110,7 @@ class OffscreenRenderer:
         self._gl = open_context(width, height)
         self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
-        self._scene = mujoco.MjvScene(self._model, maxgeom=20000)
+        self._scene = mujoco.MjvScene(self._model, maxgeom=20000 + 2 * model.ngeom)
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._scene.flags[flag] = shadows
         self._option = mujoco.MjvOption()

@@ -10,6 +10,7 @@ import imageio_ffmpeg
 import mujoco
 import numpy as np
 
+from toolkit.mjcf import mujoco_warnings
 from toolkit.report.offscreen import OffscreenRenderer, Patches
 from toolkit.report.views import best_direction
 
@@ -44,7 +45,7 @@ def strip(
     """
     rows = np.unique(np.linspace(0, len(times) - 1, count).round().astype(int))
     cameras = follow(scene, qpos, times)
-    with OffscreenRenderer(scene, *size) as renderer:
+    with mujoco_warnings(), OffscreenRenderer(scene, *size) as renderer:  # a picture decides nothing
         pictures = [renderer.render(qpos[i], cameras[i], patches=patches, text=f"{times[i]:.1f} s") for i in rows]
     iio.imwrite(path, np.concatenate(pictures, axis=1))
 
@@ -69,7 +70,7 @@ def video(
     """
     rows = np.searchsorted(times, np.arange(times[0], times[-1] + 1e-9, 1 / fps) - 1e-9)
     cameras = follow(scene, qpos, times)
-    with OffscreenRenderer(scene, *size, shadows=False) as renderer:
+    with mujoco_warnings(), OffscreenRenderer(scene, *size, shadows=False) as renderer:
         sink = imageio_ffmpeg.write_frames(
             str(path), size, fps=fps, codec="libx264", quality=7, ffmpeg_log_level="fatal"
         )

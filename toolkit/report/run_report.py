@@ -17,7 +17,7 @@ from toolkit.execution.check import Check
 from toolkit.execution.result import Execution
 from toolkit.pipeline.candidate import Candidate
 from toolkit.pipeline.loop import PipelineResult
-from toolkit.report.files import REPORT, check_entries, read_check, read_json, write_json
+from toolkit.report.files import REPORT, check_entries, read_check, read_json, scuff_entries, write_json
 from toolkit.world.world import World
 
 SCHEMA = 3
@@ -58,6 +58,9 @@ EXECUTION = (
     "goal_reached",
     "final_goal_distance",
     "max_slip",
+    "max_scuff",
+    "max_scuff_impulse",
+    "max_scuff_force",
     "max_touchdown_error",
     "max_torque_ratio",
     "max_velocity_ratio",
@@ -289,10 +292,12 @@ def _execution(execution: Execution | None) -> dict[str, Any]:
     if execution is None:
         return _figures(EXECUTION, None)
     named = execution.named()
+    named |= {name: getattr(execution, name) for name in ("max_scuff_impulse", "max_scuff_force")}
     figures = {name: named[name] for name in EXECUTION}
     figures["tick_seconds"] = _spread(execution.samples.tick_seconds)
     figures["unplanned_contacts"] = len(execution.unplanned_contacts)
     figures["unplanned_contact_geoms"] = [list(pair) for pair in execution.unplanned_contacts]
+    figures["scuffs"] = scuff_entries(execution.scuffs)
     figures["fall_reason"] = named["fall_reason"]
     return figures
 

@@ -18,7 +18,9 @@ from toolkit.contacts.failure import Failure
 from toolkit.errors import ExecutionError, InputError
 from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.execution.scene_index import SceneIndex
+from toolkit.execution.scuff import Scuff
 from toolkit.execution.standard import Standard
+from toolkit.mjcf import mujoco_warnings
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.report.files import EXECUTION, REPORT, SCENE, digest, read_check
 from toolkit.report.run_report import RunReport, report_of
@@ -37,7 +39,14 @@ _SAMPLES = {
 }  # fmt: skip
 """Shape of one row of each measurement, a row per control tick."""
 _UNDEFINED = ("cop_margin", "limb_pose")  # NaN without contact, and for a limb that the robot does not have
-_FIGURES = ("final_goal_distance", "max_slip", "max_touchdown_error", "max_torque_ratio", "max_velocity_ratio")
+_FIGURES = (
+    "final_goal_distance",
+    "max_slip",
+    "max_scuff",
+    "max_touchdown_error",
+    "max_torque_ratio",
+    "max_velocity_ratio",
+)
 _FIGURES += ("com_rms_error", "simulated_seconds")
 _FLAGS = ("completed", "goal_reached", "replayable")
 _COUNTS = ("replans", "replan_failures", "replan_departures", "replan_landings")
@@ -86,15 +95,11 @@ def read_run(folder: Path) -> SavedRun:
 def _read_execution(folder: Path, reason: str) -> Execution:
     """The execution in a folder; `reason` is the verdict's."""
     path = folder / EXECUTION
-    try:
-        with np.load(io.BytesIO(path.read_bytes())) as file:  # of a path it would leave a broken file open
-            arrays = {name: file[name] for name in file.files}
-    except _UNREADABLE as error:
-        raise InputError(f"{path}: is cut off or broken ({_first_line(error)}); {_AGAIN}") from error
+    arrays = read_arrays(path)
     for name in ("standard", "scene_digest"):
         if name not in arrays:
             raise InputError(f"{path}: lacks {name}: a version before this one wrote it, or no run; {_AGAIN}")
-    scene = _read_scene(folder / SCENE, str(arrays["scene_digest"]))
+    scene = read_scene(folder / SCENE, str(arrays["scene_digest"]))
     try:
         return _execution(arrays, scene, reason)
     except KeyError as error:
@@ -103,13 +108,30 @@ def _read_execution(folder: Path, reason: str) -> Execution:
         raise InputError(f"{path}: is broken: {_first_line(error)}; {_AGAIN}") from error
 
 
-def _read_scene(path: Path, expected: str) -> mujoco.MjModel:
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Every array of an npz file.
+
+    Raises:
+        InputError: It is none, or is broken.
+    """
+    try:
+        content = path.read_bytes()
+        if not content.startswith(b"PK"):  # of which NumPy would say that it may hold pickled objects
+            raise ValueError("no npz archive")
+        with np.load(io.BytesIO(content)) as file:  # of a path it would leave a broken file open
+            return {name: file[name] for name in file.files}
+    except _UNREADABLE as error:
+        raise InputError(f"{path}: is cut off or broken ({_first_line(error)}); {_AGAIN}") from error
+
+
+def read_scene(path: Path, expected: str) -> mujoco.MjModel:
     """The compiled scene. MuJoCo itself may crash on a damaged one, so that only what the run wrote is given to it."""
     content = path.read_bytes()
     if digest(content) != expected:
         raise InputError(f"{path}: is cut off, was changed, or is of another run than {EXECUTION}; {_AGAIN}")
     try:
-        return mujoco.MjModel.from_binary_path(str(path))
+        with mujoco_warnings():
+            return mujoco.MjModel.from_binary_path(str(path))
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(
             f"{path}: this MuJoCo ({mujoco.__version__}) cannot read it ({_first_line(error)}); "
@@ -149,6 +171,7 @@ def _execution(arrays: Mapping[str, np.ndarray], scene: mujoco.MjModel, reason: 
         samples=Samples(tick_seconds=np.full(ticks, np.nan), qpos=qpos[:-1], **samples),
         touchdowns=tuple(_read_touchdown(entry, standard) for entry in json.loads(str(arrays["touchdowns"]))),
         slip=tuple(float(value) for value in arrays["slip"]),
+        scuffs=tuple(_read_scuff(entry, standard) for entry in json.loads(str(arrays["scuffs"]))),
         fall=fall,
         solver_failures=int(arrays["solver_failures"]),
         unplanned_contacts=tuple(
@@ -180,6 +203,15 @@ def _read_touchdown(entry: dict[str, Any], standard: Standard) -> dict[str, Any]
         raise ValueError(f"there is no transition {transition}")
     numbers = {name: float(entry[name]) for name in ("time", "planned_time", "position_error")}
     return {"transition": transition, "limb": standard.moves[transition].limb.label, **numbers}
+
+
+def _read_scuff(entry: dict[str, Any], standard: Standard) -> Scuff:
+    """One scuff."""
+    transition = int(entry["transition"])
+    if not 0 <= transition < len(standard.moves):
+        raise ValueError(f"there is no transition {transition}")
+    numbers = {name: float(entry[name]) for name in ("time", "duration", "peak", "impulse")}
+    return Scuff(transition, standard.moves[transition].limb, **numbers)
 
 
 def _first_line(error: BaseException) -> str:

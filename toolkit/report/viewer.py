@@ -14,6 +14,7 @@ import numpy as np
 
 from toolkit.errors import InputError
 from toolkit.execution.result import Execution
+from toolkit.mjcf import mujoco_warnings
 from toolkit.report.pictures import follow
 
 _PROBE = """
@@ -54,7 +55,7 @@ def show(execution: Execution) -> None:
         raise InputError(f"--viewer: the window cannot be opened ({error})") from error
     # A signal ends the process: the thread that draws must have ended before the library is.
     atexit.register(_close, window, [each for each in threading.enumerate() if each not in threads])
-    with window:
+    with mujoco_warnings(), window:  # a view decides nothing
         camera = follow(model, samples.qpos, times)[0]
         window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, model.jnt_bodyid[0]
         window.cam.distance, window.cam.azimuth, window.cam.elevation = 3.5, camera.azimuth, camera.elevation

@@ -12,6 +12,7 @@ import numpy as np
 
 from toolkit.errors import RobotError
 from toolkit.geometry.pose import Pose
+from toolkit.mjcf import warnings_refused
 from toolkit.robot.agreement import check_agreement
 from toolkit.robot.assemble import Assembly, assemble, exclude_pairs
 from toolkit.robot.description import FILE_NAME, RobotDescription, match_joints, read_description, suggestion
@@ -81,54 +82,55 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
         RobotError: There is no such robot, or its description is broken, incomplete or inconsistent.
     """
     folder = _robot_folder(default_robot(robots_dir) if name is None else name, robots_dir)
-    description = read_description(folder / FILE_NAME)
-    assembly = assemble(description, read_model(find_model_file(description)))
-    where = description.path
-    home = home_posture(description, assembly.mujoco_model)
-    check_patches(description, assembly)
-    assembly = exclude_pairs(assembly, touching_neighbours(description, assembly.mujoco_model, home))
-    model = assembly.mujoco_model
-    joint_names = tuple(model.joint(j).name for j in range(1, model.njnt))
-    gains = match_joints(where, "gains", description.gains, joint_names)
-    kp, kd = np.array([gains.get(joint, DEFAULT_GAINS) for joint in joint_names]).T
-    try:
-        urdf = urdf_from_model(model, folder.name)
-        legs, arms = derive_limbs(model, home, assembly.bodies)
-    except RobotError as error:
-        raise RobotError(f"{where}: {error}") from None
-    data = mujoco.MjData(model)
-    data.qpos[:] = home
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    robot = RobotModel(
-        name=folder.name,
-        folder=folder,
-        mjcf=assembly.mjcf,
-        assets=assembly.assets,
-        mujoco_model=model,
-        urdf=urdf,
-        base=model.body(1).name,
-        joint_names=joint_names,
-        lower=model.jnt_range[1:, 0].copy(),
-        upper=model.jnt_range[1:, 1].copy(),
-        velocity_limit=np.array([assembly.velocity[joint] for joint in joint_names]),
-        torque_limit=model.actuator_forcerange[:, 1].copy(),
-        armature=model.dof_armature[6:].copy(),
-        kp=kp,
-        kd=kd,
-        home=home,
-        mass=float(model.body_subtreemass[1]),
-        com_height=float(data.subtree_com[1, 2]),
-        limbs={
-            limb: LimbModel(limb, limb.label, assembly.bodies[limb], item.patch / 2, item.max_force)
-            for limb, item in description.limbs.items()
-        },
-        legs=legs,
-        arms=arms,
-        fingerprint=_fingerprint(description, assembly, home),
-    )
-    check_agreement(robot)
-    return robot
+    with warnings_refused(str(folder), RobotError):
+        description = read_description(folder / FILE_NAME)
+        assembly = assemble(description, read_model(find_model_file(description)))
+        where = description.path
+        home = home_posture(description, assembly.mujoco_model)
+        check_patches(description, assembly)
+        assembly = exclude_pairs(assembly, touching_neighbours(description, assembly.mujoco_model, home))
+        model = assembly.mujoco_model
+        joint_names = tuple(model.joint(j).name for j in range(1, model.njnt))
+        gains = match_joints(where, "gains", description.gains, joint_names)
+        kp, kd = np.array([gains.get(joint, DEFAULT_GAINS) for joint in joint_names]).T
+        try:
+            urdf = urdf_from_model(model, folder.name)
+            legs, arms = derive_limbs(model, home, assembly.bodies)
+        except RobotError as error:
+            raise RobotError(f"{where}: {error}") from None
+        data = mujoco.MjData(model)
+        data.qpos[:] = home
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        robot = RobotModel(
+            name=folder.name,
+            folder=folder,
+            mjcf=assembly.mjcf,
+            assets=assembly.assets,
+            mujoco_model=model,
+            urdf=urdf,
+            base=model.body(1).name,
+            joint_names=joint_names,
+            lower=model.jnt_range[1:, 0].copy(),
+            upper=model.jnt_range[1:, 1].copy(),
+            velocity_limit=np.array([assembly.velocity[joint] for joint in joint_names]),
+            torque_limit=model.actuator_forcerange[:, 1].copy(),
+            armature=model.dof_armature[6:].copy(),
+            kp=kp,
+            kd=kd,
+            home=home,
+            mass=float(model.body_subtreemass[1]),
+            com_height=float(data.subtree_com[1, 2]),
+            limbs={
+                limb: LimbModel(limb, limb.label, assembly.bodies[limb], item.patch / 2, item.max_force)
+                for limb, item in description.limbs.items()
+            },
+            legs=legs,
+            arms=arms,
+            fingerprint=_fingerprint(description, assembly, home),
+        )
+        check_agreement(robot)
+        return robot
 
 
 def _fingerprint(description: RobotDescription, assembly: Assembly, home: np.ndarray) -> str:

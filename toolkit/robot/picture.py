@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from toolkit.errors import ToolkitError
+from toolkit.mjcf import mujoco_warnings
 from toolkit.robot.model import RobotModel
 
 _WIDTH, _HEIGHT = 900, 1200  # pixels
@@ -39,6 +40,7 @@ def standing_scene(robot: RobotModel, friction: float = 1.0) -> mujoco.MjModel:
     return spec.compile()
 
 
+@mujoco_warnings()  # a picture decides nothing
 def render_home(robot: RobotModel) -> np.ndarray:
     """Picture (1200, 900, 3) uint8 of the home posture on a plane.
 

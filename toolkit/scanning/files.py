@@ -59,6 +59,10 @@ def read_scan(path: Path, options: ReadOptions) -> Scan:
     return _checked(path, _upright(scan, kind, options))
 
 
+_EXTRA = ("pypcd4", "rasterio")
+"""Packages of the extra `scan`."""
+
+
 def _quietly(path: Path, read: Callable[[Path, ReadOptions], Scan], options: ReadOptions) -> Scan:
     """Read a file; whatever goes wrong in the library that reads it becomes one line."""
     log = logging.getLogger("trimesh")
@@ -71,6 +75,8 @@ def _quietly(path: Path, read: Callable[[Path, ReadOptions], Scan], options: Rea
         raise
     except ModuleNotFoundError as error:
         package = (error.name or "").split(".")[0]
+        if package not in _EXTRA:  # one that only broken files need, to guess how their text is encoded
+            raise InputError(f"{path}: is damaged, or not what its ending says (it is no plain text)") from error
         raise InputError(
             f"{path}: needs the package {package}; pip install 'humanoid-contact-toolkit[scan]'"
         ) from error

@@ -10,7 +10,9 @@ import numpy as np
 
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
+from toolkit.errors import PlanningError
 from toolkit.geometry.limb import PALMS, Limb
+from toolkit.mjcf import warnings_refused
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import AnaStarResult
@@ -69,6 +71,7 @@ class ContactPlanner:
         self.ground = Ground(robot, world, self.config)
         self._timings = self.config.timings or (world.timing,)
 
+    @warnings_refused("the contact search", PlanningError)
     def search(
         self,
         rng: np.random.Generator,

@@ -15,6 +15,7 @@ from toolkit.contacts.failure import Failure
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
+from toolkit.mjcf import warnings_refused
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.avoidance import ArmAvoidance
 from toolkit.wholebody.check import check
@@ -42,6 +43,7 @@ class WholeBodyPlan(MotionPlan):
     trajectory: WholeBodyTrajectory
 
 
+@warnings_refused("the whole-body motion", PlanningError)
 def whole_body(plan: MotionPlan, scene: mujoco.MjModel, foot_lift: float = LIFT) -> WholeBodyPlan:
     """Find swing paths and a whole-body trajectory for a motion plan.
 

@@ -12,6 +12,7 @@ import numpy as np
 from toolkit.errors import WorldError
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
+from toolkit.mjcf import warnings_refused
 from toolkit.shipped import shipped
 from toolkit.world.extraction import SurfaceConfig, extract_surfaces
 from toolkit.world.solids import solids_of
@@ -48,23 +49,25 @@ def load_world(
         WorldError: The message is one line that names the file, the fault and the remedy.
     """
     path = find_world(Path(path)) if mjcf is None else Path(path)
-    source = read_source(path, mjcf, lambda share: progress(0.5 * share))
-    model = source.model
-    start, goal, timing = _start(path, model), _goal(path, model), _timing(path, model)
-    palms = _start_palms(model)
-    low = np.minimum(start.position, goal.position) - config.plane_margin
-    high = np.maximum(start.position, goal.position) + config.plane_margin
-    square = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
-    solids = solids_of(model, square=square)
-    surfaces = extract_surfaces(source, solids, square, config, lambda share: progress(0.5 + 0.5 * share))
-    if not any(surface.serves_foot for surface in surfaces):
-        raise WorldError(
-            f"{path}: no usable surface for feet; add a static colliding geom with a free flat top of at least "
-            f"{config.foot_area:g} m^2, tilted less than {np.degrees(config.foot_angle):g} degrees{_also_feet(palms)}"
-        )
-    _check_ground(path, start, surfaces, palms)
-    _check_walls(path, palms, surfaces, config)
-    return World(path.stem, path, model, surfaces, start, goal, timing, square, source.spec, palms)
+    with warnings_refused(str(path), WorldError):
+        source = read_source(path, mjcf, lambda share: progress(0.5 * share))
+        model = source.model
+        start, goal, timing = _start(path, model), _goal(path, model), _timing(path, model)
+        palms = _start_palms(model)
+        low = np.minimum(start.position, goal.position) - config.plane_margin
+        high = np.maximum(start.position, goal.position) + config.plane_margin
+        square = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+        solids = solids_of(model, square=square)
+        surfaces = extract_surfaces(source, solids, square, config, lambda share: progress(0.5 + 0.5 * share))
+        if not any(surface.serves_foot for surface in surfaces):
+            raise WorldError(
+                f"{path}: no usable surface for feet; add a static colliding geom with a free flat top of at least "
+                f"{config.foot_area:g} m^2, tilted less than {np.degrees(config.foot_angle):g} degrees"
+                f"{_also_feet(palms)}"
+            )
+        _check_ground(path, start, surfaces, palms)
+        _check_walls(path, palms, surfaces, config)
+        return World(path.stem, path, model, surfaces, start, goal, timing, square, source.spec, palms)
 
 
 def find_world(path: Path) -> Path:

@@ -1,8 +1,6 @@
 """Damaged reports, plans and standards of runs end in one line and exit code 2, or are taken; nothing else happens.
 
-A few cases run by default. For a long run:
-
-    FUZZ_SECONDS=3600 FUZZ_SEED=7 python -m pytest tests/saved/test_fuzz.py -m slow -s
+A few cases run by default. For a long run see `tests/fuzz/budget.py`.
 """
 
 import json
@@ -13,7 +11,8 @@ import time
 import numpy as np
 import pytest
 
-from tests.fuzz.test_commands import SECONDS, SEED, damaged
+from tests.fuzz.budget import SEED, seconds
+from tests.fuzz.test_commands import damaged
 from tests.saved import damage
 from tests.saved.conftest import called
 from toolkit import compare, execute, replay
@@ -21,7 +20,7 @@ from toolkit import compare, execute, replay
 
 def check(folder, whole, rng) -> tuple[str, int]:
     """Damage one part of a run and call a command that reads it; the part, and the command's exit code."""
-    part = str(rng.choice(["report.json", "plan.json", "standard", "touchdowns", "checks"]))
+    part = str(rng.choice(["report.json", "plan.json", "standard", "touchdowns", "scuffs", "checks"]))
     if part.endswith(".json"):
         content = damaged(json.loads((whole / part).read_text()), rng)
         (folder / part).write_text(json.dumps(content))
@@ -53,13 +52,14 @@ def test_some_damaged_runs(copy, walk_folder, capsys):
 
 @pytest.mark.slow
 def test_damaged_runs_for_long(copy, walk_folder, capsys):
-    end, number = time.monotonic() + SECONDS / 5, 0
+    end, number = time.monotonic() + seconds("runs"), 0
     counts: dict[tuple[str, int], int] = {}
     while time.monotonic() < end:
         try:
             key = check(copy, walk_folder, np.random.default_rng([SEED, number]))
         except Exception as error:
             raise AssertionError(f"case {number} of seed {SEED}: {error}") from error
+        capsys.readouterr()
         counts[key] = counts.get(key, 0) + 1
         number += 1
     with capsys.disabled():
