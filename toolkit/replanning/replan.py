@@ -1,9 +1,7 @@
-"""ReplanProblem: the quadratic program of a replan.
+"""ReplanProblem: the centroidal problem of the next contacts, from the measured state.
 
-The states are deviations from the plan: of the CoM, of its velocity, of the angular momentum per mass about a fixed
-point near it, and of the spin (about the CoM) at the knot before. Each free landing point adds two shifts along its
-plane. The wrenches are deviations too, in weights. The dynamics are those of `toolkit.centroidal.problem`, exact but
-for the product of a landing's shift with the change of its force. The limits of the body are linear about the plan.
+Its dynamics, cones and limits are those of `toolkit.centroidal`, about the contacts where they are. Its objective is
+the distance from the plan. The solver starts at the plan and takes the limits of the body to first order from there.
 """
 
 from __future__ import annotations
@@ -12,29 +10,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.centroidal.program import Landing, Layout, contact_block, indices, single_bounds, slack_prices
+from toolkit.centroidal.stages.blocks import Block
+from toolkit.centroidal.stages.method import Blocks, Options, Prices, Work, minimise
+from toolkit.centroidal.stages.rows import FINAL_ROWS
+from toolkit.centroidal.stages.steps import ANGULAR_RATE, STATE, WRENCH, Steps
 from toolkit.control.corrector import PENDULUM_RATE, Cones
-from toolkit.physics.wrench import friction_rows, sole_rows
-from toolkit.replanning.kernel import Program, solve
-from toolkit.replanning.knot_costs import knot_costs
 from toolkit.replanning.landing import Landings
-from toolkit.replanning.linear_motion import Dynamics, FreeLandings, Window
-from toolkit.replanning.nominal import BODY, HORIZON, Nominal
+from toolkit.replanning.nominal import HORIZON, Nominal
+from toolkit.replanning.plan_rows import PlanRows
 from toolkit.replanning.situation import HorizonContacts, Situation
-from toolkit.replanning.sweep import GIVEN
+from toolkit.replanning.tracking import SPIN_RATE, Tracking
+from toolkit.replanning.window import Window
 from toolkit.robot.model import RobotModel
 from toolkit.world.surface import Surface
 
 MOVABLE = 2  # contacts to be made whose places are free, at most
 DEADBAND = 0.01  # m; divergence that the controller's gains settle, where every foot is as near to its planned place
-SIDES = 8
-ROWS = SIDES + 12 + 10 + 1
-PRICE = 10.0  # price of exceeding the body's limits, per m or rad: a small excess is better than a fall
-HARD = 1e4  # price of a landing point outside its region, per m
-SOFTNESS = 0.05  # m or rad; excess by which a price doubles
-ROOM = 1e-3  # least distance of the plan's own wrenches to their rows
-FORCE, MOMENT = 1.0, 5.0  # costs per s of the wrenches' squared deviations in weights and weights times 1 m
-PALM_MOMENT = 1e3  # cost that keeps a palm's moments as planned: the controller gives palms none
-MAX_ITERATIONS, TOLERANCE = 25, 1e-6  # limits of the solver
+SLACK = 0.25  # price per s of taking back the body's margins: a small excess is better than a fall
+CONES = 2000.0  # price of leaving the controller's cones, in multiples of `SLACK`
+MOST = 3.0  # weights; largest normal force
+OPTIONS = Options(False, iterations=20, tolerance=1e-2, feasible=1e-3, gap=1e-3, least=1e-5, small=0.1, linear=True)
 
 # Landing points stay where they are planned while the divergence left when the next foot lands is at most SETTLED m
 # and the body's limits exceeded on the way cost at most EXCESS: the controller's gains suffice for that.
@@ -79,8 +75,7 @@ class ReplanProblem:
     def __init__(self, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...]):
         self._nominal = nominal
         self._landings = Landings(nominal.swings, robot.half_sizes, surfaces)
-        self._cone_rows: dict[tuple, np.ndarray] = {}
-        self._size = GIVEN + 2 * MOVABLE
+        self._rows = PlanRows.of(nominal.problem, robot)
 
     def solve(self, situation: Situation) -> Replan | None:
         """The best motion from a measured state; None where the solver gives no answer.
@@ -113,79 +108,84 @@ class ReplanProblem:
 
     def _solve(self, situation: Situation, early: dict[int, float], movable: int = MOVABLE) -> Replan | None:
         """The best motion with given earlier ends of swings, and at most so many movable landing points."""
-        nominal, size = self._nominal, self._size
+        nominal = self._nominal
         window = Window.of(nominal, situation.time, HORIZON)
         contacts = HorizonContacts.of(nominal, situation, window.first, window.times, early)
         events = self._free_landings(situation, window, movable)
         planes = [self._landings.contacts[event].pose.rotation[:, :2] for event in events]
-        free = FreeLandings.of(events, planes, nominal, contacts)
-        span = slice(window.first, window.last)
-        dynamics = Dynamics.of(window, nominal.wrench[span], contacts, free, size)
-        share = nominal.share[span]
-        cost, slope, constant = knot_costs(window, free, contacts.shift, share, situation.goal, size)
-        rows, bound = self._contact_rows(window, contacts, dynamics, situation.cones)
-        knot, soft, soft_bound, price = self._soft_rows(window, contacts, free, situation, early)
-        weight = np.empty((len(dynamics.step), 6))
-        duration = window.dt[dynamics.step]
-        weight[:, :3] = (FORCE * duration)[:, None]
-        weight[:, 3:] = (np.where(dynamics.limb < 2, MOMENT, PALM_MOMENT) * duration)[:, None]
-        program = Program(
-            a=dynamics.a,
-            b=dynamics.b,
-            drift=dynamics.drift,
-            cost=cost,
-            slope=slope,
-            first=dynamics.first,
-            spread=dynamics.spread,
-            weight=weight,
-            rows=rows,
-            bound=bound,
-            knot=knot,
-            soft_rows=soft,
-            soft_bound=soft_bound,
-            price=price,
-            softness=SOFTNESS,
-            start=self._start(window, situation),
+        landings = [self._landing(event, window) for event in events]
+        layout = Layout.of(contacts.active, [item.step for item in landings] if events else None)
+        step, limb = np.nonzero(contacts.active)
+        span, dt = slice(window.first, window.last), window.dt
+        wrench, planned = indices(layout.wrench[step, limb], WRENCH), nominal.wrench[span][step, limb]
+        states = np.column_stack([window.com, window.velocity, window.wrench_spin])
+        goal = [plane.T @ situation.goal.get(event, np.zeros(3)) for event, plane in zip(events, planes, strict=True)]
+        goal = np.reshape(goal, (-1, 2))
+        track = Tracking(layout, dt, states, planned, nominal.share[span], contacts, landings, events, planes)
+        price = SLACK * dt
+
+        y = np.zeros((len(dt) + 1, int(layout.size.max())))
+        y[:, :9] = states
+        y[0, :9] += self._deviation(window, situation)
+        y[step[:, None], wrench] = planned
+        # Slacks start where their prices balance the barrier.
+        y[step[:, None], wrench[:, -1:] + [1, 2]] = OPTIONS.gap / price[step, None]
+        y[np.arange(len(dt) + 1), layout.slack[:, 1]] = OPTIONS.gap / np.append(price, price[-1])
+        y[np.arange(len(dt)), layout.slack[:-1, 0]] = OPTIONS.gap / (CONES * price)
+        for item, place in zip(landings, goal, strict=True):
+            y[item.step, layout.landing[item.step] + np.arange(2)] = place
+            y[item.step + 1 :, layout.pair(item.limb)] = place
+        blocks = Blocks(
+            self._cones(layout, contacts, situation.cones, price),
+            *self._rows.blocks(layout, window.first, dt, contacts),
+            Block.of(np.zeros(0), np.zeros((0, STATE), int), np.zeros((0, 0)), FINAL_ROWS),
+            self._bounds(layout, contacts, landings, events, situation, early),
         )
-        u = np.zeros((len(dynamics.step), 6))
-        guess = np.zeros(size - GIVEN)
-        for index, (event, plane) in enumerate(zip(events, planes, strict=True)):
-            guess[2 * index : 2 * index + 2] = plane.T @ situation.goal.get(event, np.zeros(3))
-        x, _, residual, gap = solve(program, u, guess, MAX_ITERATIONS, TOLERANCE)
-        if not (np.isfinite(x).all() and np.isfinite(u).all() and residual < 1e-3 and gap < 1e-3):
+        steps = self._steps(layout, window, contacts, landings)
+        prices = Prices.joined([slack_prices(layout, price, CONES), track.prices(goal)])
+        work = Work.of(len(dt) + 1, layout.states, y.shape[1])
+        _, _, objective = minimise(steps, prices, track.squares(), blocks, layout.size, y, work, OPTIONS)
+        if not (np.isfinite(objective) and np.isfinite(y).all()):
             return None
-        excess = price * np.maximum(np.einsum("ki,ki->k", soft, x[knot]) - soft_bound, 0.0)
-        objective = constant + 0.5 * np.einsum("ti,tij,tj", x, cost, x) + (slope * x).sum()
-        objective += 0.5 * (weight * u * u).sum() + excess.sum()
-        objective += EARLY * sum(nominal.swings[k].end - t for k, t in early.items())
-        wrench = np.zeros((window.steps, 4, 6))
-        wrench[dynamics.step, dynamics.limb] = dynamics.wrench + u
+        excess = (np.append(price, price[-1]) * np.maximum(y[np.arange(len(dt) + 1), layout.slack[:, 1]], 0.0)).sum()
+        found = np.zeros((len(dt), 4, 6))
+        found[step, limb] = y[step[:, None], wrench]
+        shifts = [y[item.step, layout.landing[item.step] + np.arange(2)] for item in landings]
         ends = [nominal.swings[event].end for event in self._landings.contacts]
         next_end = min((end for end in ends if end > situation.time), default=np.inf)
-        times, dt, spin = window.times, window.dt[:, None], window.spin_of(x)
+        times, off = window.times, y[:, :9] - states
+        rates = np.diff(off, axis=0) / dt[:, None]
         return Replan(
             times=times,
-            com=x[:, :3],
-            velocity=x[:, 3:6],
-            spin=spin,
-            acceleration=np.diff(x[:, 3:6], axis=0) / dt,
-            spin_rate=np.diff(spin, axis=0) / dt,
-            wrench=wrench,
-            landing={event: planes[index] @ x[0, free.states(index)] for index, event in enumerate(events)},
+            com=off[:, :3],
+            velocity=off[:, 3:6],
+            spin=off[:, 6:],
+            acceleration=rates[:, 3:6],
+            spin_rate=rates[:, 6:],
+            wrench=found,
+            landing={event: plane @ shift for event, plane, shift in zip(events, planes, shifts, strict=True)},
             ends=early,
-            objective=float(objective),
-            excess=float(excess.sum()),
-            divergence=np.linalg.norm(x[:, :3] + x[:, 3:6] / PENDULUM_RATE, axis=1),
-            next_landing=int(np.searchsorted(times, next_end) if next_end < times[-1] else window.steps),
+            objective=float(objective) + EARLY * sum(nominal.swings[k].end - t for k, t in early.items()),
+            excess=float(excess),
+            divergence=np.linalg.norm(off[:, :3] + off[:, 3:6] / PENDULUM_RATE, axis=1),
+            next_landing=int(np.searchsorted(times, next_end) if next_end < times[-1] else len(dt)),
         )
 
-    def _start(self, window: Window, situation: Situation) -> np.ndarray:
-        """The measured deviation (12,) from the plan, less a deadband that needs no reaction."""
-        start = window.deviation(situation)
-        divergence = float(np.linalg.norm(start[:3] + start[3:6] / PENDULUM_RATE))
-        start *= max(1.0 - DEADBAND / max(divergence, 1e-9), 0.0)
-        start[:3] += situation.com_shift
-        return start
+    def _deviation(self, window: Window, situation: Situation) -> np.ndarray:
+        """The measured deviation (9,) from the plan, less a deadband that needs no reaction."""
+        com = situation.com - window.com[0] - situation.com_shift
+        velocity = situation.velocity - window.velocity[0]
+        divergence = float(np.linalg.norm(com + velocity / PENDULUM_RATE))
+        off = np.concatenate([com, velocity, situation.spin - window.spin[0]])
+        off *= max(1.0 - DEADBAND / max(divergence, 1e-9), 0.0)
+        off[:3] += situation.com_shift
+        return off
+
+    def _landing(self, event: int, window: Window) -> Landing:
+        """A landing point that may move: it is chosen as the swing begins, or now."""
+        swing = self._nominal.swings[event]
+        step = max(int(np.searchsorted(window.times, swing.start + 1e-6, side="right")) - 1, 0)
+        return Landing(swing.limb, step, np.full(2, -np.inf), np.full(2, np.inf))
 
     def _free_landings(self, situation: Situation, window: Window, most: int) -> list[int]:
         """Swings of feet whose landing point is free, the next ones first."""
@@ -201,58 +201,50 @@ class ReplanProblem:
             free.append(event)
         return free
 
-    def _contact_rows(self, window: Window, contacts: HorizonContacts, dynamics: Dynamics, cones: Cones):
-        """Rows (C, ROWS, 6) and bounds (C, ROWS) of the wrenches' deviations."""
-        step, limb = dynamics.step, dynamics.limb
-        friction = contacts.friction[step, limb]
-        rows, limit = np.zeros((len(step), ROWS, 6)), np.zeros((len(step), ROWS))
-        for c in range(len(step)):
-            rows[c, : SIDES + 12] = self._cone(int(limb[c]), float(friction[c]), cones)
-            rows[c, -1, 2], limit[c, -1] = 1.0, 3.0
-            if limb[c] < 2:
-                torque = self._nominal.torque[window.first + step[c], limb[c]]
-                rows[c, SIDES + 12 : -1] = np.concatenate([torque, -torque])
-                limit[c, SIDES + 12 : -1] = BODY.torque
-        return rows, np.maximum(limit - np.einsum("cri,ci->cr", rows, dynamics.wrench), ROOM)
+    def _steps(self, layout: Layout, window: Window, contacts: HorizonContacts, landings: list[Landing]) -> Steps:
+        """Dynamics of the steps, and the price of the rate of the angular momentum."""
+        dt, (step, limb) = window.dt, np.nonzero(contacts.active)
+        weights = np.zeros((len(dt), 6))
+        weights[:, ANGULAR_RATE] = SPIN_RATE * dt
+        return Steps(
+            dt=dt,
+            first=np.searchsorted(step, np.arange(len(dt) + 1)),
+            wrench=layout.wrench[step, limb],
+            pair=layout.displaced(limb),
+            rotation=contacts.rotation[step, limb],
+            position=(contacts.position + contacts.shift)[step, limb],
+            weights=weights,
+            height=np.zeros(len(dt)),
+            source=layout.sources(landings),
+            turning=np.diff(window.wrench_spin, axis=0) / dt[:, None],
+        )
 
-    def _cone(self, limb: int, friction: float, cones: Cones) -> np.ndarray:
-        """Rows (SIDES + 12, 6) of a contact's cone."""
-        key = limb, friction, cones.friction, cones.yaw, float(cones.half_size[limb, 0])
-        rows = self._cone_rows.get(key)
-        if rows is None:
-            rows = np.zeros((SIDES + 12, 6))
-            if limb < 2:
-                rows[:] = sole_rows(friction * cones.friction, cones.half_size[limb], cones.yaw, SIDES)
-            else:
-                rows[:SIDES, :3] = friction_rows(friction * cones.friction, SIDES)
-            self._cone_rows[key] = rows
-        return rows
+    def _cones(self, layout: Layout, contacts: HorizonContacts, cones: Cones, price: np.ndarray) -> Block:
+        """The controller's cones, which no slack but the excess widens."""
+        step, limb = np.nonzero(contacts.active)
+        margins = np.tile([cones.friction, 0.0, 0.0, cones.yaw], (len(step), 2))
+        mu, free = contacts.friction[step, limb], np.zeros((len(step), 7))
+        return contact_block(
+            layout, contacts.active, np.column_stack([mu, cones.half_size[limb], margins, free, price[step]])
+        )
 
-    def _soft_rows(self, window: Window, contacts: HorizonContacts, free: FreeLandings, situation: Situation, early):
-        """Knots, rows, bounds and prices of the body's limits after the first knot, then of the landing regions."""
-        nominal, size, first = self._nominal, self._size, window.first
-        table = nominal.rows
-        begin, end = np.searchsorted(table.knot, [first + 1, window.last + 1])
-        knot, limb = table.knot[begin:end] - first, table.limb[begin:end]
-        gradient, clearance = table.gradient[begin:end], table.clearance[begin:end]
-        rows = np.zeros((end - begin, size))
-        rows[:, :3] = -gradient
-        # The contact of the step before the knot or, where there is none, of the step after it.
-        step = np.where(nominal.active[first + knot - 1, limb] | (knot >= window.steps), knot - 1, knot)
-        contact = limb >= 0
-        bound = clearance - np.where(contact, (gradient * contacts.shift[step, limb]).sum(1), 0.0)
-        for index, plane in enumerate(free.planes):
-            here = contact & (free.column[step, limb] == index)
-            rows[here, free.states(index)] = gradient[here] @ plane
-        blocks, bounds = [rows], [bound]
-        for index, event in enumerate(free.events):
-            end = early.get(event, nominal.swings[event].end)
+    def _bounds(
+        self,
+        layout: Layout,
+        contacts: HorizonContacts,
+        landings: list[Landing],
+        events: list[int],
+        situation: Situation,
+        early: dict[int, float],
+    ) -> Block:
+        """Bounds of single variables, and of landing points."""
+        stage, variables, parameters = single_bounds(layout, contacts.active, np.full(4, MOST))
+        if not landings:
+            return Block.of(stage, variables, parameters, 1)
+        parts = [(stage, variables.repeat(2, 1), np.insert(parameters, 1, 0.0, axis=1))]
+        for item, event in zip(landings, events, strict=True):
+            end = early.get(event, self._nominal.swings[event].end)
             region, room = self._landings.region(event, situation, end)
-            block = np.zeros((len(region), size))
-            block[:, free.states(index)] = region
-            blocks.append(block)
-            bounds.append(room)
-        landing = sum(len(block) for block in blocks[1:])
-        price = np.concatenate([np.full(len(rows), PRICE), np.full(landing, HARD)])
-        knot = np.concatenate([knot, np.zeros(landing, int)]).astype(np.int64)
-        return knot, np.concatenate(blocks), np.concatenate(bounds), price
+            places = np.tile(layout.landing[item.step] + np.arange(2), (len(region), 1))
+            parts.append((np.full(len(region), item.step), places, np.column_stack([-region, -room])))
+        return Block.of(*(np.concatenate(part) for part in zip(*parts, strict=True)), 1)
