@@ -12,7 +12,7 @@ from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.program import Landing, Program, Regularisers, wanted_friction
 from toolkit.centroidal.residual import check, confirmed, cop_margin
 from toolkit.centroidal.sequence import WANTED, WANTED_BODY, SequenceConfig, optimise
-from toolkit.centroidal.stages.method import Work, evaluate
+from toolkit.centroidal.stages.method import Squares, Work, evaluate
 from toolkit.centroidal.stages.rows import prepare_contacts
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
@@ -192,7 +192,7 @@ def model_at(program, y, multiplier):
     prepare_contacts(program.blocks.contacts)
     for block in program.blocks:
         block.multiplier[:] = multiplier
-    value = evaluate(program.steps, program.prices, program.blocks, layout.size, y, 0.0, work)
+    value = evaluate(program.steps, program.prices, Squares.none(), program.blocks, layout.size, y, 0.0, False, work)
     return work, value
 
 

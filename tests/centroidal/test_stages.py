@@ -10,7 +10,7 @@ from toolkit.centroidal.program import Program
 from toolkit.centroidal.sequence import SequenceConfig, guess
 from toolkit.centroidal.stages import blocks, newton
 from toolkit.centroidal.stages.blocks import Block
-from toolkit.centroidal.stages.method import Work, direction, evaluate, longest_steps
+from toolkit.centroidal.stages.method import Squares, Work, direction, evaluate, longest_steps
 from toolkit.centroidal.stages.rows import CONE, SHARPNESS, prepare_contacts
 from toolkit.contacts.category import Category
 from validation.random_contacts import sample_transition
@@ -120,7 +120,7 @@ def test_steps_keep_slacks_and_multipliers_positive():
         expected = blocks.product_after(block, 0.9 * primal, 0.8 * dual)
         together = longest_steps((block, block), 0.9)
         np.testing.assert_allclose(together, np.minimum(0.9 * np.array([primal, dual]), 1.0), rtol=1e-12)
-        blocks.move(block, 0.9 * primal, 0.8 * dual)
+        blocks.move(block, 0.9 * primal, 0.8 * dual, False)
         assert block.slack.min() > 0.0 and block.multiplier.min() > 0.0
         assert blocks.complementarity(block) == pytest.approx(expected)
         assert expected == pytest.approx((block.slack * block.multiplier).sum())
@@ -142,7 +142,7 @@ def transition(robot):
     prepare_contacts(program.blocks.contacts)
     for block in program.blocks:
         block.multiplier[:] = rng.uniform(0.1, 2.0, block.multiplier.shape)
-    evaluate(program.steps, program.prices, program.blocks, size, y, 0.01, work)
+    evaluate(program.steps, program.prices, Squares.none(), program.blocks, size, y, 0.01, False, work)
     for block in program.blocks:
         block.slack[:] = np.maximum(block.value, 0.1)
     return SimpleNamespace(program=program, y=y, work=work, inside=inside)
@@ -196,7 +196,7 @@ def test_a_cone_s_row_is_zero_on_its_boundary_and_falls_outside(transition):
     most = block.parameters[0, 0] * block.parameters[0, 3] * y[at, index[2]]
     for part, sign in ((0.5, 1), (1.0, 0), (1.5, -1)):
         y[at, index[:2]] = part * most * np.array([0.6, -0.8])
-        evaluate(program.steps, program.prices, program.blocks, program.layout.size, y, 0.0, work)
+        evaluate(program.steps, program.prices, Squares.none(), program.blocks, program.layout.size, y, 0.0, False, work)
         value = block.value[0, CONE] / SHARPNESS
         assert np.sign(np.round(value, 6)) == sign
         assert value == pytest.approx((1 - part**2) * most, abs=1e-6)
@@ -211,7 +211,7 @@ def test_a_cone_that_holds_less_than_the_floor_has_one_branch(transition):
     values, slopes = [], []
     for load in (-0.1, -1e-3, 0.0, 1e-3):
         y[at, index[:3]] = 0.003, 0.004, load
-        evaluate(program.steps, program.prices, program.blocks, program.layout.size, y, floor, work)
+        evaluate(program.steps, program.prices, Squares.none(), program.blocks, program.layout.size, y, floor, False, work)
         held = block.parameters[0, 0] * block.parameters[0, 3] * load
         values.append(block.value[0, CONE] / SHARPNESS - held)
         slopes.append(block.slope[0, CONE, :3].copy())

@@ -5,14 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from toolkit.centroidal.problem import STANDARD_GRAVITY as G
 from toolkit.control.corrector import Cones
 from toolkit.control.sampled_plan import sample_reference
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.geometry.limb import Limb
-from toolkit.replanning.linear_motion import G
-from toolkit.replanning.nominal import HORIZON, MAX_DT, Nominal
-from toolkit.replanning.replan import ReplanProblem
+from toolkit.replanning.nominal import HORIZON, Nominal
+from toolkit.replanning.replan import OPTIONS, ReplanProblem
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.replanning.situation import Situation
 
@@ -21,7 +21,7 @@ from toolkit.replanning.situation import Situation
 def nominal(walking):
     plan = walking
     times = np.arange(0.0, plan.schedule.duration, 0.01)
-    return Nominal.of(plan.motion, sample_reference(times, plan), plan.robot)
+    return Nominal.of(plan.motion, sample_reference(times, plan))
 
 
 @pytest.fixture(scope="module")
@@ -73,8 +73,7 @@ def test_the_grid_is_the_plan(walking, nominal):
         np.testing.assert_allclose(nominal.com[k], com, rtol=0.0, atol=1e-9)
         if nominal.times[k] < walking.motion.problem.times[-1]:
             np.testing.assert_allclose(nominal.velocity[k], velocity, rtol=0.0, atol=1e-9)
-    assert np.diff(nominal.times).max() <= MAX_DT + 1e-9
-    assert (nominal.rows.clearance >= 0.0).all() and np.isfinite(nominal.rows.gradient).all()
+    assert nominal.times[-1] >= walking.motion.problem.times[-1] + HORIZON
 
 
 def test_an_undisturbed_state_changes_nothing(walking, nominal, problem):
@@ -109,13 +108,11 @@ def test_a_replan_obeys_the_dynamics(walking, nominal, problem):
             force += own
             moment += np.cross(place, own) + G * turn @ replan.wrench[t, limb, 3:]
         acceleration = force - [0.0, 0.0, G]
-        np.testing.assert_allclose(np.diff(velocity, axis=0)[t], dt[t] * acceleration, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(np.diff(velocity, axis=0)[t], dt[t] * acceleration, rtol=0.0, atol=OPTIONS.feasible)
         about = spin[t : t + 2] + np.cross(com[t : t + 2], velocity[t : t + 2])
         mean = com[t] + dt[t] * (velocity[t] / 2 + dt[t] * acceleration / 6)
         rate = moment + np.cross(mean, [0.0, 0.0, -G])
-        # The product of a landing's shift and the change of its force is left out: 5 cm times a part of the weight.
-        exact = 1e-9 if not any(np.abs(shift).max() > 1e-9 for shift in replan.landing.values()) else 0.3
-        np.testing.assert_allclose(np.diff(about, axis=0)[0], dt[t] * rate, rtol=0.0, atol=exact * dt[t])
+        np.testing.assert_allclose(np.diff(about, axis=0)[0], dt[t] * rate, rtol=0.0, atol=2 * OPTIONS.feasible)
 
 
 def test_a_push_moves_the_landing_along(walking, nominal, problem):
