@@ -127,6 +127,11 @@ def test_steps_keep_slacks_and_multipliers_positive():
         assert blocks.largest_residual(block) == pytest.approx(np.abs(block.value - block.slack).max())
 
 
+def parts_of(program):
+    """What the solver takes of a program."""
+    return program.steps, program.prices, Squares.none(), program.blocks
+
+
 @pytest.fixture(scope="module")
 def transition(robot):
     """A program of a transition with both palms, so that every kind of row is there, at a point near its guess."""
@@ -142,7 +147,7 @@ def transition(robot):
     prepare_contacts(program.blocks.contacts)
     for block in program.blocks:
         block.multiplier[:] = rng.uniform(0.1, 2.0, block.multiplier.shape)
-    evaluate(program.steps, program.prices, Squares.none(), program.blocks, size, y, 0.01, False, work)
+    evaluate(*parts_of(program), size, y, 0.01, False, work)
     for block in program.blocks:
         block.slack[:] = np.maximum(block.value, 0.1)
     return SimpleNamespace(program=program, y=y, work=work, inside=inside)
@@ -196,7 +201,7 @@ def test_a_cone_s_row_is_zero_on_its_boundary_and_falls_outside(transition):
     most = block.parameters[0, 0] * block.parameters[0, 3] * y[at, index[2]]
     for part, sign in ((0.5, 1), (1.0, 0), (1.5, -1)):
         y[at, index[:2]] = part * most * np.array([0.6, -0.8])
-        evaluate(program.steps, program.prices, Squares.none(), program.blocks, program.layout.size, y, 0.0, False, work)
+        evaluate(*parts_of(program), program.layout.size, y, 0.0, False, work)
         value = block.value[0, CONE] / SHARPNESS
         assert np.sign(np.round(value, 6)) == sign
         assert value == pytest.approx((1 - part**2) * most, abs=1e-6)
@@ -211,7 +216,7 @@ def test_a_cone_that_holds_less_than_the_floor_has_one_branch(transition):
     values, slopes = [], []
     for load in (-0.1, -1e-3, 0.0, 1e-3):
         y[at, index[:3]] = 0.003, 0.004, load
-        evaluate(program.steps, program.prices, Squares.none(), program.blocks, program.layout.size, y, floor, False, work)
+        evaluate(*parts_of(program), program.layout.size, y, floor, False, work)
         held = block.parameters[0, 0] * block.parameters[0, 3] * load
         values.append(block.value[0, CONE] / SHARPNESS - held)
         slopes.append(block.slope[0, CONE, :3].copy())

@@ -12,7 +12,8 @@ from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.geometry.limb import Limb
 from toolkit.replanning.nominal import HORIZON, Nominal
-from toolkit.replanning.replan import OPTIONS, ReplanProblem
+from toolkit.replanning.replan import ReplanProblem
+from toolkit.replanning.replan_program import OPTIONS
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.replanning.situation import Situation
 
@@ -34,9 +35,10 @@ def situation(walking, nominal, time, com=(0, 0, 0), velocity=(0, 0, 0), **optio
     planned_com, planned_velocity, _ = walking.motion.sample(time)
     spin = [np.interp(time, nominal.times, nominal.spin[:, k]) for k in range(3)]
     step = int(np.searchsorted(nominal.times, time + 1e-6)) - 1
+    plan = nominal.problem
     standing = {
-        Limb(limb): (int(nominal.landing[step, limb]), nominal.position[step, limb], nominal.rotation[step, limb])
-        for limb in np.flatnonzero(nominal.active[step])
+        Limb(limb): (int(nominal.landing[step, limb]), plan.position[step, limb], plan.rotation[step, limb])
+        for limb in np.flatnonzero(plan.active[step])
     }
     moving = {
         index: np.zeros(3)
@@ -99,11 +101,11 @@ def test_a_replan_obeys_the_dynamics(walking, nominal, problem):
     )
     for t in range(len(dt)):
         force, moment = np.zeros(3), np.zeros(3)
-        for limb in np.flatnonzero(nominal.active[k + t]):
-            place = nominal.position[k + t, limb].copy()
+        for limb in np.flatnonzero(nominal.problem.active[k + t]):
+            place = nominal.problem.position[k + t, limb].copy()
             event = int(nominal.landing[k + t, limb])
             place += replan.landing.get(event, np.zeros(3))
-            turn = nominal.rotation[k + t, limb]
+            turn = nominal.problem.rotation[k + t, limb]
             own = G * turn @ replan.wrench[t, limb, :3]
             force += own
             moment += np.cross(place, own) + G * turn @ replan.wrench[t, limb, 3:]

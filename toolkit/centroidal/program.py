@@ -132,6 +132,10 @@ class Layout:
         """(..., 2) variables of the displacement of a foot's contact, or of the one left (`AIR`), in any stage."""
         return indices(STATE + 2 * np.asarray(which), 2)
 
+    def chosen(self, item: Landing) -> np.ndarray:
+        """(2,) variables of the displacement of a landing point in the step that chooses it."""
+        return self.landing[item.step] + np.arange(2)
+
     def displaced(self, limb: np.ndarray) -> np.ndarray:
         """(n,) first variable of the displacement of limbs' contacts; -1 where they stay."""
         return np.where((limb < len(FEET)) & self.moving, STATE + 2 * limb, -1)
@@ -141,7 +145,7 @@ class Layout:
         source = np.tile(np.arange(STATE, self.states), (len(self.landing), 1))
         for item in landings:
             source[item.step, 2 * AIR : 2 * AIR + 2] = self.pair(item.limb)
-            source[item.step, 2 * item.limb : 2 * item.limb + 2] = self.landing[item.step] + np.arange(2)
+            source[item.step, 2 * item.limb : 2 * item.limb + 2] = self.chosen(item)
         return source
 
     def moved(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:

@@ -19,13 +19,11 @@ class Nominal:
     """A planned motion in M steps, ending with a rest as long as a horizon. SI units, world frame.
 
     Attributes:
-        problem: The problem of these steps.
-        mass: Mass in kg.
+        problem: The problem of these steps, with the contacts.
         times: (M + 1,) s.
         com, velocity, acceleration: (M + 1, 3), (M + 1, 3) and (M, 3).
         spin, wrench_spin: Each (M + 1, 3) m^2/s; angular momentum about the CoM per mass, of the postures and of the
             wrenches (the optimiser's).
-        active, position, rotation, friction: Contacts (M, 4), (M, 4, 3), (M, 4, 3, 3) and (M, 4).
         wrench: (M, 4, 6) about the centre of the patch in the contact frame, in weights and weights times 1 m.
         share: (M, 2) shares of the feet in the load.
         landing: (M, 4) index of the swing that made the contact; -1 for those of the start.
@@ -33,17 +31,12 @@ class Nominal:
     """
 
     problem: CentroidalProblem
-    mass: float
     times: np.ndarray
     com: np.ndarray
     velocity: np.ndarray
     spin: np.ndarray
     wrench_spin: np.ndarray
     acceleration: np.ndarray
-    active: np.ndarray
-    position: np.ndarray
-    rotation: np.ndarray
-    friction: np.ndarray
     wrench: np.ndarray
     share: np.ndarray
     landing: np.ndarray
@@ -64,7 +57,6 @@ class Nominal:
         acceleration = rested.force.sum(1) / mass + GRAVITY
         return cls(
             problem=problem,
-            mass=mass,
             times=problem.times,
             com=rested.com,
             velocity=rested.linear_momentum / mass,
@@ -73,10 +65,6 @@ class Nominal:
             ),
             wrench_spin=rested.angular_momentum / mass,
             acceleration=np.where(moving[:, None], acceleration, 0.0),
-            active=problem.active,
-            position=problem.position,
-            rotation=problem.rotation,
-            friction=problem.friction,
             wrench=planned_wrench(rested) / weight,
             share=load / np.maximum(load.sum(1, keepdims=True), 1e-9),
             landing=landing,

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.program import Landing, Layout, indices
+from toolkit.centroidal.program import Layout, indices
 from toolkit.centroidal.stages.method import Prices, Squares
 from toolkit.centroidal.stages.steps import STATE, WRENCH
 from toolkit.control.corrector import PENDULUM_RATE
 from toolkit.geometry.limb import FEET
+from toolkit.replanning.landing import FreeLandings
 from toolkit.replanning.situation import HorizonContacts
 
 # Weights of the CoM per m^2 s, and of its velocity per m^2/s, horizontal and vertical (no landing point helps there).
@@ -36,8 +37,7 @@ class Tracking:
         wrench: (C, 6) planned wrenches of the contacts, in their frames, in weights.
         share: (N, 2) shares of the feet in the load; each foot takes its share of the CoM along.
         contacts: The contacts, C of them active.
-        landings: Landing points that may move.
-        events, planes: Their swings, and the axes (3, 2) of each.
+        free: Landing points that may move.
     """
 
     layout: Layout
@@ -46,27 +46,30 @@ class Tracking:
     wrench: np.ndarray
     share: np.ndarray
     contacts: HorizonContacts
-    landings: list[Landing]
-    events: list[int]
-    planes: list[np.ndarray]
+    free: FreeLandings
 
-    def prices(self, goal: np.ndarray) -> Prices:
-        """Prices of single variables; `goal` (landings, 2) m are the shifts decided last, along the planes."""
+    def prices(self) -> Prices:
+        """Prices of single variables."""
         n, (step, limb) = len(self.dt), np.nonzero(self.contacts.active)
         weight = self.dt[:, None] * np.array([COM] * 3 + [VELOCITY, VELOCITY, CLIMB] + [SPIN] * 3)
-        if self.landings:
+        if self.free.items:
             weight[:, :3] = 0.0  # see `squares`
         weight[-1, 6:] += FINAL_SPIN
         wanted = self.states[1:].copy()
         wanted[:, :3] += self._led()
         moment = np.where(limb < len(FEET), MOMENT, PALM_MOMENT)
         pull = self.dt[step, None] * np.column_stack([np.full((len(step), 3), FORCE), np.tile(moment, (3, 1)).T])
-        at = np.repeat([item.step for item in self.landings], 2).astype(int)
+        at = np.repeat([item.step for item in self.free.items], 2).astype(int)
         total = LANDING + LANDING_CHANGE
         parts = [
             (np.repeat(np.arange(1, n + 1), 9), np.tile(np.arange(9), n), weight, wanted),
             (np.repeat(step, 6), indices(self.layout.wrench[step, limb], WRENCH), pull, self.wrench),
-            (at, indices(self.layout.landing[at[::2]], 2), np.full(len(at), total), LANDING_CHANGE / total * goal),
+            (
+                at,
+                indices(self.layout.landing[at[::2]], 2),
+                np.full(len(at), total),
+                LANDING_CHANGE / total * self.free.goal,
+            ),
         ]
         stage, variable, quadratic, wanted = (
             np.concatenate([np.ravel(entry) for entry in part]) for part in zip(*parts, strict=True)
@@ -76,13 +79,13 @@ class Tracking:
     def squares(self) -> Squares:
         """Prices of the divergence at the end and, where feet may move, of the CoM from the feet that it follows."""
         n = len(self.dt)
-        knot = np.append(np.arange(1, n + 1) if self.landings else np.zeros(0, np.int64), n)
+        knot = np.append(np.arange(1, n + 1) if self.free.items else np.zeros(0, np.int64), n)
         count, axis = len(knot), np.arange(3)
         variables = np.zeros((count, 3, 2 + 4 * self.layout.moving), np.int64)
         factors = np.zeros(variables.shape)
         variables[..., 0], variables[..., 1] = axis, 3 + axis
         factors[..., 0], factors[-1, :, 1] = 1.0, 1.0 / PENDULUM_RATE
-        if self.landings:
+        if self.free.items:
             variables[..., 2:] = np.arange(STATE, STATE + 4)
             factors[:-1, :, 2:] = self._following()
             factors[-1, :, 2:] = factors[-2, :, 2:]
@@ -91,9 +94,12 @@ class Tracking:
         weight = np.append(COM * self.dt[knot[:-1] - 1], FINAL)
         width = variables.shape[2]
         return Squares(
-            np.repeat(knot, 3), variables.reshape(-1, width), factors.reshape(-1, width), np.repeat(weight, 3),
-            wanted.ravel(),
-        )  # fmt: skip
+            stage=np.repeat(knot, 3),
+            variables=variables.reshape(-1, width),
+            factors=factors.reshape(-1, width),
+            weight=np.repeat(weight, 3),
+            wanted=wanted.ravel(),
+        )
 
     def _led(self) -> np.ndarray:
         """(N, 3) m; shift of the CoM with the contacts already made."""
@@ -102,7 +108,7 @@ class Tracking:
     def _following(self) -> np.ndarray:
         """(N, 3, 4) factors of the feet's displacements, less which the CoM keeps to the plan."""
         follow = np.zeros((len(self.dt), 3, len(FEET), 2))
-        for item, event, plane in zip(self.landings, self.events, self.planes, strict=True):
+        for item, event, plane in zip(self.free.items, self.free.events, self.free.planes, strict=True):
             here = self.contacts.event[:, item.limb] == event
             follow[here, :, item.limb] = -self.share[here, item.limb, None, None] * plane
         return follow.reshape(len(self.dt), 3, 4)

@@ -94,7 +94,8 @@ def terms(steps, t, before, acceleration, spin_rate, after):
     for a in range(3):
         change = acceleration[a] - before[ACCELERATION + a]
         total += weights[MOMENTUM] * after[V + a] ** 2 + weights[MOMENTUM_RATE] * after[ACCELERATION + a] ** 2
-        total += weights[ANGULAR] * after[SPIN + a] ** 2 + weights[ANGULAR_RATE] * (spin_rate[a] - steps.turning[t, a]) ** 2
+        turning = spin_rate[a] - steps.turning[t, a]
+        total += weights[ANGULAR] * after[SPIN + a] ** 2 + weights[ANGULAR_RATE] * turning**2
         total += weights[JERK] * change**2
     return total + weights[HEIGHT] * (after[R + 2] - steps.height[t]) ** 2
 
