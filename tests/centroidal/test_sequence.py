@@ -1,5 +1,6 @@
 """Whole sequences: feasible walks with the wanted margins, honest refusals, and the program behind them."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -198,7 +199,13 @@ def model_at(program, y, multiplier):
 
 def test_the_solver_and_casadi_see_the_same_program(program):
     """Objective, gradient, rows, their derivatives and the Hessian: two writings of one problem."""
-    reference, rng = Reference(program), np.random.default_rng(8)
+    rng = np.random.default_rng(8)
+    prices, steps = program.prices, program.steps
+    wanted = prices._replace(wanted=0.1 * rng.normal(size=len(prices.wanted)))
+    turning = steps._replace(turning=0.1 * rng.normal(size=steps.turning.shape))
+    program = copy(program)
+    program.prices, program.steps = wanted, turning  # other values than a sequence wants
+    reference = Reference(program)
     functions, p = reference.assembly.functions(), reference.assembly.parameters
     layout = program.layout
     for _ in range(3):

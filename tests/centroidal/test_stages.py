@@ -10,8 +10,8 @@ from toolkit.centroidal.program import Program
 from toolkit.centroidal.sequence import SequenceConfig, guess
 from toolkit.centroidal.stages import blocks, newton
 from toolkit.centroidal.stages.blocks import Block
-from toolkit.centroidal.stages.method import Squares, Work, direction, evaluate, longest_steps
-from toolkit.centroidal.stages.rows import CONE, SHARPNESS, prepare_contacts
+from toolkit.centroidal.stages.method import Prices, Squares, Work, direction, evaluate, longest_steps
+from toolkit.centroidal.stages.rows import CONE, SHARPNESS, add_prices, add_squares, prepare_contacts
 from toolkit.contacts.category import Category
 from validation.random_contacts import sample_transition
 
@@ -125,6 +125,38 @@ def test_steps_keep_slacks_and_multipliers_positive():
         assert blocks.complementarity(block) == pytest.approx(expected)
         assert expected == pytest.approx((block.slack * block.multiplier).sum())
         assert blocks.largest_residual(block) == pytest.approx(np.abs(block.value - block.slack).max())
+
+
+def test_linear_rows_change_with_a_step_as_their_slopes_say():
+    rng, stages, size = np.random.default_rng(4), 4, 7
+    block, change = random_block(rng, stages, size=size), rng.normal(size=(stages, size))
+    expected = block.value.ravel() + 0.3 * dense_rows(block, stages, size) @ change.ravel()
+    blocks.set_changes(block, 0.1, False, change)
+    blocks.move(block, 0.3, 0.2, True)
+    np.testing.assert_allclose(block.value.ravel(), expected, rtol=0.0, atol=1e-12)
+
+
+def test_prices_and_their_derivatives():
+    """Of single variables and of sums, one of which names a variable twice: a quadratic function of the variables."""
+    rng, stages, size, n = np.random.default_rng(5), 3, 6, 8
+    single = Prices(rng.integers(0, stages, n), rng.integers(0, size, n), *rng.normal(size=(3, n)))
+    variables = rng.integers(0, size, (n, 3))
+    variables[0, 1] = variables[0, 0]
+    sums = Squares(rng.integers(0, stages, n), variables, rng.normal(size=(n, 3)), *rng.uniform(0.0, 2.0, (2, n)))
+
+    def model(y):
+        hessian, gradient = np.zeros((stages, size, size)), np.zeros((stages, size))
+        value = add_prices(single, y, hessian, gradient) + add_squares(sums, y, hessian, gradient)
+        return value, gradient, hessian
+
+    y, step = rng.normal(size=(2, stages, size))
+    value, gradient, hessian = model(y)
+    taken = y[single.stage, single.variable]
+    expected = single.linear @ taken + single.quadratic @ (taken - single.wanted) ** 2
+    off = (sums.factors * y[sums.stage[:, None], sums.variables]).sum(1) - sums.wanted
+    assert value == pytest.approx(expected + sums.weight @ off**2)
+    bend = np.einsum("ti,tij,tj", step, hessian, step)
+    assert model(y + step)[0] == pytest.approx(value + (gradient * step).sum() + bend / 2)
 
 
 def parts_of(program):

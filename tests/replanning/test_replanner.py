@@ -10,7 +10,8 @@ from toolkit.control.corrector import Cones
 from toolkit.control.sampled_plan import sample_reference
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.physics.wrench import sole_rows
 from toolkit.replanning.nominal import HORIZON, Nominal
 from toolkit.replanning.replan import ReplanProblem
 from toolkit.replanning.replan_program import OPTIONS
@@ -123,6 +124,29 @@ def test_a_push_moves_the_landing_along(walking, nominal, problem):
     back = problem.solve(situation(walking, nominal, time, velocity=(-0.4, 0.0, 0.0)))
     assert ahead.landing[0][0] > 0.005 and back.landing[0][0] < -0.005
     assert max(np.abs(shift).max() for shift in (*ahead.landing.values(), *back.landing.values())) < 0.16
+
+
+def test_wrenches_stay_in_the_cones_and_on_the_feet(walking, nominal, problem):
+    """Also under a push that lets a swing end early. The polygon of the rows is made large enough to hold the cone."""
+    time, cones = mid_swing(nominal), Cones(0.85, 0.8, walking.robot.half_sizes - 0.02)
+    for push in ((0.1, 0.0, 0.0), (0.0, -0.3, 0.0), (0.0, 0.5, 0.0)):
+        state = situation(walking, nominal, time, velocity=push, earliest={0: time + 0.1}, landing={0: np.inf})
+        replan = problem.solve(state)
+        assert np.isfinite(replan.wrench).all() and replan.wrench[:, :2, 2].sum(1).min() > 0.5
+        friction = cones.friction * nominal.problem.friction[0, 0]
+        for limb in FEET:
+            rows = sole_rows(friction / np.cos(np.pi / 24), cones.half_size[limb], cones.yaw)
+            assert (replan.wrench[:, limb] @ rows.T).max() < 2e-3  # in weights, and in weights times 1 m
+        lands = replan.ends.get(0, nominal.swings[0].end)
+        middle = (replan.times[:-1] + replan.times[1:]) / 2
+        assert not replan.wrench[middle < lands, nominal.swings[0].limb].any()
+
+
+def test_the_same_state_has_the_same_answer(walking, nominal, problem):
+    state = situation(walking, nominal, mid_swing(nominal), velocity=(0.3, 0.1, 0.0))
+    first, second = problem.solve(state), problem.solve(state)
+    np.testing.assert_array_equal(first.com, second.com)
+    np.testing.assert_array_equal(first.wrench, second.wrench)
 
 
 def test_a_kept_landing_is_not_moved(walking, nominal, problem):
