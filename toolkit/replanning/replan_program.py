@@ -23,10 +23,10 @@ from toolkit.replanning.situation import HorizonContacts
 from toolkit.replanning.tracking import SPIN_RATE, Tracking
 from toolkit.replanning.window import Window
 
-SLACK = 0.25  # price per s of taking back the body's margins: a small excess is better than a fall
-CONES = 2000.0  # price of leaving the controller's cones, in multiples of `SLACK`
+SLACK = 2.0  # price per s of taking back the body's margins: a small excess is better than a fall
+CONES = 5000.0  # price of leaving the controller's cones, in multiples of `SLACK`
 MOST = 3.0  # weights; largest normal force
-OPTIONS = Options(False, iterations=20, tolerance=1e-2, feasible=1e-3, gap=1e-3, least=1e-5, small=0.1, linear=True)
+OPTIONS = Options(False, iterations=25, tolerance=1e-2, feasible=1e-3, gap=1e-2, least=1e-5, small=0.1, linear=True)
 """The start is near the solution and near the central path, so few iterations suffice: about four."""
 
 
