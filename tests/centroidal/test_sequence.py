@@ -1,5 +1,6 @@
 """Whole sequences: feasible walks with the wanted margins, honest refusals, and the program behind them."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.program import Landing, Program, Regularisers, wanted_friction
 from toolkit.centroidal.residual import check, confirmed, cop_margin
 from toolkit.centroidal.sequence import WANTED, WANTED_BODY, SequenceConfig, optimise
-from toolkit.centroidal.stages.method import Work, evaluate
+from toolkit.centroidal.stages.method import Squares, Work, evaluate
 from toolkit.centroidal.stages.rows import prepare_contacts
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
@@ -192,13 +193,19 @@ def model_at(program, y, multiplier):
     prepare_contacts(program.blocks.contacts)
     for block in program.blocks:
         block.multiplier[:] = multiplier
-    value = evaluate(program.steps, program.prices, program.blocks, layout.size, y, 0.0, work)
+    value = evaluate(program.steps, program.prices, Squares.none(), program.blocks, layout.size, y, 0.0, False, work)
     return work, value
 
 
 def test_the_solver_and_casadi_see_the_same_program(program):
     """Objective, gradient, rows, their derivatives and the Hessian: two writings of one problem."""
-    reference, rng = Reference(program), np.random.default_rng(8)
+    rng = np.random.default_rng(8)
+    prices, steps = program.prices, program.steps
+    wanted = prices._replace(wanted=0.1 * rng.normal(size=len(prices.wanted)))
+    turning = steps._replace(turning=0.1 * rng.normal(size=steps.turning.shape))
+    program = copy(program)
+    program.prices, program.steps = wanted, turning  # other values than a sequence wants
+    reference = Reference(program)
     functions, p = reference.assembly.functions(), reference.assembly.parameters
     layout = program.layout
     for _ in range(3):

@@ -10,8 +10,8 @@ from toolkit.centroidal.program import Program
 from toolkit.centroidal.sequence import SequenceConfig, guess
 from toolkit.centroidal.stages import blocks, newton
 from toolkit.centroidal.stages.blocks import Block
-from toolkit.centroidal.stages.method import Work, direction, evaluate, longest_steps
-from toolkit.centroidal.stages.rows import CONE, SHARPNESS, prepare_contacts
+from toolkit.centroidal.stages.method import Prices, Squares, Work, direction, evaluate, longest_steps
+from toolkit.centroidal.stages.rows import CONE, SHARPNESS, add_prices, add_squares, prepare_contacts
 from toolkit.contacts.category import Category
 from validation.random_contacts import sample_transition
 
@@ -120,11 +120,48 @@ def test_steps_keep_slacks_and_multipliers_positive():
         expected = blocks.product_after(block, 0.9 * primal, 0.8 * dual)
         together = longest_steps((block, block), 0.9)
         np.testing.assert_allclose(together, np.minimum(0.9 * np.array([primal, dual]), 1.0), rtol=1e-12)
-        blocks.move(block, 0.9 * primal, 0.8 * dual)
+        blocks.move(block, 0.9 * primal, 0.8 * dual, False)
         assert block.slack.min() > 0.0 and block.multiplier.min() > 0.0
         assert blocks.complementarity(block) == pytest.approx(expected)
         assert expected == pytest.approx((block.slack * block.multiplier).sum())
         assert blocks.largest_residual(block) == pytest.approx(np.abs(block.value - block.slack).max())
+
+
+def test_linear_rows_change_with_a_step_as_their_slopes_say():
+    rng, stages, size = np.random.default_rng(4), 4, 7
+    block, change = random_block(rng, stages, size=size), rng.normal(size=(stages, size))
+    expected = block.value.ravel() + 0.3 * dense_rows(block, stages, size) @ change.ravel()
+    blocks.set_changes(block, 0.1, False, change)
+    blocks.move(block, 0.3, 0.2, True)
+    np.testing.assert_allclose(block.value.ravel(), expected, rtol=0.0, atol=1e-12)
+
+
+def test_prices_and_their_derivatives():
+    """Of single variables and of sums, one of which names a variable twice: a quadratic function of the variables."""
+    rng, stages, size, n = np.random.default_rng(5), 3, 6, 8
+    single = Prices(rng.integers(0, stages, n), rng.integers(0, size, n), *rng.normal(size=(3, n)))
+    variables = rng.integers(0, size, (n, 3))
+    variables[0, 1] = variables[0, 0]
+    sums = Squares(rng.integers(0, stages, n), variables, rng.normal(size=(n, 3)), *rng.uniform(0.0, 2.0, (2, n)))
+
+    def model(y):
+        hessian, gradient = np.zeros((stages, size, size)), np.zeros((stages, size))
+        value = add_prices(single, y, hessian, gradient) + add_squares(sums, y, hessian, gradient)
+        return value, gradient, hessian
+
+    y, step = rng.normal(size=(2, stages, size))
+    value, gradient, hessian = model(y)
+    taken = y[single.stage, single.variable]
+    expected = single.linear @ taken + single.quadratic @ (taken - single.wanted) ** 2
+    off = (sums.factors * y[sums.stage[:, None], sums.variables]).sum(1) - sums.wanted
+    assert value == pytest.approx(expected + sums.weight @ off**2)
+    bend = np.einsum("ti,tij,tj", step, hessian, step)
+    assert model(y + step)[0] == pytest.approx(value + (gradient * step).sum() + bend / 2)
+
+
+def parts_of(program):
+    """What the solver takes of a program."""
+    return program.steps, program.prices, Squares.none(), program.blocks
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +179,7 @@ def transition(robot):
     prepare_contacts(program.blocks.contacts)
     for block in program.blocks:
         block.multiplier[:] = rng.uniform(0.1, 2.0, block.multiplier.shape)
-    evaluate(program.steps, program.prices, program.blocks, size, y, 0.01, work)
+    evaluate(*parts_of(program), size, y, 0.01, False, work)
     for block in program.blocks:
         block.slack[:] = np.maximum(block.value, 0.1)
     return SimpleNamespace(program=program, y=y, work=work, inside=inside)
@@ -196,7 +233,7 @@ def test_a_cone_s_row_is_zero_on_its_boundary_and_falls_outside(transition):
     most = block.parameters[0, 0] * block.parameters[0, 3] * y[at, index[2]]
     for part, sign in ((0.5, 1), (1.0, 0), (1.5, -1)):
         y[at, index[:2]] = part * most * np.array([0.6, -0.8])
-        evaluate(program.steps, program.prices, program.blocks, program.layout.size, y, 0.0, work)
+        evaluate(*parts_of(program), program.layout.size, y, 0.0, False, work)
         value = block.value[0, CONE] / SHARPNESS
         assert np.sign(np.round(value, 6)) == sign
         assert value == pytest.approx((1 - part**2) * most, abs=1e-6)
@@ -211,7 +248,7 @@ def test_a_cone_that_holds_less_than_the_floor_has_one_branch(transition):
     values, slopes = [], []
     for load in (-0.1, -1e-3, 0.0, 1e-3):
         y[at, index[:3]] = 0.003, 0.004, load
-        evaluate(program.steps, program.prices, program.blocks, program.layout.size, y, floor, work)
+        evaluate(*parts_of(program), program.layout.size, y, floor, False, work)
         held = block.parameters[0, 0] * block.parameters[0, 3] * load
         values.append(block.value[0, CONE] / SHARPNESS - held)
         slopes.append(block.slope[0, CONE, :3].copy())

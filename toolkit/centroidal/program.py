@@ -132,6 +132,50 @@ class Layout:
         """(..., 2) variables of the displacement of a foot's contact, or of the one left (`AIR`), in any stage."""
         return indices(STATE + 2 * np.asarray(which), 2)
 
+    def chosen(self, item: Landing) -> np.ndarray:
+        """(2,) variables of the displacement of a landing point in the step that chooses it."""
+        return self.landing[item.step] + np.arange(2)
+
+    def displaced(self, limb: np.ndarray) -> np.ndarray:
+        """(n,) first variable of the displacement of limbs' contacts; -1 where they stay."""
+        return np.where((limb < len(FEET)) & self.moving, STATE + 2 * limb, -1)
+
+    def sources(self, landings: Sequence[Landing]) -> np.ndarray:
+        """(N, 2 P) variables that become the displacements of the next stage; see `Steps`."""
+        source = np.tile(np.arange(STATE, self.states), (len(self.landing), 1))
+        for item in landings:
+            source[item.step, 2 * AIR : 2 * AIR + 2] = self.pair(item.limb)
+            source[item.step, 2 * item.limb : 2 * item.limb + 2] = self.chosen(item)
+        return source
+
+    def moved(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
+        """(n, 2) variables that displace a foot's contact at knots; (n, 0) where contacts stay."""
+        if not self.moving:
+            return np.zeros((len(knot), 0), int)
+        return np.broadcast_to(self.pair(foot), (len(knot), 2))
+
+    def contacts(self, step: np.ndarray, limb: np.ndarray) -> np.ndarray:
+        """(n, 9) variables of the rows of contacts."""
+        return np.column_stack([indices(self.wrench[step, limb], CONTACT), self.slack[step, 0]])
+
+    def legs(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
+        """(n, k) variables of the limits of stance legs."""
+        return np.column_stack([np.tile(np.arange(3), (len(knot), 1)), self.slack[knot, 1:], self.moved(knot, foot)])
+
+    def torques(self, step: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
+        """(n, k) variables of the joint torques of stance legs."""
+        states, wrench = np.tile(np.arange(6), (len(step), 1)), indices(self.wrench[step, foot], WRENCH)
+        return np.column_stack([states, wrench, self.slack[step, 1:], self.moved(step, foot)])
+
+    def distances(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
+        """(n, k) variables of the lengths of legs in the air and of arms."""
+        states, moved = np.tile(np.arange(6), (len(knot), 1)), [self.moved(knot, which) for which in (foot, AIR)]
+        return np.column_stack([states, self.slack[knot, 1:], *moved])
+
+    def heights(self, knot: np.ndarray, foot: np.ndarray) -> np.ndarray:
+        """(n, k) variables of the height of the CoM above the lowest foot."""
+        return np.column_stack([np.full(len(knot), 2), self.slack[knot, 1:], self.moved(knot, foot)])
+
 
 def indices(first: np.ndarray, size: int) -> np.ndarray:
     """(..., size) consecutive indices from first ones."""
@@ -197,46 +241,33 @@ class Program:
         squares = np.stack([*squares, reg.jerk / (0.2 * np.maximum(p.dt, 0.02)), reg.height * duration], 1)
         squares[0, 4] *= not np.any(p.com_velocity)  # the acceleration before a start in motion is unknown
         height = mean_feet(p)[:, 2] + (p.final_center[2] - p.position[-1, :2, 2].mean())
-        source = np.zeros((p.steps, 0), np.int64)
-        pair = np.full(len(step), -1)
-        if layout.moving:
-            pair = np.where(limb < len(FEET), STATE + 2 * limb, -1)
-            source = np.tile(np.arange(STATE, layout.states), (p.steps, 1))
-            for item in self._landings:
-                source[item.step, 2 * AIR : 2 * AIR + 2] = layout.pair(item.limb)
-                source[item.step, 2 * item.limb : 2 * item.limb + 2] = layout.landing[item.step] + np.arange(2)
         return Steps(
             dt=np.ascontiguousarray(p.dt, float),
             first=np.searchsorted(step, np.arange(p.steps + 1)),
             wrench=layout.wrench[step, limb],
-            pair=pair,
+            pair=layout.displaced(limb),
             rotation=np.ascontiguousarray(p.rotation[step, limb]),
             position=np.ascontiguousarray(p.position[step, limb]),
             weights=SCALE * squares,
             height=np.ascontiguousarray(height[1:]),
-            source=source,
+            source=layout.sources(self._landings),
+            turning=np.zeros((p.steps, 3)),
         )
 
-    def _slack_price(self) -> np.ndarray:
+    @property
+    def slack_price(self) -> np.ndarray:
         """(N,) price of a slack in each step."""
         return SCALE * self._regularisers.slack * self.problem.dt / 0.2
 
     def _prices(self) -> Prices:
         """Prices of the excess, the body's slack and of landing points."""
-        n, price, slack = self.problem.steps, self._slack_price(), self.layout.slack
-        stage = np.concatenate([np.arange(n), np.arange(n + 1)])
-        linear = np.concatenate([self._regularisers.excess * price, price, price[-1:]])
-        variable = np.concatenate([slack[:-1, 0], slack[:, 1]])
         at = np.repeat([item.step for item in self._landings], 2).astype(int)
         moved = indices(self.layout.landing[at[::2]], 2).ravel()
         room = [np.subtract(item.upper, item.lower) for item in self._landings]
         narrow = np.reshape(room, len(at)) < NARROW
-        return Prices(
-            np.concatenate([stage, at]),
-            np.concatenate([variable, moved]),
-            np.concatenate([linear, np.zeros(len(at))]),
-            np.concatenate([EVEN * linear, np.where(narrow, STIFF, SCALE * self._regularisers.landing)]),
-        )
+        weight = np.where(narrow, STIFF, SCALE * self._regularisers.landing)
+        landings = Prices(at, moved, np.zeros(len(at)), weight, np.zeros(len(at)))
+        return Prices.joined([slack_prices(self.layout, self.slack_price, self._regularisers.excess), landings])
 
     def _contacts(self) -> Block:
         """Cones of the contacts."""
@@ -260,16 +291,15 @@ class Program:
         least[:, 1:3] = np.minimum(least[:, 1:3], cop)
         least[:, 0] = np.maximum(LEAST.friction, p.margins.friction)
         least[:, 3] = np.maximum(LEAST.yaw, yaw)
-        load, price = np.where(foot, 0.0, reg.palm_force), self._slack_price()[step]
+        load, price = np.where(foot, 0.0, reg.palm_force), self.slack_price[step]
         mu = p.friction[step, limb]
         parameters = np.column_stack([mu, p.half_size[limb], wanted, least, weights, load, price])
-        wrench = indices(self.layout.wrench[step, limb], CONTACT)
-        return Block.of(step, np.column_stack([wrench, self.layout.slack[step, 0]]), parameters, CONTACT_ROWS)
+        return contact_block(self.layout, p.active, parameters)
 
     def _legs(self) -> Block:
         """Limits of stance legs at the knots."""
         knots, limbs, positions, rotations = self._knot_contacts
-        com, slack, parts = np.arange(3), self.layout.slack, []
+        parts = []
         for limb in FEET:
             leg = self.robot.legs[limb]
             here = np.flatnonzero(limbs == limb)
@@ -278,8 +308,7 @@ class Program:
             hip = (self._heading @ leg.hip_in_com)[at]
             limits = np.tile(leg_limits(leg, self._body), (len(at), 1))
             posture = [hip, ankle, rotation.reshape(-1, 9), np.tile([leg.thigh, leg.shin], (len(at), 1)), limits]
-            variables = [np.tile(com, (len(at), 1)), slack[at, 1:], self._moved(at, limb)]
-            parts.append((at, np.column_stack(variables), np.column_stack(posture)))
+            parts.append((at, self.layout.legs(at, limb), np.column_stack(posture)))
         return _joined(parts, LEG_ROWS)
 
     def _torques(self) -> Block:
@@ -300,10 +329,7 @@ class Program:
                 limits,
                 np.full(len(step), self._body.torque),
             ]
-            wrench = indices(self.layout.wrench[step, limb], WRENCH)
-            variables = [np.tile(np.arange(6), (len(step), 1)), wrench, self.layout.slack[step, 1:]]
-            variables.append(self._moved(step, limb))
-            parts.append((step, np.column_stack(variables), np.column_stack(parameters)))
+            parts.append((step, self.layout.torques(step, limb), np.column_stack(parameters)))
         return _joined(parts, TORQUE_ROWS)
 
     def _distances(self) -> Block:
@@ -334,24 +360,19 @@ class Program:
         tangents: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Stages, variables and parameters of bounds on the distance from roots to tips; see `rows.fill_distances`."""
-        n, layout = len(knot), self.layout
-        variables = [np.tile(np.arange(6), (n, 1)), layout.slack[knot, 1:], self._moved(knot, foot)]
-        parameters = [delay, root, tip, np.tile([*span, self._body.length], (n, 1))]
-        if layout.moving:
-            variables.append(self._moved(knot, AIR))
-            parameters.append(tangents.reshape(n, 12))
-        return knot, np.column_stack(variables), np.column_stack(parameters)
+        parameters = [delay, root, tip, np.tile([*span, self._body.length], (len(knot), 1))]
+        if self.layout.moving:
+            parameters.append(tangents.reshape(len(knot), 12))
+        return knot, self.layout.distances(knot, foot), np.column_stack(parameters)
 
     def _heights(self) -> Block:
         """Least height of the CoM at the knots."""
         p = self.problem
         floor, lowest = lowest_foot(p)
         at = np.flatnonzero(np.isfinite(floor))
-        slack = self.layout.slack[at, 1:]
-        variables = np.column_stack([np.full(len(at), 2), slack, self._moved(at, lowest[at])])
         rises = p.rotation[np.minimum(at, p.steps - 1), lowest[at], 2, :2][:, : 2 * self.layout.moving]
         parameters = np.column_stack([floor[at] + p.min_height, np.full(len(at), self._body.height), rises])
-        return Block.of(at, variables, parameters, 1)
+        return Block.of(at, self.layout.heights(at, lowest[at]), parameters, 1)
 
     def _final(self) -> Block:
         """Box and price of the last state."""
@@ -367,27 +388,46 @@ class Program:
 
     def _bounds(self) -> Block:
         """Bounds of single variables."""
-        p, layout = self.problem, self.layout
-        step, limb = np.nonzero(p.active)
-        knot, wrench = np.arange(p.steps + 1), layout.wrench[step, limb]
-        most = p.max_normal_force[limb] / self._weight
-        finite = np.isfinite(most)
-        lower = [(step, wrench + 2), (step, wrench + 6), (step, wrench + 7), (knot[:-1], layout.slack[:-1, 0])]
-        lower.append((knot, layout.slack[:, 1]))
-        parts = [(at, variable[:, None], np.tile([1.0, 0.0], (len(at), 1))) for at, variable in lower]
-        parts.append((step[finite], wrench[finite, None] + 2, np.stack([-np.ones(finite.sum()), most[finite]], 1)))
+        layout = self.layout
+        parts = [single_bounds(layout, self.problem.active, self.problem.max_normal_force / self._weight)]
         for item in self._landings:
             for axis, (least, largest) in enumerate(zip(item.lower, item.upper, strict=True)):
                 if largest - least >= NARROW:
                     variable = np.full((2, 1), layout.landing[item.step] + axis)
-                    parts.append((np.full(2, item.step), variable, np.array([[1.0, least], [-1.0, largest]])))
+                    parts.append((np.full(2, item.step), variable, np.array([[1.0, least], [-1.0, -largest]])))
         return _joined(parts, 1)
 
-    def _moved(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
-        """(n, 2) variables that displace a foot's contact at knots; (n, 0) where contacts stay."""
-        if not self.layout.moving:
-            return np.zeros((len(knot), 0), int)
-        return np.broadcast_to(self.layout.pair(foot), (len(knot), 2))
+
+def contact_block(layout: Layout, active: np.ndarray, parameters: np.ndarray) -> Block:
+    """Cones of (N, 4) active contacts, for the parameters (C, p) that `rows.prepare_contacts` lists."""
+    step, limb = np.nonzero(active)
+    return Block.of(step, layout.contacts(step, limb), parameters, CONTACT_ROWS)
+
+
+def slack_prices(layout: Layout, price: np.ndarray, excess: float) -> Prices:
+    """Prices of the excess and the body's slack, for the prices (N,) of slacks in each step; see `Regularisers`."""
+    n, slack = len(price), layout.slack
+    linear = np.concatenate([excess * price, price, price[-1:]])
+    stage, variable = np.append(np.arange(n), np.arange(n + 1)), np.append(slack[:-1, 0], slack[:, 1])
+    return Prices(stage, variable, linear, EVEN * linear, np.zeros(2 * n + 1))
+
+
+def single_bounds(layout: Layout, active: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stages (n,), variables (n, 1) and parameters (n, 2) of the bounds of single variables.
+
+    Contacts are (N, 4) active; their largest normal forces (4,) are in weights.
+    """
+    step, limb = np.nonzero(active)
+    knot, wrench = np.arange(len(active) + 1), layout.wrench[step, limb]
+    most = most[limb]
+    finite = np.isfinite(most)
+    lower = [(step, wrench + 2), (step, wrench + 6), (step, wrench + 7), (knot[:-1], layout.slack[:-1, 0])]
+    lower.append((knot, layout.slack[:, 1]))
+    stages, variables = (np.concatenate(part) for part in zip(*lower, strict=True))
+    parameters = np.tile([1.0, 0.0], (len(stages) + finite.sum(), 1))
+    parameters[len(stages) :] = np.stack([-np.ones(finite.sum()), -most[finite]], 1)
+    stages, variables = np.append(stages, step[finite]), np.append(variables, wrench[finite] + 2)
+    return stages, variables[:, None], parameters
 
 
 def leg_limits(leg: LegGeometry, margins: ReachMargins) -> np.ndarray:

@@ -16,7 +16,7 @@ from toolkit.centroidal.body import BodyMargins, mean_feet
 from toolkit.centroidal.build import ProblemConfig, sequence_problem, transition_problem
 from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalMotion, CentroidalProblem, Margins, Weights
 from toolkit.centroidal.program import Landing, Program, Regularisers, indices
-from toolkit.centroidal.stages.method import Options, Work, minimise
+from toolkit.centroidal.stages.method import Options, Squares, Work, minimise
 from toolkit.centroidal.stages.steps import WRENCH
 from toolkit.centroidal.verdict import judged
 from toolkit.contacts.failure import Failure
@@ -145,7 +145,7 @@ def _solve(program: Program) -> tuple[np.ndarray, str, int]:
     layout, y = program.layout, guess(program)
     work = Work.of(len(layout.size), layout.states, y.shape[1])
     options = Options(program.problem.final_at_rest)
-    found = minimise(program.steps, program.prices, program.blocks, layout.size, y, work, options)
+    found = minimise(program.steps, program.prices, Squares.none(), program.blocks, layout.size, y, work, options)
     converged, iterations, _ = found
     return y, CONVERGED if converged else "the solver stopped early", iterations
 

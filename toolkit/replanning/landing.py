@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from toolkit.centroidal.program import Landing
 from toolkit.contacts.stance import Contact
 from toolkit.control.sampled_plan import Swing
 from toolkit.geometry.pose import Pose
@@ -15,6 +18,25 @@ MAX_SHIFT = 0.15  # m; largest shift of a landing point along each axis of its p
 MARGIN = 0.01  # m; distance of the sole from the edge of its surface, for errors of the swing's tracking
 GAP = 0.02  # m; between a landing sole and the other one
 SLEW = 0.8  # m/s; how far a landing point may still move per second that is left: a foot is not faster sideways
+
+
+@dataclass(frozen=True)
+class FreeLandings:
+    """Landing points that a replan may move.
+
+    Attributes:
+        events: The swings, the next one first.
+        items: Their feet, and the steps in which they are chosen: as the swing begins, or now.
+        planes: The axes (3, 2) of each landing point's plane.
+        goal: (n, 2) m; the shifts that were decided last, along these axes.
+        regions: Rows (k, 2) and bounds (k,) of each shift.
+    """
+
+    events: list[int]
+    items: list[Landing]
+    planes: list[np.ndarray]
+    goal: np.ndarray
+    regions: list[tuple[np.ndarray, np.ndarray]]
 
 
 class Landings:
@@ -29,6 +51,18 @@ class Landings:
             if swing.contact is not None and swing.limb.is_foot and swing.contact.surface >= 0
         }
         self._regions: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def free(self, events: list[int], situation: Situation, times: np.ndarray, early: dict[int, float]) -> FreeLandings:
+        """The landing points of swings that may move, at knots (N + 1,) in s; `early` has earlier ends of swings."""
+        planes = [self.contacts[event].pose.rotation[:, :2] for event in events]
+        goal = [plane.T @ situation.goal.get(event, np.zeros(3)) for event, plane in zip(events, planes, strict=True)]
+        items, regions, anywhere = [], [], np.full(2, np.inf)
+        for event in events:
+            swing = self._swings[event]
+            step = max(int(np.searchsorted(times, swing.start + 1e-6, side="right")) - 1, 0)
+            items.append(Landing(swing.limb, step, -anywhere, anywhere))
+            regions.append(self.region(event, situation, early.get(event, swing.end)))
+        return FreeLandings(events, items, planes, np.reshape(goal, (-1, 2)), regions)
 
     def region(self, event: int, situation: Situation, end: float) -> tuple[np.ndarray, np.ndarray]:
         """Rows (k, 2) and bounds (k,) of at least 0 of a landing point's shift: `rows @ shift <= bounds`.

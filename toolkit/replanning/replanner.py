@@ -60,9 +60,9 @@ class Replanner:
         """Prepare for a run of a plan, whose reference is sampled at the control ticks."""
         self._reference = reference
         self._period = float(reference.times[1] - reference.times[0])
-        self._nominal = nominal = Nominal.of(plan.motion, reference, plan.robot)
+        self._nominal = nominal = Nominal.of(plan.motion, reference)
         self._problem = ReplanProblem(nominal, plan.robot, plan.world.surfaces)
-        self._mass = nominal.mass
+        self._mass = nominal.problem.mass
         self._weight = self._mass * STANDARD_GRAVITY
         self._due = 0.0
         self._plan: Replan | None = None

@@ -74,8 +74,9 @@ class HorizonContacts:
         """
         steps, middle = len(times) - 1, (times[:-1] + times[1:]) / 2
         span = slice(first, first + steps)
-        active, position = nominal.active[span].copy(), nominal.position[span].copy()
-        rotation, friction = nominal.rotation[span].copy(), nominal.friction[span].copy()
+        plan = nominal.problem
+        active, position = plan.active[span].copy(), plan.position[span].copy()
+        rotation, friction = plan.rotation[span].copy(), plan.friction[span].copy()
         event, shift = nominal.landing[span].copy(), np.zeros((steps, 4, 3))
         landed = {number: -np.inf for number, _, _ in situation.standing.values() if number >= 0}
         for number, time in (early | landed).items():

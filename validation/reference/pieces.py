@@ -43,7 +43,7 @@ def _stage(contacts: int, moving: bool) -> Piece:
 
     Variables: state, wrenches, next state; where contacts move, the displacement (2) of each along its own axes.
     Parameters: dt; per contact R (9, row-major), p (3) and, where contacts move, whether this one does; square roots
-    of the weights of v, a, kappa, kappa rate, acceleration change, height; wanted height.
+    of the weights of v, a, kappa, kappa rate, acceleration change, height; wanted height and kappa rate (3).
     """
     p = Parameters()
     x, after = ca.SX.sym("x", STATE), ca.SX.sym("after", STATE)
@@ -62,12 +62,12 @@ def _stage(contacts: int, moving: bool) -> Piece:
     acceleration = G * total + ca.DM(GRAVITY)
     moved = ca.vertcat(*advanced(dt, G, x, acceleration, G * moment)[:6])
     following = ca.vertcat(moved, kappa + dt * G * moment, acceleration)
-    weights, height = p(6), p()
+    weights, height, turning = p(6), p(), p(3)
     rho = ca.vertcat(
         weights[0] * after[3:6],
         weights[1] * after[9:12],
         weights[2] * after[6:9],
-        weights[3] * G * moment,
+        weights[3] * (G * moment - turning),
         weights[4] * (acceleration - before),
         weights[5] * (after[2] - height),
     )
@@ -164,17 +164,17 @@ def _height(moving: bool) -> Piece:
 
 
 def _price() -> Piece:
-    """Price of a single variable; parameters: linear and quadratic."""
+    """Price of a single variable; parameters: linear, quadratic, and the value from which the latter counts."""
     p = Parameters()
-    value, linear, quadratic = ca.SX.sym("u"), p(), p()
-    return Piece("price", value, p.vector, rho=ca.sqrt(quadratic) * value, linear=linear * value)
+    value, linear, quadratic, wanted = ca.SX.sym("u"), p(), p(), p()
+    return Piece("price", value, p.vector, rho=ca.sqrt(quadratic) * (value - wanted), linear=linear * value)
 
 
 def _bound() -> Piece:
-    """Bound of a single variable; parameters: 1 for a lower bound or -1 for an upper one, and the bound."""
+    """Lower bound of a variable times a factor; parameters: the factor and the bound."""
     p = Parameters()
-    value, sign, bound = ca.SX.sym("u"), p(), p()
-    return Piece("bound", value, p.vector, rows=sign * (value - bound))
+    value, factor, bound = ca.SX.sym("u"), p(), p()
+    return Piece("bound", value, p.vector, rows=factor * value - bound)
 
 
 def _fixed(size: int) -> Piece:

@@ -45,7 +45,7 @@ class Reference:
             self._add(name, self.offset[block.stage][:, None] + block.variables, block.parameters)
         prices = program.prices
         single = (self.offset[prices.stage] + prices.variable)[:, None]
-        self._add("price", single, np.stack([prices.linear, prices.quadratic], 1))
+        self._add("price", single, np.stack([prices.linear, prices.quadratic, prices.wanted], 1))
         given = np.concatenate([p.com, p.com_velocity, p.angular_momentum / p.mass, np.zeros(layout.states - 9)])
         self._add(f"fixed{layout.states}", np.arange(layout.states)[None], given[None], equal=True)
         if p.final_at_rest:
@@ -86,7 +86,7 @@ class Reference:
                 pair = (first + np.where(moves, steps.pair[at], STATE))[..., None] + np.arange(2)
                 variables.append(pair.reshape(len(step), -1))
             parameters = [steps.dt[step, None], np.concatenate(pose, 2).reshape(len(step), -1)]
-            parameters += [np.sqrt(steps.weights[step]), steps.height[step, None]]
+            parameters += [np.sqrt(steps.weights[step]), steps.height[step, None], steps.turning[step]]
             self._add(f"stage{contacts}", np.concatenate(variables, 1), np.concatenate(parameters, 1), equal=True)
 
     def flat(self, y: np.ndarray) -> np.ndarray:

@@ -163,9 +163,11 @@ def product_after(block, primal, dual):
 
 
 @compiled(reordered=True)
-def move(block, primal, dual):
-    """Take a step of these lengths."""
+def move(block, primal, dual, linear):
+    """Take a step of these lengths; linear rows change with it, while others are filled again."""
     for i in range(block.value.shape[0]):
         for a in range(block.value.shape[1]):
+            if linear:
+                block.value[i, a] += primal * (block.slack_change[i, a] - block.value[i, a] + block.slack[i, a])
             block.slack[i, a] += primal * block.slack_change[i, a]
             block.multiplier[i, a] += dual * block.multiplier_change[i, a]

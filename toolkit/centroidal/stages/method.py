@@ -8,6 +8,7 @@ Reference: J. Nocedal, S. Wright, Numerical Optimization (2006), Sec. 14.2 and 1
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -42,17 +43,44 @@ class Blocks(NamedTuple):
 
 
 class Prices(NamedTuple):
-    """Prices of n single variables: linear * v + quadratic * v^2.
+    """Prices of n single variables: linear * v + quadratic * (v - wanted)^2.
 
     Attributes:
         stage, variable: (n,) its stage and its number there.
-        linear, quadratic: (n,).
+        linear, quadratic, wanted: (n,).
     """
 
     stage: np.ndarray
     variable: np.ndarray
     linear: np.ndarray
     quadratic: np.ndarray
+    wanted: np.ndarray
+
+    @classmethod
+    def joined(cls, parts: Iterable[Prices]) -> Prices:
+        """All of these prices."""
+        return cls(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+
+class Squares(NamedTuple):
+    """Prices of n sums of k variables: weight * (factors . v - wanted)^2.
+
+    Attributes:
+        stage: (n,) their stage.
+        variables, factors: (n, k) numbers of the variables there, and their factors.
+        weight, wanted: (n,).
+    """
+
+    stage: np.ndarray
+    variables: np.ndarray
+    factors: np.ndarray
+    weight: np.ndarray
+    wanted: np.ndarray
+
+    @classmethod
+    def none(cls) -> Squares:
+        """No prices."""
+        return cls(np.zeros(0, np.int64), np.zeros((0, 1), np.int64), np.zeros((0, 1)), np.zeros(0), np.zeros(0))
 
 
 class Work(NamedTuple):
@@ -98,6 +126,8 @@ class Options(NamedTuple):
         feasible: Largest violation of dynamics, rows and rest.
         gap: Complementarity of a row at the start.
         least: Least slack of a row at the start.
+        small: Objective below which accuracy is absolute.
+        linear: Whether the body's limits are kept to first order in the change from the start.
     """
 
     at_rest: bool
@@ -106,16 +136,24 @@ class Options(NamedTuple):
     feasible: float = 4e-7
     gap: float = 1.0
     least: float = 0.3
+    small: float = SMALL
+    linear: bool = False
 
 
 @compiled(reordered=True)
-def evaluate(steps, prices, all_blocks, size, y, floor, work):
-    """Fill the model at y; returns the objective. `floor` is explained in `rows.fill_contacts`."""
+def evaluate(steps, prices, squares, all_blocks, size, y, floor, kept, work):
+    """Fill the model at y; returns the objective. `floor` is explained in `rows.fill_contacts`.
+
+    Where the rows of the body are `kept`, they are left as they are.
+    """
     work.hessian[:] = 0.0
     work.gradient[:] = 0.0
     value = dynamics.linearise(steps, size, y, work.hessian, work.gradient, work.following, work.defect)
     value += rows.add_prices(prices, y, work.hessian, work.gradient)
+    value += rows.add_squares(squares, y, work.hessian, work.gradient)
     value += rows.fill_contacts(all_blocks.contacts, y, floor, work.hessian, work.gradient)
+    if kept:
+        return value
     value += rows.fill_legs(all_blocks.legs, y, work.hessian, work.gradient)
     value += rows.fill_distances(all_blocks.distances, y, work.hessian, work.gradient)
     value += rows.fill_final(all_blocks.final, y, work.hessian, work.gradient)
@@ -164,12 +202,13 @@ def residual(all_blocks, y, rest, work):
 
 
 @compiled(kept=True, reordered=True)
-def minimise(steps, prices, all_blocks, size, y, work, options):
+def minimise(steps, prices, squares, all_blocks, size, y, work, options):
     """Minimise from the motion y (T, m), which is overwritten but for its first state.
 
     Args:
         steps: Dynamics and momentum objective (`Steps`) of T - 1 steps.
         prices: `Prices` of single variables.
+        squares: `Squares` of sums of variables.
         all_blocks: `Blocks`; their work arrays are overwritten.
         size: (T,) number of variables of each stage; numbers of y beyond them are not read.
         y: (T, m) guess, then the motion.
@@ -186,11 +225,12 @@ def minimise(steps, prices, all_blocks, size, y, work, options):
     force = np.zeros(3)  # multiplier of the final rest
     rows.prepare_contacts(all_blocks.contacts)
     worst = 1.0
-    value = evaluate(steps, prices, all_blocks, size, y, FLOOR, work)
+    value = evaluate(steps, prices, squares, all_blocks, size, y, FLOOR, False, work)
     for block in all_blocks:
         blocks.start(block, options.least, options.gap)
     for iteration in range(options.iterations):
-        value = evaluate(steps, prices, all_blocks, size, y, FLOOR * min(worst, 1.0), work)
+        kept = options.linear and iteration > 0
+        value = evaluate(steps, prices, squares, all_blocks, size, y, FLOOR * min(worst, 1.0), kept, work)
         worst, gap = residual(all_blocks, y, options.at_rest, work), 0.0
         for block in all_blocks:
             gap += blocks.complementarity(block)
@@ -205,7 +245,7 @@ def minimise(steps, prices, all_blocks, size, y, work, options):
 
         goal = 0.0
         direction(all_blocks, size, goal, goal > 0.0, work)
-        accepted, decrease = options.tolerance * (abs(value) + SMALL), 0.0
+        accepted, decrease = options.tolerance * (abs(value) + options.small), 0.0
         for t in range(last + 1):
             for k in range(size[t]):
                 decrease += work.gradient[t, k] * work.change[t, k]
@@ -226,5 +266,5 @@ def minimise(steps, prices, all_blocks, size, y, work, options):
             for k in range(size[t]):
                 y[t, k] += primal * work.change[t, k]
         for block in all_blocks:
-            blocks.move(block, primal, dual)
+            blocks.move(block, primal, dual, options.linear)
     return False, options.iterations, value

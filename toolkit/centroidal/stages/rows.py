@@ -441,11 +441,14 @@ def fill_final(block, y, hessian, gradient):
 
 @compiled(reordered=True)
 def fill_bounds(block, y):
-    """Bounds of single variables; parameters: 1 for a lower bound or -1 for an upper one, and the bound."""
+    """Lower bounds of sums of variables; parameters: the variables' factors, and the bound."""
+    count = block.variables.shape[1]
     for i in range(block.stage.shape[0]):
-        p = block.parameters[i]
-        block.value[i, 0] = p[0] * (y[block.stage[i], block.variables[i, 0]] - p[1])
-        block.slope[i, 0, 0] = p[0]
+        p, value = block.parameters[i], -block.parameters[i, count]
+        for k in range(count):
+            value += p[k] * y[block.stage[i], block.variables[i, k]]
+            block.slope[i, 0, k] = p[k]
+        block.value[i, 0] = value
 
 
 @compiled(reordered=True)
@@ -454,8 +457,27 @@ def add_prices(prices, y, hessian, gradient):
     total = 0.0
     for i in range(prices.stage.shape[0]):
         t, k = prices.stage[i], prices.variable[i]
-        value = y[t, k]
-        total += prices.linear[i] * value + prices.quadratic[i] * value * value
-        gradient[t, k] += prices.linear[i] + 2 * prices.quadratic[i] * value
+        off = y[t, k] - prices.wanted[i]
+        total += prices.linear[i] * y[t, k] + prices.quadratic[i] * off * off
+        gradient[t, k] += prices.linear[i] + 2 * prices.quadratic[i] * off
         hessian[t, k, k] += 2 * prices.quadratic[i]
+    return total
+
+
+@compiled(reordered=True)
+def add_squares(squares, y, hessian, gradient):
+    """Add prices of the squares of sums of variables; returns their sum."""
+    total, count = 0.0, squares.variables.shape[1]
+    for i in range(squares.stage.shape[0]):
+        t, index, factors = squares.stage[i], squares.variables[i], squares.factors[i]
+        off = -squares.wanted[i]
+        for k in range(count):
+            off += factors[k] * y[t, index[k]]
+        total += squares.weight[i] * off * off
+        for b in range(count):
+            pull = 2 * squares.weight[i] * factors[b]
+            if pull != 0.0:
+                gradient[t, index[b]] += pull * off
+                for c in range(count):
+                    hessian[t, index[b], index[c]] += pull * factors[c]
     return total

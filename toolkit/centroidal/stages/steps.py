@@ -37,6 +37,7 @@ class Steps(NamedTuple):
             acceleration, and height.
         height: (N,) m; wanted height of the CoM after the step.
         source: (N, 2 P) the variables of the stage that become the P displacements of the next one.
+        turning: (N, 3) m^2/s^2; wanted rate of the angular momentum per mass.
     """
 
     dt: np.ndarray
@@ -48,6 +49,7 @@ class Steps(NamedTuple):
     weights: np.ndarray
     height: np.ndarray
     source: np.ndarray
+    turning: np.ndarray
 
 
 @compiled(reordered=True)
@@ -92,7 +94,8 @@ def terms(steps, t, before, acceleration, spin_rate, after):
     for a in range(3):
         change = acceleration[a] - before[ACCELERATION + a]
         total += weights[MOMENTUM] * after[V + a] ** 2 + weights[MOMENTUM_RATE] * after[ACCELERATION + a] ** 2
-        total += weights[ANGULAR] * after[SPIN + a] ** 2 + weights[ANGULAR_RATE] * spin_rate[a] ** 2
+        turning = spin_rate[a] - steps.turning[t, a]
+        total += weights[ANGULAR] * after[SPIN + a] ** 2 + weights[ANGULAR_RATE] * turning**2
         total += weights[JERK] * change**2
     return total + weights[HEIGHT] * (after[R + 2] - steps.height[t]) ** 2
 
@@ -121,12 +124,13 @@ def linearise(steps, size, y, hessian, gradient, following, defect):
             for c in range(size[t]):
                 row[c] = following[t, SPIN + a, c]
             row[SPIN + a] = 0.0
-            add_square(weight, h * spin_rate[a], row, size[t], hessian[t], gradient[t])
-            for c in range(size[t]):
-                row[c] = following[t, ACCELERATION + a, c]
-            row[ACCELERATION + a] = -1.0
-            change = acceleration[a] - now[ACCELERATION + a]
-            add_square(weights[JERK], change, row, size[t], hessian[t], gradient[t])
+            add_square(weight, h * (spin_rate[a] - steps.turning[t, a]), row, size[t], hessian[t], gradient[t])
+            if weights[JERK] != 0.0:
+                for c in range(size[t]):
+                    row[c] = following[t, ACCELERATION + a, c]
+                row[ACCELERATION + a] = -1.0
+                change = acceleration[a] - now[ACCELERATION + a]
+                add_square(weights[JERK], change, row, size[t], hessian[t], gradient[t])
             for part, weight in (
                 (V, weights[MOMENTUM]),
                 (ACCELERATION, weights[MOMENTUM_RATE]),
