@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 
 from toolkit.compiled import is_kept
-from toolkit.execution.config import ExecutionConfig
-from toolkit.execution.disturbance import Disturbance
 from toolkit.pipeline import warmup
 from toolkit.pipeline.observer import Observer
 from toolkit.pipeline.warmup import Kernel, lacking, listed, warm_up
@@ -22,9 +20,7 @@ from toolkit.search.costs.grid_kernels import spread
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = "python -m validation.first_minute --record"
-SPREAD = Kernel(
-    "toolkit.search.costs.grid_kernels:spread", 0.2, False, ["float64[3]", "int64[2]", "float64", "float64[3]"]
-)
+SPREAD = Kernel("toolkit.search.costs.grid_kernels:spread", 0.2, ["float64[3]", "int64[2]", "float64", "float64[3]"])
 
 
 class Told(Observer):
@@ -59,7 +55,7 @@ def python(program, *words, cache=None, **options):
 
 def test_the_list_names_kernels_and_types_that_there_are():
     kernels = listed()
-    assert any(kernel.disturbed for kernel in kernels) and not all(kernel.disturbed for kernel in kernels)
+    assert kernels
     for kernel in kernels:
         assert kernel.seconds > 0.0
         try:
@@ -136,20 +132,6 @@ def test_what_is_lacking_is_compiled_once(tmp_path):
     assert "1 of 1, about" in details[-2] and details[-1] == "1 kernels, once after installation"
 
 
-def test_only_runs_that_leave_their_plan_need_what_they_need_alone(monkeypatch):
-    asked = []
-    monkeypatch.setattr(warmup, "lacking", lambda *, disturbed: asked.append(disturbed) or [])
-    for execution in (
-        None,
-        ExecutionConfig(),
-        ExecutionConfig(disturbance=Disturbance(push=30.0)),
-        ExecutionConfig(disturbance=Disturbance(push=30.0), replanning=False),
-    ):
-        with warm_up(Told(), execution):
-            pass
-    assert asked == [False, False, True, False]
-
-
 def test_nothing_lacks_where_compiled_code_is_not_kept(monkeypatch):
     monkeypatch.setattr(warmup, "listed", lambda: [SPREAD._replace(arguments=["float32[3]", *SPREAD.arguments[1:]])])
     assert len(lacking()) == 1
@@ -158,9 +140,7 @@ def test_nothing_lacks_where_compiled_code_is_not_kept(monkeypatch):
 
 
 def test_nothing_lacks_where_nothing_is_compiled():
-    program = (
-        "import json; from toolkit.pipeline.warmup import lacking; print(json.dumps(len(lacking(disturbed=True))))"
-    )
+    program = "import json; from toolkit.pipeline.warmup import lacking; print(json.dumps(len(lacking())))"
     assert python(program, NUMBA_DISABLE_JIT="1") == 0
 
 
@@ -173,7 +153,7 @@ def test_a_kernel_that_is_listed_in_an_older_form_is_left_to_the_run(monkeypatch
 
 
 def test_what_cannot_be_compiled_before_is_left_to_the_run(monkeypatch):
-    monkeypatch.setattr(warmup, "lacking", lambda *, disturbed: [SPREAD._replace(arguments=["float64"]), SPREAD])
+    monkeypatch.setattr(warmup, "lacking", lambda: [SPREAD._replace(arguments=["float64"]), SPREAD])
     told = Told()
     with warm_up(told):
         pass
@@ -182,7 +162,7 @@ def test_what_cannot_be_compiled_before_is_left_to_the_run(monkeypatch):
 
 def test_an_error_ends_the_processes(monkeypatch):
     slow = max(listed(), key=lambda kernel: kernel.seconds)
-    monkeypatch.setattr(warmup, "lacking", lambda *, disturbed: [slow._replace(name="time:sleep", arguments=[])] * 3)
+    monkeypatch.setattr(warmup, "lacking", lambda: [slow._replace(name="time:sleep", arguments=[])] * 3)
     monkeypatch.setattr(warmup, "keep", _sleep)
     before, began = set(active_children()), time.perf_counter()
     with pytest.raises(ValueError, match="in the block"), warm_up(Told()):
@@ -200,7 +180,7 @@ def _sleep(name, arguments):
 def test_the_processes_share_the_work():
     assert warmup._ends([4.0, 2.0, 1.0], 2) == [5.0, 3.0, 4.0]
     one, many = [SPREAD], [SPREAD] * 1000
-    assert warmup._workers(one) == 1 and 1 <= warmup._workers(many) <= os.cpu_count()
+    assert warmup._workers(one) == 1 and 1 <= warmup._workers(many) <= (os.cpu_count() or 1)
 
 
 def test_an_interruption_ends_a_first_run_in_one_line(tmp_path):

@@ -60,7 +60,7 @@ def main(argv: list[str] | None = None) -> int:
     display = StageConsole()
     options, execution = cli.PlanningOptions.of(args), cli.execution_config(args)
     display.started("surfaces")
-    with warm_up(display, execution):
+    with warm_up(display):
         world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
         surface_seconds = time.perf_counter() - began
         robot = load_robot(args.robot, args.robots)

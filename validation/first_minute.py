@@ -105,22 +105,20 @@ def _timed(scratch: Path, *words: str) -> Figure:
 
 def _record(scratch: Path) -> int:
     """Write the list of kernels."""
-    disturbed: dict[str, bool] = {}
+    found: set[str] = set()
     answer = scratch / "answer.json"
     for words in RECORDED:
         for _ in range(2):  # of what the first of them compiles, some is only a part of something else
             _timed(scratch, "-c", USED, str(answer), *words, "--out", str(scratch / "run"))
         for name, arguments, _ in json.loads(answer.read_text()):
-            key = json.dumps([name, arguments])
-            disturbed[key] = disturbed.get(key, True) and "--push" in words
-    answer.write_text(json.dumps([json.loads(key) for key in sorted(disturbed)]))
+            found.add(json.dumps([name, arguments]))
+    answer.write_text(json.dumps([json.loads(key) for key in sorted(found)]))
     (scratch / "kernels").rename(scratch / "compiled before")
     _timed(scratch, "-c", TIMES, str(answer))
     lines = []
-    for key, seconds in zip(sorted(disturbed), json.loads(answer.read_text()), strict=True):
+    for key, seconds in zip(sorted(found), json.loads(answer.read_text()), strict=True):
         name, arguments = json.loads(key)
-        entry = {"name": name, "seconds": round(seconds, 2), "disturbed": disturbed[key]}
-        lines.append(json.dumps(entry | {"arguments": arguments}))
+        lines.append(json.dumps({"name": name, "seconds": round(seconds, 2), "arguments": arguments}))
     KERNELS.write_text("[\n" + ",\n".join(lines) + "\n]\n", encoding="utf-8")
     sys.stdout.write(f"{len(lines)} kernels written to {KERNELS}\n")
     return 0

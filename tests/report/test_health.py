@@ -69,9 +69,9 @@ def test_the_folder_of_kernels(monkeypatch):
 
 def test_kernels_that_are_not_compiled_yet_are_a_note(monkeypatch):
     known = health.listed()
-    monkeypatch.setattr(health, "lacking", lambda *, disturbed: [])
+    monkeypatch.setattr(health, "lacking", lambda: [])
     assert [finding.state for finding in check_kernels()] == [State.GOOD]
-    monkeypatch.setattr(health, "lacking", lambda *, disturbed: known[:2])
+    monkeypatch.setattr(health, "lacking", lambda: known[:2])
     (finding,) = check_kernels()
     assert finding.state is State.NOTE and finding.detail.startswith(f"{len(known) - 2} of {len(known)} are compiled;")
     monkeypatch.setattr(health, "kept_folder", lambda: None)

@@ -20,8 +20,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from toolkit.compiled import is_kept, keep, kept_folder
-from toolkit.execution.config import ExecutionConfig
-from toolkit.execution.disturbance import Disturbance
 from toolkit.interruption import end_with_parent
 from toolkit.pipeline.observer import Observer
 
@@ -37,13 +35,11 @@ class Kernel(NamedTuple):
     Attributes:
         name: `module:function`.
         seconds: Processor time that it takes to compile, on the machine where the list was recorded.
-        disturbed: Whether only runs that leave their plan need it.
         arguments: Types of its arguments; see `toolkit.compiled.is_kept`.
     """
 
     name: str
     seconds: float
-    disturbed: bool
     arguments: list
 
 
@@ -52,18 +48,15 @@ def listed() -> list[Kernel]:
     return [Kernel(**entry) for entry in json.loads(KERNELS.read_text(encoding="utf-8"))]
 
 
-def lacking(*, disturbed: bool = False) -> list[Kernel]:
+def lacking() -> list[Kernel]:
     """The kernels that a run needs and that are not compiled yet.
 
     There is none where compiled code cannot be kept. A kernel that the list knows in an older form is left out, and
     compiles when it is called.
-
-    Args:
-        disturbed: Whether the run may leave its plan.
     """
     if kept_folder() is None:
         return []
-    return [kernel for kernel in listed() if (disturbed or not kernel.disturbed) and not _is_ready(kernel)]
+    return [kernel for kernel in listed() if not _is_ready(kernel)]
 
 
 def _is_ready(kernel: Kernel) -> bool:
@@ -74,17 +67,15 @@ def _is_ready(kernel: Kernel) -> bool:
 
 
 @contextmanager
-def warm_up(observer: Observer, execution: ExecutionConfig | None = None) -> Iterator[None]:
+def warm_up(observer: Observer) -> Iterator[None]:
     """Compile what a run lacks, while the block goes on; afterwards, wait for it and show how far it is.
 
     Where a process fails, what it left is compiled when it is called. An error in the block ends the processes.
 
     Args:
         observer: Is told of the stage `STAGE`, unless nothing is lacking.
-        execution: The simulated run, if there is one: where it is disturbed, the motion is planned again.
     """
-    disturbed = execution is not None and execution.replanning and execution.disturbance != Disturbance()
-    kernels = sorted(lacking(disturbed=disturbed), key=lambda kernel: -kernel.seconds)
+    kernels = sorted(lacking(), key=lambda kernel: -kernel.seconds)
     if not kernels:
         yield
         return

@@ -130,7 +130,7 @@ def check_cache() -> Finding:
 def check_kernels() -> Iterator[Finding]:
     """Whether the kernels that a run needs are compiled; nothing where they cannot be kept."""
     if kept_folder() is not None:
-        number, left = len(listed()), len(lacking(disturbed=True))
+        number, left = len(listed()), len(lacking())
         detail = f"{number - left} of {number} are compiled"
         detail += "; the next run that needs the others compiles them" if left else ""
         yield Finding("kernels", State.NOTE if left else State.GOOD, detail)
