@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 from scipy.stats import qmc
@@ -109,23 +110,30 @@ class Cell:
 
 
 def cells_of(names: Sequence[str], *, quick: bool, seeds: int | None = None, first: int = 0) -> list[Cell]:
-    """Cells of some families; those of a quick sweep are among those of the whole one with as many seeds.
+    """Cells of some families, which take turns; those of a quick sweep are among those of the whole one.
 
     Args:
         names: Of families.
-        quick: Whether to take `QUICK` worlds in all, evenly from the families' values.
+        quick: Whether to take `QUICK` worlds in all.
         seeds: Seeds of each value; None for `SEEDS`, and for one in a quick sweep.
         first: The first seed.
     """
     seeds = (1 if quick else SEEDS) if seeds is None else seeds
-    cells = []
+    sweeps = []
     for name in names:
         values = FAMILIES[name].values()
         if quick:
-            count = min(max(1, QUICK // (len(names) * seeds)), len(values))
-            values = [values[int((index + 0.5) * len(values) / count)] for index in range(count)]
-        cells += [Cell(name, each, first + seed) for each in values for seed in range(seeds)]
-    return cells
+            values = _some(FAMILIES[name], values, max(1, QUICK // (len(names) * seeds)))
+        sweeps.append([[Cell(name, each, first + seed) for seed in range(seeds)] for each in values])
+    return [cell for turn in zip_longest(*sweeps, fillvalue=[]) for cells in turn for cell in cells]
+
+
+def _some(family: Family, values: list[tuple[float, ...]], count: int) -> list[tuple[float, ...]]:
+    """So many of a family's values: evenly spread where they are, else the first of the drawn ones, which spread too."""
+    count = min(count, len(values))
+    if len(family.axes) > 1:
+        return values[:count]
+    return [values[int((index + 0.5) * len(values) / count)] for index in range(count)]
 
 
 _STONES = (Axis("gap", "between stones [m]", 0.05, 0.25), Axis("stone", "stone [m]", 0.4, 0.24))

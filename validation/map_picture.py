@@ -82,8 +82,8 @@ def _draw_plane(axes: Axes, family: Family, records: Sequence[Record]) -> None:
         axes.scatter(x, record["values"][1], marker=marker, color=color)
     for x, y in sorted({tuple(record["values"]) for record in records}):
         shorts = Counter(r["short"] for r in records if tuple(r["values"]) == (x, y) and not r["passed"])
-        place = {"textcoords": "offset points", "ha": "center", "va": "top"}
-        axes.annotate("\n".join(shorts), (x, y), (0, -6), fontsize=_SMALL, **place)
+        text = "\n".join(shorts)
+        axes.annotate(text, (x, y), (0, -6), textcoords="offset points", fontsize=_SMALL, ha="center", va="top")
     axes.set_xlabel(first.label)
     axes.set_ylabel(second.label)
     axes.set_xlim(_ends(first))
