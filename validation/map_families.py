@@ -129,7 +129,7 @@ def cells_of(names: Sequence[str], *, quick: bool, seeds: int | None = None, fir
 
 
 def _some(family: Family, values: list[tuple[float, ...]], count: int) -> list[tuple[float, ...]]:
-    """So many of a family's values: evenly spread where they are, else the first of the drawn ones, which spread too."""
+    """So many of a family's values: evenly spread where they are, else the first draws, which are spread as well."""
     count = min(count, len(values))
     if len(family.axes) > 1:
         return values[:count]

@@ -205,12 +205,13 @@ def anywhere(mjcf: str, rng: np.random.Generator) -> str:
 
 def has_way(mjcf: str, friction: float) -> bool:
     """Whether tiles `tile_<row>_<column>` that are walkable lead from the first row to the last one."""
-    spec = mujoco.MjSpec.from_string(mjcf)
-    tiles = {tuple(map(int, geom.name.split("_")[1:])): geom for geom in spec.geoms if geom.name.startswith("tile_")}
-    walkable = np.zeros(np.max(list(tiles), axis=0) + 1, bool)
-    for place, geom in tiles.items():
-        normal = Rotation.from_quat(geom.quat[[1, 2, 3, 0]]).as_matrix()[:, 2]
-        walkable[place] = np.degrees(np.arccos(normal[2])) <= np.degrees(np.arctan(friction)) - BELOW
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    names = [model.geom(index).name for index in range(model.ngeom)]
+    tiles = [index for index, name in enumerate(names) if name.startswith("tile_")]
+    places = np.array([names[index].split("_")[1:] for index in tiles], int)
+    normals = Rotation.from_quat(model.geom_quat[tiles], scalar_first=True).as_matrix()[:, :, 2]
+    walkable = np.zeros(places.max(0) + 1, bool)
+    walkable[tuple(places.T)] = np.degrees(np.arccos(normals[:, 2])) <= np.degrees(np.arctan(friction)) - BELOW
     ways = np.zeros(walkable.shape, int)
     label(walkable, np.ones((3, 3)), output=ways)
     return bool(np.intersect1d(ways[0][walkable[0]], ways[-1][walkable[-1]]).size)
