@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from toolkit.world import generators, regular
 from toolkit.world.authoring import WorldText, numbers
-from toolkit.world.mesh_patches import block
+from toolkit.world.mesh_patches import closed_block
 
 FRICTION = 0.5
 TIMING = (0.6, 0.8)  # s; shift and swing that every world names
@@ -166,7 +166,7 @@ def mesh_ground(rng: np.random.Generator, height: float) -> str:
     heights = _facet_heights(rng, height)
     world, corner = _ground("mesh_ground", height, heights)
     x, y = (low + np.arange(count) * _CELL for count, low in zip(heights.shape, corner, strict=True))
-    mesh = block(x, y, heights)
+    mesh = closed_block(x, y, heights)
     world.mesh("ground", mesh.vertices, mesh.faces)
     return world.render()
 
