@@ -54,11 +54,9 @@ def map_trial(settings: TrialSettings, cell: Cell) -> Record:
 
 
 def completed(records: list[Record], cells: list[Cell]) -> list[Record]:
-    """Records of cells, with what those lack that ended in an error of the program."""
-    return [
-        {**_record(cell, ERROR, "error", str(record.get("reason", ""))), **record}
-        for record, cell in zip(records, cells, strict=True)
-    ]
+    """Records of cells with their reasons in short words, and with what those lack that ended in an error."""
+    whole = [{**_record(cell, ERROR, "error", ""), **record} for record, cell in zip(records, cells, strict=True)]
+    return [record | {"short": in_short(record["outcome"], record["reason"])} for record in whole]
 
 
 def in_short(outcome: str, reason: str) -> str:
@@ -73,7 +71,8 @@ def in_short(outcome: str, reason: str) -> str:
         return _cut(reason.rpartition(": ")[2].partition(";")[0])
     for head in ("no feasible centroidal motion: ", "no whole-body motion: ", "the robot "):
         reason = reason.removeprefix(head)
-    return _cut(re.split(r" is -?\d|, the limit|[;,(]", reason)[0])
+    reason = re.sub(r"\ba geom of |\b(left|right)_", "", reason)
+    return _cut(re.split(r" is -?\d| at \d|, the limit|[;,(]", reason)[0])
 
 
 def _cut(text: str) -> str:
@@ -92,5 +91,4 @@ def _record(cell: Cell, outcome: str, stage: str, reason: str) -> dict[str, Any]
         "stage": stage,
         "passed": outcome == PASS,
         "reason": reason,
-        "short": in_short(outcome, reason),
     }
