@@ -44,7 +44,7 @@ def map_trial(settings: TrialSettings, cell: Cell) -> Record:
     trial, stage = result.trial, stage_reached(result)
     outcome = PASS if result.passed else NO_SEQUENCE if trial is None else FAILURES[stage]
     found = _record(cell, outcome, stage, result.reason)
-    found |= {"stages": log.entries, "searches": len(result.trials), "expansions": result.search.expansions}
+    found |= {"stages": log.entries, "tested": len(result.trials), "expansions": result.search.expansions}
     if trial is not None:
         found["transitions"] = len(trial.plan.sequence.transitions)
         if trial.execution is not None:
