@@ -8,17 +8,32 @@ import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from rich.console import Console
 
 from toolkit.learning.jobs import executor
 from toolkit.report.console import progress_bar
-from validation.trial_file import TrialFile
 
 Record = dict[str, Any]
 _BATCH = 16  # trials of a process before a fresh one takes over: what it has freed stays with it, and looks like need
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class Store(Protocol):
+    """Keeps records; see `validation.trial_file`.
+
+    Attributes:
+        records: by name of the trial.
+        others: number of records of other settings.
+    """
+
+    records: dict[str, Record]
+    others: int
+
+    def add(self, record: Record) -> None:
+        """Keep a record."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -66,7 +81,7 @@ def failed_record(reason: str, trace: str = "") -> Record:
     return {"stage": "error", "passed": False, "reason": reason, "traceback": trace}
 
 
-def run_jobs(jobs: Sequence[Job], store: TrialFile, options: PoolOptions, console: Console, title: str) -> list[Record]:
+def run_jobs(jobs: Sequence[Job], store: Store, options: PoolOptions, console: Console, title: str) -> list[Record]:
     """Run the jobs that have no record yet.
 
     Args:

@@ -19,19 +19,14 @@ from validation.goals import NOT_MET, Goal
 from validation.jobs import PoolOptions
 from validation.machine import ROOT, code_fingerprint, folder_fingerprint
 
+RESULTS = ROOT / "validation" / "results"
 EXIT_CODES = "exit codes: 0 every trial passed, 1 one failed (see the results), 2 bad input"
 GOAL_CODES = "exit codes: 0 every goal that was checked is met, 1 one is not (see the results), 2 bad input"
 
 
 def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> argparse.ArgumentParser:
     """Parser of `python -m validation.<module>` with everything that a trial and the pool need."""
-    made = argparse.ArgumentParser(
-        prog=f"python -m validation.{module}",
-        description=description,
-        epilog=EXIT_CODES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        conflict_handler="resolve",
-    )
+    made = plain_parser(module, description)
     made.add_argument(
         "--trials",
         type=cli.positive(int),
@@ -39,6 +34,18 @@ def parser(module: str, description: str, kinds: Sequence[str], trials: int) -> 
         help="trials of each random kind of world (default: %(default)s)",
     )
     made.add_argument("--kinds", nargs="+", default=list(kinds), metavar="KIND", help=f"default: {' '.join(kinds)}")
+    return made
+
+
+def plain_parser(module: str, description: str) -> argparse.ArgumentParser:
+    """The same without the options that choose the worlds."""
+    made = argparse.ArgumentParser(
+        prog=f"python -m validation.{module}",
+        description=description,
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        conflict_handler="resolve",
+    )
     cli.add_robot_options(made)
     cli.add_planning_options(made)
     # A trial's own number seeds everything in it: the option of a single run gives way to this one.
@@ -63,7 +70,7 @@ def add_results_option(target: argparse.ArgumentParser, module: str) -> None:
     target.add_argument(
         "--results",
         type=Path,
-        default=ROOT / "validation" / "results",
+        default=RESULTS,
         metavar="DIR",
         help=f"where {module}.json and {module}.md go (default: validation/results)",
     )
@@ -128,6 +135,15 @@ def settings_of(args: argparse.Namespace) -> TrialSettings:
     """
     for kind in args.kinds:
         kind_of(kind)
+    return trial_settings(args)
+
+
+def trial_settings(args: argparse.Namespace) -> TrialSettings:
+    """Settings of the trials of a program that has kinds of worlds of its own.
+
+    Raises:
+        InputError: the robot cannot be loaded, or the networks that were asked for are not there.
+    """
     robot = load_robot(args.robot, args.robots)
     planner = planner_kind(robot, args.planner)
     if planner == "learned":

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from toolkit.world.authoring import WorldText
 from toolkit.world.generators import KINDS
 from toolkit.world.loader import load_world
 
@@ -122,3 +123,13 @@ def test_training_terrain_starts_on_the_middle_tile_beside_a_wall(seed, tmp_path
     offset = (wall.pose.position - [0, 0, 1.0]) @ wall.normal / np.linalg.norm(wall.normal[:2])
     assert 0.39 <= -offset <= 0.91
     assert abs(level[1]) > 0.7
+
+
+def test_a_height_field_has_its_heights_where_they_are_meant(tmp_path):
+    heights = np.add.outer(0.05 * np.arange(9), 0.02 * np.arange(6)) - 0.1  # a plane, (x, y)
+    text = WorldText("field", "", 0.5, (0.6, 0.8), (0.6, 0.0, 0.0), start=(0.0, 0.0, -0.05))
+    text.height_field("ground", heights, 0.2, (-0.3, -0.5))
+    (surface,) = load_world(tmp_path / "field.xml", mjcf=text.render()).surfaces
+    points = np.array([[-0.2, -0.4], [1.2, -0.4], [-0.2, 0.4], [0.5, 0.1]])
+    expected = 0.25 * (points[:, 0] + 0.3) + 0.1 * (points[:, 1] + 0.5) - 0.1
+    np.testing.assert_allclose(surface.height(points), expected, atol=1e-6)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 THICKNESS = 0.04  # m; generated tiles and platforms are too thin for their edges to count as surfaces for palms
+_LEAST_TOP, _BASE = 1e-3, 0.3  # m; height that a height field has at least, and its depth below its lowest point
 
 _HEAD = """<mujoco model="{model}">
   <!-- {comment} -->
@@ -103,6 +104,20 @@ class WorldText:
         faces = "" if triangles is None else f'\n      face="{" ".join(str(index) for index in np.ravel(triangles))}"'
         self._assets.append(f'    <mesh name="{name}" vertex="{numbers(vertices)}"{faces}/>\n')
         self._lines.append(f'    <geom name="{name}" type="mesh" mesh="{name}" material="{material}"/>\n')
+
+    def height_field(self, name: str, heights: np.ndarray, spacing: float, corner, *, material: str = "stone") -> None:
+        """Add a height field by its heights (nx, ny) m at points `spacing` m apart, the first at `corner` (2,) m."""
+        low, top = float(heights.min()), max(float(np.ptp(heights)), _LEAST_TOP)
+        half = (np.array(heights.shape) - 1) * spacing / 2
+        pos = numbers([*(np.asarray(corner) + half), low])
+        elevation = numbers((heights.T[::-1] - low) / top)  # MJCF has the row of the largest y first
+        self._assets.append(
+            f'    <hfield name="{name}" nrow="{heights.shape[1]}" ncol="{heights.shape[0]}" '
+            f'size="{numbers([*half, top, _BASE])}"\n      elevation="{elevation}"/>\n'
+        )
+        self._lines.append(
+            f'    <geom name="{name}" type="hfield" hfield="{name}" pos="{pos}" material="{material}"/>\n'
+        )
 
     def _geom(self, name: str, kind: str, size, pos, material: str, rotation: Rotation | None) -> None:
         """Add a geom by its whole extents (3,) m and its centre (3,) m."""

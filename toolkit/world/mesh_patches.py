@@ -53,7 +53,7 @@ def mesh_patches(
             block = rng.uniform(-rise, rise) + slope[0] * local[:, None] + slope[1] * local[None]
             first, second = row * (_CELLS + 1), column * (_CELLS + 1)
             height[first : first + _CELLS + 1, second : second + _CELLS + 1] = block
-    mesh = _block(x - patch * 0.75, y - width / 2, height)
+    mesh = closed_block(x - patch * 0.75, y - width / 2, height)
     world = WorldText(
         "mesh_patches",
         f"one mesh of {len(mesh.faces)} triangles: {rows} x {columns} flat patches of {patch:g} m",
@@ -66,7 +66,7 @@ def mesh_patches(
     return world.render()
 
 
-def _block(x: np.ndarray, y: np.ndarray, height: np.ndarray) -> trimesh.Trimesh:
+def closed_block(x: np.ndarray, y: np.ndarray, height: np.ndarray) -> trimesh.Trimesh:
     """Closed mesh of a height grid (nx, ny) over x (nx,) and y (ny,) with sides and a bottom."""
     count = len(y)
     top = np.column_stack([np.repeat(x, count), np.tile(y, len(x)), height.ravel()])

@@ -1,0 +1,136 @@
+"""Where plans hold and where they do not, over the parameters of families of worlds: `python -m validation.map`."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from toolkit import cli
+from toolkit.drafts import write_whole
+from toolkit.report.console import make_console
+from validation import goals, map_families, map_worlds, options
+from validation.goals import Goal
+from validation.jobs import Job, run_jobs
+from validation.map_families import FAMILIES, QUICK, SEEDS, Cell, cells_of
+from validation.map_picture import draw_map
+from validation.map_table import hole_table, summarise, table
+from validation.map_trial import CANDIDATES, IMPOSSIBLE, completed, map_trial
+from validation.tables import failure_section, show_results, write_results
+from validation.trial_file import TrialFolder
+
+DESCRIPTION = f"""\
+Sweep families of worlds over their parameters (gaps, slopes, stairs, stones, beams, doors, turns, rubble, meshes, ...),
+plan and execute each, and draw a map: one picture a family, and one table with rates and holes.
+
+Every world is moved by up to 100 m and turned by any angle. Worlds name a timing of {map_worlds.TIMING[0]:g} s of
+shifting and {map_worlds.TIMING[1]:g} s of swinging; --timing passes another one, or auto. A cell whose goal the planner
+proves to be out of reach is impossible and counts in no rate. A hole is a cell that fails although a harder one of its
+family passes in all seeds. A sweep that was stopped goes on where it was: --out has a small file for each cell.
+
+  python -m validation.map --quick                      {QUICK} worlds of all families
+  python -m validation.map --families gap beam          two families, every value, {SEEDS} seeds
+  python -m validation.map --timing auto --add-results  everything, into validation/results
+"""
+
+
+def worlds_fingerprint() -> str:
+    """Twelve hex digits of the source that makes the worlds."""
+    sources = (Path(module.__file__ or "").read_bytes() for module in (map_families, map_worlds))
+    return hashlib.sha256(b"".join(sources)).hexdigest()[:12]
+
+
+def goals_of(rows: list[dict[str, Any]]) -> list[Goal]:
+    """What is asked of the whole map."""
+    holes, errors = sum(len(row["holes"]) for row in rows), sum(row["errors"] for row in rows)
+    return [
+        goals.at_most("holes: failures although a harder world passes in all seeds", float(holes), 0.0),
+        goals.at_most("cells that ended in an error of the program", float(errors), 0.0),
+    ]
+
+
+def keep_worlds(folder: Path, cells: list[Cell], records: list[dict[str, Any]]) -> None:
+    """Write the worlds of cells that did not pass, to run them again.
+
+    Raises:
+        InputError: They cannot be written.
+    """
+    for cell, record in zip(cells, records, strict=True):
+        if not record["passed"] and record["stage"] != "error":
+            write_whole(folder / f"{cell.name}.xml", cell.mjcf().encode())
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the experiment; returns the exit code."""
+    parser = options.plain_parser("map", DESCRIPTION)
+    parser.set_defaults(time_limit=60.0)
+    parser.add_argument("--results", type=Path, metavar="DIR", help="where map.json, map.md and the pictures go")
+    parser.add_argument(
+        "--families",
+        nargs="+",
+        choices=tuple(FAMILIES),
+        default=list(FAMILIES),
+        metavar="FAMILY",
+        help=f"default: all of {' '.join(FAMILIES)}",
+    )
+    parser.add_argument("--quick", action="store_true", help=f"{QUICK} worlds in all, one seed each")
+    parser.add_argument(
+        "--seeds",
+        type=cli.positive(int),
+        metavar="N",
+        help=f"seeds of each value (default: {SEEDS}, or 1 with --quick)",
+    )
+    parser.add_argument(
+        "--add-results", action="store_true", help="that is validation/results; the default is OUT/results"
+    )
+    cli.add_execution_options(parser)
+    parser.epilog = options.GOAL_CODES
+    args = parser.parse_args(argv)
+    console = make_console()
+    settings = options.trial_settings(args)
+    families = list(dict.fromkeys(args.families))
+    cells = cells_of(families, quick=args.quick, seeds=args.seeds, first=args.seed_offset)
+    deciding = settings.deciding() | {"worlds": worlds_fingerprint(), "candidates": CANDIDATES}
+    store = TrialFolder(args.out / "cells", deciding)
+    jobs = [Job(cell.name, map_trial, (settings, cell)) for cell in cells]
+    records = completed(run_jobs(jobs, store, options.pool_of(args), console, "cells"), cells)
+    keep_worlds(args.out / "worlds", cells, records)
+    results = args.results or (options.RESULTS if args.add_results else args.out / "results")
+    by_family = {name: [record for record in records if record["family"] == name] for name in families}
+    for name, own in by_family.items():
+        draw_map(results / "map" / f"{name}.png", FAMILIES[name], own)
+    rows = [summarise(name, own) for name, own in by_family.items()]
+    timing = f"Timing of the worlds: {' + '.join(f'{value:g}' for value in map_worlds.TIMING)} s"
+    path = write_results(
+        results,
+        "map",
+        title="Where plans hold",
+        sections=[
+            ("Table", f"{table(rows)}\n\n{timing}, unless the settings below name another. {NOTE}"),
+            ("Holes", hole_table(rows)),
+            ("Pictures", "\n\n".join(f"![{name}](map/{name}.png)" for name in families)),
+            ("Failures", failure_section([record for record in records if record["outcome"] != IMPOSSIBLE])),
+            ("Proven impossible", failure_section([record for record in records if record["outcome"] == IMPOSSIBLE])),
+        ],
+        content={"table": rows, "trials": records},
+        goals=goals_of(rows),
+        settings={
+            **settings.described(),
+            "candidates": CANDIDATES,
+            "quick": args.quick,
+            "seeds": args.seeds,
+            "seed_offset": args.seed_offset,
+        },
+    )
+    show_results(console, path)
+    return options.goal_code(goals_of(rows))
+
+
+NOTE = (
+    "Every world is moved by up to 100 m and turned by any angle. A rate leaves out what the planner proves to be "
+    "impossible; its interval is Wilson's. A hole is a cell that fails, or is called impossible, although a harder "
+    "one of its family passes in all seeds."
+)
+
+if __name__ == "__main__":
+    cli.run(main)
