@@ -71,7 +71,7 @@ class Ground:
         """Screened moves on the way to the goal; None: the steps of the table, wherever they lead."""
         terrain, drawn = self._terrain, None
         model = self._models[way is not None and way.slides]
-        if way is not None and self._config.drawn:
+        if way is not None and self._config.drawn and not way.slides:
             drawn = DrawnSteps(self._robot, self._projector.table, self._footholds, way.distance, self._longest)
         return MoveGenerator(self._robot, self._projector, model, terrain.occupancy, terrain.box, self._arms, drawn)
 

@@ -102,7 +102,8 @@ class ContactPlanner:
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
         tally = Tally()
         strategy = strategy_of(self.config, self._suited(start, com, tally), way.length, slides=way.slides)
-        parts = self._parts(way, strategy, tally, exclusions, palms, time.perf_counter() + time_limit)
+        avoided = list(exclusions)
+        parts = self._parts(way, strategy, tally, avoided, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
         unit = parts.cost.per_metre
         searches = [(ContactProblem(parts, state), replace(strategy.patient, unit=unit))]
@@ -111,7 +112,8 @@ class ContactPlanner:
             searches.insert(0, (ContactProblem(parts, moved_last(state, Limb.RIGHT_FOOT)), hasty))
         judge = None
         if self._finish is not None:
-            judge = Arrival(self._finish, self._at_rest if way.slides else None, parts.reader, parts.cost, tally)
+            at_rest = self._at_rest if way.slides else None
+            judge = Arrival(self._finish, at_rest, parts.reader, parts.cost, tally, avoided)
         result, early = search_in_turn(searches, rng, judge, time_limit, observer)
         return SearchResult(
             solutions=tuple(Solution.of(parts.reader, path) for path in result.paths),
