@@ -120,7 +120,7 @@ def add_planning_options(target: argparse.ArgumentParser) -> None:
         type=positive(int),
         default=1000,
         metavar="N",
-        help="states that the search expands at most, whatever the time (three times as many where feet have to "
+        help="states that the search expands at most, whatever the time (ten times as many where feet have to "
         "slide); reproducible (default: %(default)s)",
     )
     target.add_argument("--no-palms", action="store_true", help="plan with the feet alone")

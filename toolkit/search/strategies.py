@@ -71,7 +71,7 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
     """Find a first sequence soon over ground on which no foot rests, then start again with patience.
 
     The cost so far does not count before there is a solution, since it would only lead back: it is high for all states
-    that get far. Expansions are three times as many, as most of them only show that the robot arrives too fast; the
+    that get far. Expansions are ten times as many, as most of them only show that the robot arrives too fast; the
     hasty search has a fifth of them.
     """
     limit = config.search.max_expansions
@@ -80,7 +80,7 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
         layer=0.2,
         epsilon=0.15,
         crowding=0.08,
-        max_expansions=None if limit is None else 3 * limit,
+        max_expansions=None if limit is None else 10 * limit,
     )
     hasty = replace(
         patient,
