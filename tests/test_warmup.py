@@ -187,7 +187,13 @@ def test_an_interruption_ends_a_first_run_in_one_line(tmp_path):
     words = [sys.executable, "-m", "toolkit.validate", "flat", "--out", str(tmp_path / "run")]
     environment = dict(os.environ, PYTHONPATH=str(ROOT), NUMBA_CACHE_DIR=str(tmp_path / "kernels"))
     run = subprocess.Popen(
-        words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        words,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=_interruptible,
     )
     while not _children(run.pid) and run.poll() is None:
         time.sleep(0.05)
@@ -196,6 +202,11 @@ def test_an_interruption_ends_a_first_run_in_one_line(tmp_path):
     out, err = run.communicate(timeout=120)
     assert run.returncode == 128 + signal.SIGINT and err == "interrupted\n" and "Traceback" not in out
     assert not (tmp_path / "run").exists()
+
+
+def _interruptible():
+    """Mind SIGINT again, which shells make the programs that they run in the background ignore."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _children(parent):
