@@ -197,7 +197,7 @@ def keep_run(
     with folder:
         write_run(folder.path, result, options)
         (folder.path / WORLD_FILE).write_text(case.mjcf(), encoding="utf-8")
-    return shown(folder.target)
+    return shown(folder.target, settings.out)
 
 
 def keep_failure(settings: TrialSettings, case: Case, world: World, reason: str) -> str:
@@ -207,10 +207,15 @@ def keep_failure(settings: TrialSettings, case: Case, world: World, reason: str)
     with folder:
         write_report(folder.path / REPORT, report)
         (folder.path / WORLD_FILE).write_text(case.mjcf(), encoding="utf-8")
-    return shown(folder.target)
+    return shown(folder.target, settings.out)
 
 
-def shown(path: Path) -> str:
-    """A path as results show it: relative to the working directory where it lies below."""
+def shown(path: Path, out: Path) -> str:
+    """A path in the folder `out` as results show it: relative to the working directory, or below "OUT" elsewhere.
+
+    Results are published, so they name no folder of a machine.
+    """
     here = Path.cwd()
-    return str(path.relative_to(here) if path.is_relative_to(here) else path)
+    if path.is_relative_to(here):
+        return str(path.relative_to(here))
+    return str("OUT" / path.relative_to(out.resolve()))

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from validation import ablation, budgets, calibration, execution, options, planning, robustness, sequences
+from validation.run_trial import shown
 
 
 @pytest.fixture
@@ -144,3 +145,11 @@ def test_sequences_come_from_searches_and_at_random(folders):
     assert [row["title"].split(",")[0] for row in found["by_kind"]] == ["flat", "flat", "random walk", "all"]
     assert found["by_kind"][-1]["reference_feasible"] >= 2
     assert found["exponent"] is not None
+
+
+def test_results_name_no_folder_of_a_machine(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert shown(tmp_path / "out" / "runs" / "one", tmp_path / "out") == "out/runs/one"
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert shown(tmp_path / "out" / "runs" / "one", tmp_path / "out") == "OUT/runs/one"

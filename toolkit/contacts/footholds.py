@@ -12,6 +12,8 @@ import numpy as np
 import shapely
 
 from toolkit.contacts.projection import Projected
+from toolkit.geometry.heading import wrapped
+from toolkit.geometry.plane import along_plane, plane_height
 from toolkit.world.surface import Surface
 
 _SHARES = (1.0, 0.5, 0.05)  # of the margin around a sole, tried in turn: a stone may be hardly larger than a sole
@@ -36,7 +38,7 @@ class Footholds:
 
     def headings(self, index: int, yaw: float) -> list[float]:
         """Headings in rad to try on a surface: the wanted one, and those along and across its longest edge."""
-        turns = (self._longest_edge(index) - yaw + np.pi / 2 * np.arange(4) + np.pi) % (2 * np.pi) - np.pi
+        turns = wrapped(self._longest_edge(index) - yaw + np.pi / 2 * np.arange(4))
         return [yaw, *(yaw + float(turn) for turn in turns if _SAME < abs(turn) < _TURN)]
 
     def samples(self, index: int, spacing: float) -> np.ndarray:
@@ -48,9 +50,7 @@ class Footholds:
                 low_u, low_v, high_u, high_v = region.bounds
                 across = np.linspace(low_u, high_u, 2 + int((high_u - low_u) / spacing))
                 upwards = np.linspace(low_v, high_v, 2 + int((high_v - low_v) / spacing))
-                grid = [(u, v) for u in across for v in upwards]
-                lines = shapely.shortest_line(shapely.points(grid), region)
-                found.append(shapely.get_coordinates(shapely.get_point(lines, 1)))
+                found.append(_nearest(region, np.array([(u, v) for u in across for v in upwards])))
         flat = np.concatenate(found) if found else np.zeros((0, 2))
         return surface.pose @ np.column_stack([flat, np.zeros(len(flat))])
 
@@ -71,11 +71,9 @@ class Footholds:
         region = self._region(index, axis)
         if region.is_empty:
             return found
-        slope = turn[:2, 2] / turn[2, 2]
-        height = origin[2] - (wishes - origin[:2]) @ slope
+        height = plane_height(origin, turn[:, 2], *wishes.T)
         local = (np.column_stack([wishes, height]) - origin) @ turn
-        lines = shapely.shortest_line(shapely.points(local[:, :2]), region)
-        places = shapely.get_coordinates(shapely.get_point(lines, 1))
+        places = _nearest(region, local[:, :2])
         found.surface[:] = index
         found.position[:] = origin + places @ turn[:, :2].T
         found.rotation[:] = np.column_stack([axis, np.cross(turn[:, 2], axis), turn[:, 2]])
@@ -110,10 +108,14 @@ class Footholds:
 
 
 def _sole_axis(normal: np.ndarray, yaw: float) -> np.ndarray:
-    """(3,) x axis of a sole on a plane with this normal: the heading, projected along the vertical."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    axis = np.array([c * normal[2], s * normal[2], -(c * normal[0] + s * normal[1])])
-    return axis / np.linalg.norm(axis)
+    """(3,) x axis of a sole on a plane with this normal."""
+    return np.array(along_plane(normal, np.cos(yaw), np.sin(yaw)))
+
+
+def _nearest(region: shapely.Geometry, points: np.ndarray) -> np.ndarray:
+    """The points (n, 2) of a region nearest to points (n, 2)."""
+    lines = shapely.shortest_line(shapely.points(points), region)
+    return shapely.get_coordinates(shapely.get_point(lines, 1))
 
 
 def _eroded(surface: Surface, along: np.ndarray, half: np.ndarray) -> shapely.Geometry:

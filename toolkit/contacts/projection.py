@@ -69,6 +69,11 @@ class Projected:
         """Candidates whose patches fit nowhere yet."""
         return cls(np.full(count, -1), np.zeros((count, 3)), np.zeros((count, 3, 3)))
 
+    @classmethod
+    def joined(cls, parts: Sequence[Projected]) -> Projected:
+        """The candidates of all parts, at least one, in their order."""
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__))
+
     def select(self, rows: np.ndarray) -> Projected:
         """The candidates of these rows, by index or by mask."""
         return Projected(self.surface[rows], self.position[rows], self.rotation[rows])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.compiled import compiled
+from toolkit.geometry.plane import along_plane, plane_height
 
 
 @compiled
@@ -15,22 +16,6 @@ def _meets_rectangle(ax, ay, bx, by, hx, hy):
     dx, dy = bx - ax, by - ay
     # The remaining separating axis: the segment's normal.
     return abs(dx * ay - dy * ax) <= abs(dx) * hy + abs(dy) * hx
-
-
-@compiled
-def plane_height(table, q, x, y):
-    """Height of the plane of surface q at (x, y)."""
-    origin, normal = table.origin[q], table.rotation[q, :, 2]
-    return origin[2] - (normal[0] * (x - origin[0]) + normal[1] * (y - origin[1])) / normal[2]
-
-
-@compiled
-def sole_axis(table, q, c, s):
-    """The x axis of a sole on surface q: the heading (c, s) projected on the plane along the vertical."""
-    normal = table.rotation[q, :, 2]
-    ax, ay, az = c * normal[2], s * normal[2], -(c * normal[0] + s * normal[1])
-    length = np.sqrt(ax * ax + ay * ay + az * az)
-    return ax / length, ay / length, az / length
 
 
 @compiled
@@ -51,13 +36,17 @@ def sole_fits(table, cell, entry, x, y, c, s, half):
     """Whether a sole with centre above (x, y) and heading (c, s) has room on the surface of an entry of that cell."""
     q = table.entry_surface[entry]
     r, origin, edges = table.rotation[q], table.origin[q], table.edges
-    ax, ay, az = sole_axis(table, q, c, s)
+    ax, ay, az = along_plane(table.rotation[q, :, 2], c, s)
     cx, sx = in_plane(r, ax, ay, az)
     # p and d are taken to the surface frame: the centre, and the way to it from the cell's reference point.
-    px, py, pz = x - origin[0], y - origin[1], plane_height(table, q, x, y) - origin[2]
+    px, py, pz = x - origin[0], y - origin[1], plane_height(table.origin[q], table.rotation[q, :, 2], x, y) - origin[2]
     i, j = cell // table.shape[1], cell % table.shape[1]
     rx, ry = table.corner[0] + (i + 0.5) * table.cell, table.corner[1] + (j + 0.5) * table.cell
-    dx, dy, dz = px - rx + origin[0], py - ry + origin[1], pz - plane_height(table, q, rx, ry) + origin[2]
+    dx, dy, dz = (
+        px - rx + origin[0],
+        py - ry + origin[1],
+        pz - plane_height(table.origin[q], table.rotation[q, :, 2], rx, ry) + origin[2],
+    )
     u, v = in_plane(r, px, py, pz)
     du, dv = in_plane(r, dx, dy, dz)
     inside = table.entry_inside[entry]
@@ -101,14 +90,14 @@ def project_soles(pose, low, high, half, offsets, table, surface, position, orie
             best = low
             for entry in range(table.entry_start[cell], table.entry_start[cell + 1]):
                 q = table.entry_surface[entry]
-                z = plane_height(table, q, x, y)
+                z = plane_height(table.origin[q], table.rotation[q, :, 2], x, y)
                 if best <= z <= high and sole_fits(table, cell, entry, x, y, c, s, half):
                     best = z
                     surface[row] = q
                     position[row, 0], position[row, 1], position[row, 2] = x, y, z
             q = surface[row]
             if q >= 0:
-                ax, ay, az = sole_axis(table, q, c, s)
+                ax, ay, az = along_plane(table.rotation[q, :, 2], c, s)
                 nx, ny, nz = table.rotation[q, 0, 2], table.rotation[q, 1, 2], table.rotation[q, 2, 2]
                 _set_frame(orientation[row], ax, ay, az, nx, ny, nz)
                 break

@@ -64,6 +64,11 @@ def leg_scale(robot: RobotModel) -> float:
     return 1.0 if abs(scale - 1.0) < 0.1 else scale
 
 
+def soles_apart(robot: RobotModel) -> float:
+    """Distance in m across between the centres of two soles side by side, with some room between them."""
+    return float(2.0 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04)
+
+
 @dataclass(frozen=True)
 class TransitionModel:
     """The moves of every limb of one robot.
@@ -84,8 +89,7 @@ class TransitionModel:
         """
         scale = leg_scale(robot)
         scaled = steps * [scale, scale, 1.0]
-        apart = 2.0 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04
-        scaled[:, 1] += max(0.0, apart - scaled[:, 1].min())
+        scaled[:, 1] += max(0.0, soles_apart(robot) - scaled[:, 1].min())
         return cls(scaled, palm_rays() if robot.arms else np.zeros((0, 3)))
 
     def steps_of(self, limb: Limb) -> np.ndarray:

@@ -14,14 +14,18 @@ class Simulation:
     Attributes:
         recorder: The measurements.
         qpos, qvel: The present state (nq,) and (nv,), changed in place.
-        steps: Number of physics steps that were taken.
     """
 
     def __init__(self, recorder: Recorder, qpos: np.ndarray, qvel: np.ndarray):
-        self.recorder, self.steps = recorder, 0
+        self.recorder = recorder
         self.qpos, self.qvel = qpos.copy(), qvel.copy()
         self._data = mujoco.MjData(recorder.scene)
         self._data.qpos[:], self._data.qvel[:] = qpos, qvel
+
+    @property
+    def steps(self) -> int:
+        """Number of physics steps that were taken."""
+        return self.recorder.steps
 
     def run_tick(self, ctrl: np.ndarray, push: np.ndarray | None) -> None:
         """Take the physics steps of one control tick; the first of them is sampled.
@@ -40,4 +44,3 @@ class Simulation:
             if part == 0:
                 recorder.record(data, self.qpos, self.qvel)
             self.qpos[:], self.qvel[:] = data.qpos, data.qvel
-        self.steps += len(ctrl)

@@ -69,16 +69,14 @@ class Arrival:
             return None
         sequence = ContactSequence(self._reader.origin(passed[0])[0], tuple(transitions))
         at = self._avoided(sequence)
-        if at is None:
-            objective = self._finish(sequence)
-        else:
-            objective = Failure("a transition that failed before", transition=at)
+        objective = self._finish(sequence) if at is None else Failure("avoided", transition=at)
         if isinstance(objective, Failure):
             self._tally.rejected[Reason.DYNAMICS] += 1
             at = objective.transition
-            if at is not None:
-                self._blame(sequence, at)
-            return None if at is None or at + 1 >= len(passed) else Fault(list(states).index(passed[at + 1]))
+            if at is None:
+                return None
+            self._blame(sequence, at)
+            return None if at + 1 >= len(passed) else Fault(list(states).index(passed[at + 1]))
         predicted = sum(payload[0] for payload in judged) + edge.payload[0]
         missing = self._cost.dynamics * (objective - predicted)
         return edge._replace(cost=edge.cost + missing, payload=(*edge.payload, missing))

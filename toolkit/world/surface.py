@@ -9,6 +9,7 @@ import shapely
 from shapely.geometry import Point, Polygon
 from shapely.ops import nearest_points
 
+from toolkit.geometry.plane import plane_height
 from toolkit.geometry.pose import Pose
 
 
@@ -49,7 +50,7 @@ class Surface:
     def height(self, points: np.ndarray) -> np.ndarray:
         """World z (n,) in m of a surface that is not vertical at points (n, 2) of the world's xy, NaN outside it."""
         normal, origin = self.normal, self.pose.position
-        height = origin[2] - (points - origin[:2]) @ normal[:2] / normal[2]
+        height = plane_height(origin, normal, *points.T)
         local = self.pose.inverse() @ np.column_stack([points, height])
         inside = shapely.intersects_xy(self.region, local[:, 0], local[:, 1])
         return np.where(inside, height, np.nan)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.compiled import compiled
-from toolkit.contacts.projection_kernels import cell_of, plane_height, sole_fits
+from toolkit.contacts.projection_kernels import cell_of, sole_fits
+from toolkit.geometry.plane import plane_height
 from toolkit.search.moves.occupancy import body_free
 
 LEVELS = 4  # heights kept per cell
@@ -36,7 +37,8 @@ def sole_levels(corner, cell, half, offsets, merge, table, result):
                 if place < 0:
                     continue
                 for entry in range(table.entry_start[place], table.entry_start[place + 1]):
-                    z = plane_height(table, table.entry_surface[entry], x, y)
+                    q = table.entry_surface[entry]
+                    z = plane_height(table.origin[q], table.rotation[q, :, 2], x, y)
                     known = False
                     for m in range(LEVELS):
                         known |= abs(result[a, b, m] - z) < 0.5 * merge

@@ -13,7 +13,7 @@ import numpy as np
 from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projected
 from toolkit.contacts.surface_table import SurfaceTable
-from toolkit.contacts.transition_model import leg_scale
+from toolkit.contacts.transition_model import leg_scale, soles_apart
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
@@ -50,8 +50,7 @@ class DrawnSteps:
         scale = leg_scale(robot)
         self._table, self._footholds, self._distance, self._longest = table, footholds, distance, longest
         self._advance = scale * _ADVANCE
-        apart = 2.0 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04
-        across = np.append(scale * _ACROSS, apart)
+        across = np.append(scale * _ACROSS, soles_apart(robot))
         self._wishes = np.stack(np.meshgrid(scale * _ALONG, across, indexing="ij"), axis=-1).reshape(-1, 2)
 
     def wanted(self, stand: np.ndarray, yaw: float, places: np.ndarray, yaws: np.ndarray) -> bool:
@@ -72,13 +71,13 @@ class DrawnSteps:
             for heading in self._footholds.headings(index, yaw):
                 soles = self._footholds.nearest(index, heading, wishes)
                 _, first = np.unique(np.round(soles.position / _SAME), axis=0, return_index=True)
-                inside = np.hypot(*(soles.position[first] - stand)[:, :2].T) < self._longest
-                found.append(soles.select(np.sort(first[inside & soles.found[first]])))
-                headings.append(np.full(int((inside & soles.found[first]).sum()), heading))
+                first = np.sort(first[soles.found[first]])
+                kept = first[np.hypot(*(soles.position[first] - stand)[:, :2].T) < self._longest]
+                found.append(soles.select(kept))
+                headings.append(np.full(len(kept), heading))
         if not found:
             return Projected.none(0), np.zeros(0)
-        parts = (np.concatenate([getattr(soles, name) for soles in found]) for name in Projected.__dataclass_fields__)
-        return Projected(*parts), np.concatenate(headings)
+        return Projected.joined(found), np.concatenate(headings)
 
 
 def longest_step(robot: RobotModel) -> float:

@@ -110,13 +110,14 @@ class MoveGenerator:
         )
         codes = self.screen(limb, soles.surface, soles.position, soles.rotation, pose[:, 2], standing)
         passed = codes == 0
-        numbers = table.add(limb, soles.select(passed))
+        numbers, rejected = table.add(limb, soles.select(passed)), _count(codes)
         drawn = self._drawn
         if drawn is not None and drawn.wanted(stand, stand_yaw, soles.position[passed], pose[passed, 2]):
             more, yaws = drawn.beside(limb, stand, stand_yaw)
             codes = self.screen(limb, more.surface, more.position, more.rotation, yaws, standing)
             numbers = np.concatenate([numbers, table.add(limb, more.select(codes == 0))])
-        return Moves(np.unique(numbers), _count(codes))
+            rejected += _count(codes)
+        return Moves(np.unique(numbers), rejected)
 
     def screen(
         self,
