@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from toolkit.errors import InputError, ToolkitError
 from toolkit.interruption import end_when_stopped
-from toolkit.world.timing import LONGEST, Timing
+from toolkit.world.timing import LONGEST, Timing, Timings
 
 if TYPE_CHECKING:
     from toolkit.execution.config import ExecutionConfig
     from toolkit.search.planner import PlannerConfig
 
-AUTO_TIMINGS = (Timing(1.0, 1.0), Timing(0.4, 0.6), Timing(0.05, 0.35))
 WORLD = "MJCF scene with sites named start and goal, or the name of a world that comes with the toolkit"
 EXIT_CODES = "exit codes: 0 success, 1 a plan or check failed (the reason is printed), 2 bad input"
 
@@ -105,8 +104,9 @@ def add_planning_options(target: argparse.ArgumentParser) -> None:
         "--timing",
         metavar="SHIFT,SWING",
         type=timing,
-        help="seconds of shifting the CoM and of moving the limb, e.g. 0.4,0.6 (default: the world's), or auto: the "
-        "planner chooses for each transition",
+        help="seconds of shifting the CoM and of moving the limb, e.g. 0.4,0.6 or the paper's 1,1; auto: the planner "
+        "chooses for each transition, and a second costs as much as 20 m of way (default: the world's, or auto where "
+        "it names none)",
     )
     target.add_argument(
         "--time-limit",
@@ -139,7 +139,7 @@ class PlanningOptions:
 
     Attributes:
         planner: Who judges transitions (see `toolkit.pipeline.planner.make_planner`).
-        timing: Times that a transition may take; empty for the world's own.
+        timing: Times that a transition may take; see `toolkit.world.timing.Timings`.
         time_limit: s of the search.
         expansions: States that the search expands at most; None for any number.
         no_palms: Whether to plan with the feet alone.
@@ -148,7 +148,7 @@ class PlanningOptions:
     """
 
     planner: str = "auto"
-    timing: tuple[Timing, ...] = ()
+    timing: Timings = ()
     time_limit: float = 30.0
     expansions: int | None = 1000
     no_palms: bool = False
@@ -307,10 +307,10 @@ def _finite(text: str) -> float:
     return value
 
 
-def timing(text: str) -> tuple[Timing, ...]:
-    """An argparse type: `shift,swing` in seconds, or `auto` (an empty choice is the world's own)."""
+def timing(text: str) -> Timings:
+    """An argparse type: `shift,swing` in seconds, or `auto`."""
     if text == "auto":
-        return AUTO_TIMINGS
+        return text
     try:
         shift, swing = (float(part) for part in text.split(","))
     except ValueError:

@@ -51,9 +51,8 @@ def arguments() -> argparse.ArgumentParser:
     parser.add_argument(
         "--timing",
         type=_timing,
-        default=(0.6, 0.8),
         metavar="SHIFT,SWING",
-        help="seconds of shifting the CoM and of moving the limb (default: 0.6,0.8)",
+        help="seconds of shifting the CoM and of moving the limb (default: the planner chooses)",
     )
     parser.add_argument(
         "--scale",
@@ -100,12 +99,10 @@ def _place(least: int, most: int):
     return place
 
 
-def _timing(text: str) -> tuple[float, float]:
-    """An argparse type: times of shift and swing in s."""
+def _timing(text: str) -> tuple[float, float] | None:
+    """An argparse type: times of shift and swing in s; None for auto."""
     found = cli.timing(text)
-    if len(found) != 1:
-        raise argparse.ArgumentTypeError(f"{text} is for planners; give SHIFT,SWING in seconds")
-    return found[0].shift, found[0].swing
+    return None if isinstance(found, str) else (found[0].shift, found[0].swing)
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -15,7 +15,7 @@ from toolkit.world.authoring import WorldText, numbers
 from toolkit.world.mesh_patches import closed_block
 
 FRICTION = 0.5
-TIMING = (0.6, 0.8)  # s; shift and swing that every world names
+TIMING = (0.6, 0.8)  # s; shift and swing that the files name, for other users of them
 BELOW = 2.0  # deg; a tile is walkable if it is so much less steep than its friction angle
 LONG, SHORT = 3.0, 1.0  # m; lengths of slopes
 

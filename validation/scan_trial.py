@@ -89,7 +89,7 @@ def made_of(world: World, scene, name: str) -> ScannedWorld:
     start, goal = world.start, world.goal.position
     config = ScanConfig(
         friction=world.surfaces[0].friction,
-        timing=(world.timing.shift, world.timing.swing),
+        timing=world.timing and (world.timing.shift, world.timing.swing),
         start=(float(start.position[0]), float(start.position[1]), start.yaw),
         goal=(float(goal[0]), float(goal[1])),
     )

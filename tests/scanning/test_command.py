@@ -119,7 +119,6 @@ def test_two_hundred_thousand_triangles(tmp_path):
             "error: argument --goal: '1,1e300' is not 2 numbers with commas, each at most",
         ),
         (["steps.stl", "--goal", "1,x"], "error: argument --goal: '1,x' is not 2 numbers with commas"),
-        (["steps.stl", "--timing", "auto"], "error: argument --timing: auto is for planners"),
         (["steps.stl", "--friction", "0"], "error: argument --friction: 0 is not above zero"),
         (["steps.stl", "--out", "bad.ply"], "error: bad.ply/steps.xml: cannot be written"),
         (["map.npy"], "error: map.npy: does not say how far apart its heights are; give --cell"),

@@ -14,8 +14,9 @@ def box(centre, half, euler=(0, 0, 0), friction=0.7):
 
 
 def make_world(*geoms, start=(0, 0, 0), goal=(1.5, 0, 0), radius=0.2, timing="1 1", heading=0.0):
-    """A world of geoms (MJCF); the heading is in degrees."""
-    mjcf = f"""<mujoco><custom><numeric name="transition_timing" data="{timing}"/></custom><worldbody>
+    """A world of geoms (MJCF); the heading is in degrees, and no timing leaves that to the planner."""
+    custom = "" if timing is None else f'<custom><numeric name="transition_timing" data="{timing}"/></custom>'
+    mjcf = f"""<mujoco>{custom}<worldbody>
       <site name="start" pos="{start[0]} {start[1]} {start[2]}" euler="0 0 {heading}"/>
       <site name="goal" type="cylinder" pos="{goal[0]} {goal[1]} {goal[2]}" size="{radius} 0.01"/>
       {"".join(geoms)}</worldbody></mujoco>"""

@@ -12,6 +12,7 @@ from toolkit import surfaces, terrain
 from toolkit.errors import InputError, WorldError
 from toolkit.world.generators import KINDS
 from toolkit.world.loader import load_world
+from toolkit.world.timing import Timing
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -23,10 +24,11 @@ def test_terrain_writes_a_world(kind, tmp_path):
 
 
 def test_terrain_goes_to_standard_output_and_takes_options(tmp_path, capsys):
-    assert terrain.main(["slope", "--length", "1.5", "--angle", "20", "--friction", "0.6", "--shift", "0.3"]) == 0
-    text = capsys.readouterr().out
-    world = load_world(tmp_path / "slope.xml", mjcf=text)
-    assert world.surfaces[0].friction == 0.6 and world.timing.shift == 0.3
+    options = ["slope", "--length", "1.5", "--angle", "20", "--friction", "0.6"]
+    for timing, named in (([], None), (["--shift", "0.3", "--swing", "0.5"], Timing(0.3, 0.5))):
+        assert terrain.main([*options, *timing]) == 0
+        world = load_world(tmp_path / "slope.xml", mjcf=capsys.readouterr().out)
+        assert world.surfaces[0].friction == 0.6 and world.timing == named
 
 
 @pytest.mark.parametrize(

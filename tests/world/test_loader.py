@@ -46,8 +46,8 @@ def test_reads_palms_of_the_start(make_world):
     make_world(FLOOR + WALL + LEFT_PALM.format("0.1 0.31 1.2"))  # 0.29 m off the wall
 
 
-def test_timing_of_the_paper_where_none_is_given(make_world):
-    assert make_world(FLOOR).timing == Timing(1.0, 1.0)
+def test_no_timing_where_none_is_given(make_world):
+    assert make_world(FLOOR).timing is None
 
 
 def test_file_with_includes_and_meshes_beside_it(tmp_path, monkeypatch):

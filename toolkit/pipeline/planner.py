@@ -23,6 +23,7 @@ from toolkit.search.anytime.ana_star import Progress
 from toolkit.search.moves.exclusion import Exclusion
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult
+from toolkit.world.timing import timings_of
 from toolkit.world.world import World
 
 
@@ -66,8 +67,8 @@ def make_planner(
 
         return quasi_static_planner(robot, world, config)
     if kind == "kinematic":
-        if len(config.timings) < 2:  # this planner counts steps; each of them takes as long as any other
-            config = replace(config, cost=replace(config.cost, time=0.0))
+        calm = timings_of(config.timings, world.timing, robot.com_height)[:1]  # it cannot tell which pace is too fast
+        config = replace(config, timings=calm, cost=replace(config.cost, time=0.0))
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
     optimiser = OptimiserEvaluator(robot)
     judge = _networks(robot, optimiser) if kind == "learned" else optimiser

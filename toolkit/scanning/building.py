@@ -76,7 +76,7 @@ def read_scene(scans: Sequence[Scan], progress: Callable[[float], None] = lambda
     return Scene(list(scans), exact, reading, patches, blobs(reading.rest, reading.spacing, reading.noise), area)
 
 
-def world_text(scene: Scene, comment: str, friction: float, timing: tuple[float, float]) -> WorldText:
+def world_text(scene: Scene, comment: str, friction: float, timing: tuple[float, float] | None) -> WorldText:
     """The world of a scene; its start and goal are still to be set.
 
     Every patch becomes convex plates as thick as the tiles of generated worlds, so thin that their edges are no

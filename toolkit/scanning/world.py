@@ -22,13 +22,13 @@ class ScanConfig:
 
     Attributes:
         friction: Sliding coefficient of everything.
-        timing: Times of shift and swing, s.
+        timing: Times of shift and swing, s; None: the planner chooses.
         start: x, y in m and perhaps the yaw in rad; None for a place that is found.
         goal: x, y in m; None for a place that is found.
     """
 
     friction: float = 0.5
-    timing: tuple[float, float] = (0.6, 0.8)
+    timing: tuple[float, float] | None = None
     start: tuple[float, ...] | None = None
     goal: tuple[float, ...] | None = None
 

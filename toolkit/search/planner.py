@@ -35,6 +35,7 @@ from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import CONTACTS, is_pending, moved_last, unpack
 from toolkit.search.strategies import Strategy, strategy_of
+from toolkit.world.timing import timings_of
 from toolkit.world.world import World
 
 _UNTRAINED = (
@@ -55,6 +56,7 @@ class ContactPlanner:
 
     Attributes:
         ground: The world as the robot can walk it.
+        timings: The timings of a transition that it chooses from.
     """
 
     def __init__(
@@ -69,7 +71,7 @@ class ContactPlanner:
         self.robot, self.world, self.config = robot, world, config or PlannerConfig()
         self._evaluator, self._finish, self._at_rest = evaluator, finish, at_rest
         self.ground = Ground(robot, world, self.config)
-        self._timings = self.config.timings or (world.timing,)
+        self.timings = timings_of(self.config.timings, world.timing, robot.com_height)
 
     @warnings_refused("the contact search", PlanningError)
     def search(
@@ -134,7 +136,7 @@ class ContactPlanner:
 
         All evaluators are asked here once, so that what they compile or load at first takes no time of the search.
         """
-        still = [ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], timing) for timing in self._timings]
+        still = [ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], timing) for timing in self.timings]
         untrained = self._evaluator.evaluate(start, com, np.zeros(3), still).untrained
         tally.untrained += untrained
         stand_in = self._evaluator.stand_in
@@ -147,7 +149,7 @@ class ContactPlanner:
         self, way: Way, strategy: Strategy, tally: Tally, exclusions: Sequence[Exclusion], palms: bool, deadline: float
     ) -> Parts:
         """The parts of the graphs of one search."""
-        moves, timings = self.ground.moves(way), self._timings
+        moves, timings = self.ground.moves(way), self.timings
         table, palms = moves.table, palms and self.config.palms and moves.has_palm_surfaces
         limbs = [limb for limb in PALMS if palms and limb in self.robot.arms]
         candidates = CandidateGenerator(moves, limbs, timings, exclusions, tally.rejected)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from toolkit.errors import InputError
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig
-from toolkit.world.timing import Timing
+from toolkit.world.timing import Timings
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class PlannerConfig:
         drawn: Whether landing places are drawn from the surfaces where the table's steps lead no farther.
         palms: Whether palms may be used.
         heuristic: "grid" or "euclidean".
-        timings: Timings of a transition to choose from; empty: the world's.
+        timings: Timings of a transition to choose from; see `toolkit.world.timing.Timings`.
         rest_friction: Part of the friction that a resting foot may need; steeper ground holds no foot at all. None: the
             evaluator decides.
         cost: Weights of the edge costs.
@@ -33,7 +33,7 @@ class PlannerConfig:
     drawn: bool = True
     palms: bool = True
     heuristic: str = "grid"
-    timings: tuple[Timing, ...] = ()
+    timings: Timings = ()
     rest_friction: float | None = None
     cost: CostConfig = field(default_factory=CostConfig)
     acceptable_cost: float = 500.0

@@ -30,15 +30,17 @@ height="256"/>
     <material name="slope" rgba="0.76 0.55 0.42 1"/>
     <material name="panel" rgba="0.52 0.62 0.70 1"/>
 {assets}  </asset>
-  <custom>
-    <numeric name="transition_timing" data="{timing}"/>
-  </custom>
-  <default>
+{timing}  <default>
     <geom friction="{friction}"/>
     <default class="visual"><geom contype="0" conaffinity="0" group="2"/></default>
   </default>
   <worldbody>
     <light pos="{light}" dir="0.3 0.2 -1" directional="true" diffuse="0.55 0.55 0.55"/>
+"""
+
+_TIMING = """  <custom>
+    <numeric name="transition_timing" data="{}"/>
+  </custom>
 """
 
 _TAIL = """    <site name="start" pos="{start}" euler="0 0 {heading}" size="0.02" rgba="0.2 0.7 0.3 1"/>
@@ -62,7 +64,7 @@ class WorldText:
         model: Name of the model in the file.
         comment: What the world is, for a reader of the file.
         friction: Sliding coefficient of all geoms.
-        timing: Times of shift and swing, s.
+        timing: Times of shift and swing, s; None: the planner chooses.
         goal, start: Positions (3,) of the two sites, m.
         abyss: Height of a floor that is only drawn, m; None for no such floor.
         heading: Yaw of the start, deg.
@@ -71,7 +73,7 @@ class WorldText:
     model: str
     comment: str
     friction: float
-    timing: tuple[float, float]
+    timing: tuple[float, float] | None
     goal: tuple[float, float, float]
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     abyss: float | None = -1.0
@@ -141,7 +143,7 @@ class WorldText:
             light=numbers(middle - 4.0 * np.array([0.3, 0.2, -1.0])),
             extent=numbers([0.6 * np.linalg.norm(goal - start) + 1.0]),
             assets="".join(self._assets),
-            timing=numbers(self.timing),
+            timing="" if self.timing is None else _TIMING.format(numbers(self.timing)),
             friction=numbers([self.friction]),
         )
         if self.abyss is not None:

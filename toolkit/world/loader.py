@@ -120,10 +120,10 @@ def _goal(path: Path, model: mujoco.MjModel) -> Goal:
     return Goal(_site_pose(model, site).position, radius)
 
 
-def _timing(path: Path, model: mujoco.MjModel) -> Timing:
+def _timing(path: Path, model: mujoco.MjModel) -> Timing | None:
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, "transition_timing")
     if index < 0:
-        return Timing()
+        return None
     first, count = int(model.numeric_adr[index]), int(model.numeric_size[index])
     values = model.numeric_data[first : first + count]
     if count != 2 or not ((0.0 < values) & (values <= LONGEST)).all():

@@ -81,8 +81,8 @@ def slope(
     angle: float = 30.0,
     width: float = 1.0,
     friction: float = 0.5,
-    shift: float = 0.05,
-    swing: float = 0.3,
+    shift: float = 0.0,
+    swing: float = 0.0,
 ) -> str:
     """A slope downwards, level above and below.
 
@@ -92,7 +92,7 @@ def slope(
         angle: Angle of the slope, deg; negative for a slope upwards.
         width: Width of the slope, m.
         friction: Sliding coefficient.
-        shift: Time of a shift, s.
+        shift: Time of a shift, s; 0 as the swing is: the planner chooses both.
         swing: Time of a swing, s.
     """
     del rng
@@ -102,7 +102,7 @@ def slope(
         "slope",
         f"a slope of {angle:g} degrees, {length:g} m long, level above and below",
         friction,
-        (shift, swing),
+        (shift, swing) if shift or swing else None,
         (edge + run + 1.0, 0.0, 0.0),
         start=(0.0, 0.0, top),
         abyss=min(0.0, top) - THICKNESS - 0.01,

@@ -1,11 +1,19 @@
-"""Timing of a contact transition."""
+"""Timing of a contact transition, and the timings among which the planner chooses."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Literal
 
 LONGEST = 10.0
 """Longest shift and longest swing in s. Time and memory grow with them, and slower motions are no different ones."""
+
+Timings = tuple["Timing", ...] | Literal["auto"]
+"""Timings to choose from; "auto": those of `own_choice`; empty: the world's, or "auto" where it names none."""
+
+_HEIGHT = 1.0  # m; CoM of a body for which the times below hold
+_CHOICES = ((0.6, 0.8), (0.4, 0.6), (0.2, 0.5), (0.05, 0.3))  # s, s; shift and swing, the calmest first
 
 
 @dataclass(frozen=True)
@@ -19,3 +27,19 @@ class Timing:
 
     shift: float = 1.0
     swing: float = 1.0
+
+
+def own_choice(com_height: float) -> tuple[Timing, ...]:
+    """The timings that a planner may choose from for every transition, the calmest first.
+
+    They scale as a pendulum of the height of the CoM, in m, does.
+    """
+    scale = math.sqrt(com_height / _HEIGHT)
+    return tuple(Timing(round(scale * shift, 3), round(scale * swing, 3)) for shift, swing in _CHOICES)
+
+
+def timings_of(asked: Timings, own: Timing | None, com_height: float) -> tuple[Timing, ...]:
+    """The timings of a search: those `asked` for, else the world's `own`, else the planner's `own_choice`."""
+    if isinstance(asked, tuple) and asked:
+        return asked
+    return (own,) if own is not None and asked != "auto" else own_choice(com_height)

@@ -39,7 +39,7 @@ class World:
         surfaces: Contact surfaces, `surfaces[i].index == i`.
         start: Upright pose of the point between the feet at the start, as authored, not projected.
         goal: Goal region.
-        timing: Shift and swing time of a transition.
+        timing: Shift and swing time of a transition; None: the planner chooses.
         square: Infinite planes are cut to this (xmin, ymin, xmax, ymax), m, wherever they are drawn or listed.
         scenery: The scene as it was read, to be combined with a robot.
         start_palms: Points (3,), m, by palm that starts in contact, each on the surface nearest to its point; empty if
@@ -52,7 +52,7 @@ class World:
     surfaces: tuple[Surface, ...] = field(repr=False)
     start: Pose
     goal: Goal
-    timing: Timing
+    timing: Timing | None
     square: tuple[float, float, float, float] = (-10.0, -10.0, 10.0, 10.0)
     scenery: mujoco.MjSpec = field(default_factory=mujoco.MjSpec, repr=False)
     start_palms: Mapping[Limb, np.ndarray] = field(default_factory=dict)
