@@ -29,12 +29,14 @@ class Planner:
     """Finds what it is given: with palms, and for the feet alone."""
 
     hasty = 0
+    paces = 1
 
     def __init__(self, with_palms, without):
         self.found, self.calls, self.exclusions = {True: with_palms, False: without}, [], []
 
-    def search(self, rng, time_limit, observer=None, exclusions=(), palms=True):
+    def search(self, rng, time_limit, observer=None, exclusions=(), palms=True, calmer=0):
         self.calls.append(palms)
+        self.pace = calmer
         self.exclusions.append(len(exclusions))
         return SimpleNamespace(
             solutions=self.found[palms],
@@ -45,6 +47,7 @@ class Planner:
             expansions=1,
             hasty=self.hasty,
             slides=False,
+            may_yield=calmer + 1 < self.paces,
             screen=SimpleNamespace(),
         )
 
@@ -124,6 +127,13 @@ def test_what_fails_later_makes_room_for_the_next_cheapest(monkeypatch):
     run = Run(planner, {"old"}, monkeypatch, {"old": 3.0, "cheap": 1.0, "new": 2.0})
     assert run.tested == ["cheap", "new", "old"] and run.result.passed
     assert [run.result.reason_against(item) for item in run.result.candidates] == ["it fell", "it fell", ""]
+
+
+def test_where_nothing_is_found_the_pace_yields_as_long_as_it_may(monkeypatch):
+    planner = Planner([], [])
+    planner.paces = 3
+    result = Run(planner, set(), monkeypatch).result
+    assert planner.calls == [True, True, True] and planner.pace == 2 and not result.passed
 
 
 def test_what_was_only_to_come_soon_is_tested_like_the_rest(monkeypatch):

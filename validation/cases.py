@@ -38,7 +38,7 @@ KINDS = {
     "rubble_field": Kind("rubble_field", random=True),
     "rubble_corridor": Kind("rubble_corridor", random=True),
     "wide_gap": Kind("gap", {"width": 0.5}),
-    "steep_slope_1m": Kind("slope", {"length": 1.0, "swing": 0.35}),  # the shorter, the less haste there is
+    "steep_slope_1m": Kind("slope", {"length": 1.0}),
     "steep_slope_2m": Kind("slope", {"length": 2.0}),
     "steep_slope_3m": Kind("slope", {"length": 3.0}),
 }

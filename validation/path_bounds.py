@@ -66,7 +66,7 @@ class BoundCheck:
         way = ground.way(ground.start_stance())
         # The weights do not depend on the judge.
         self._weights = strategy_of(config, KinematicEvaluator(planner.robot), way.length, slides=way.slides).cost
-        table, timings = ground.moves(way).table, planner.timings
+        table, timings = ground.moves(way).table, planner.timings(slides=way.slides)
         self._goal = planner.world.goal
         self._cost = EdgeCost(self._weights, table, timings, self._goal, way.distance, way.longest, planner.robot.mass)
 

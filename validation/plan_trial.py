@@ -102,13 +102,14 @@ class TimedPlanner:
         observer: Callable[[Progress], None] | None = None,
         exclusions: Sequence[Exclusion] = (),
         palms: bool = True,
+        calmer: int = 0,
     ) -> SearchResult:
         """See `ContactPlanner.search`."""
         if self.search_result is not None:
-            return self._planner.search(rng, time_limit, observer, exclusions, palms)
+            return self._planner.search(rng, time_limit, observer, exclusions, palms, calmer)
         before = memory()
         clock = SearchClock.start()
-        search = self._planner.search(rng, time_limit, clock, exclusions, palms)
+        search = self._planner.search(rng, time_limit, clock, exclusions, palms, calmer)
         share, after = clock.share(), memory()
         first = search.solutions[0].seconds if search.solutions else None
         first_share = self.first_share = clock.processor_share or share

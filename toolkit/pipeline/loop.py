@@ -121,7 +121,9 @@ class _Run:
             found = self._optimised(search)
             passed = self._tried(found)
             failed_with_palms = any(candidate.uses_palms for candidate in found)
-            if passed or not found or self._spent() or not (self._exclusions or failed_with_palms):
+            if passed or self._spent():
+                break
+            if not search.may_yield and (not found or not (self._exclusions or failed_with_palms)):
                 break
             palms = palms and not failed_with_palms
         return self._concluded()
@@ -157,6 +159,7 @@ class _Run:
             observer=lambda progress: observer.progress("planning", None, str(progress)),
             exclusions=tuple(exclusions),
             palms=palms,
+            calmer=len(self._searches),
         )
         self._searches.append(search)
         found = len(search.solutions)

@@ -23,7 +23,6 @@ from toolkit.search.anytime.ana_star import Progress
 from toolkit.search.moves.exclusion import Exclusion
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult
-from toolkit.world.timing import timings_of
 from toolkit.world.world import World
 
 
@@ -37,6 +36,7 @@ class Planner(Protocol):
         observer: Callable[[Progress], None] | None = None,
         exclusions: Sequence[Exclusion] = (),
         palms: bool = True,
+        calmer: int = 0,
     ) -> SearchResult:
         """Search for as long as `time_limit` s."""
         ...
@@ -67,8 +67,7 @@ def make_planner(
 
         return quasi_static_planner(robot, world, config)
     if kind == "kinematic":
-        calm = timings_of(config.timings, world.timing, robot.com_height)[:1]  # it cannot tell which pace is too fast
-        config = replace(config, timings=calm, cost=replace(config.cost, time=0.0))
+        config = replace(config, one_timing=True, cost=replace(config.cost, time=0.0))
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
     optimiser = OptimiserEvaluator(robot)
     judge = _networks(robot, optimiser) if kind == "learned" else optimiser

@@ -35,7 +35,7 @@ from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import CONTACTS, is_pending, moved_last, unpack
 from toolkit.search.strategies import Strategy, strategy_of
-from toolkit.world.timing import timings_of
+from toolkit.world.timing import Timing, timings_of
 from toolkit.world.world import World
 
 _UNTRAINED = (
@@ -56,7 +56,6 @@ class ContactPlanner:
 
     Attributes:
         ground: The world as the robot can walk it.
-        timings: The timings of a transition that it chooses from.
     """
 
     def __init__(
@@ -71,7 +70,17 @@ class ContactPlanner:
         self.robot, self.world, self.config = robot, world, config or PlannerConfig()
         self._evaluator, self._finish, self._at_rest = evaluator, finish, at_rest
         self.ground = Ground(robot, world, self.config)
-        self.timings = timings_of(self.config.timings, world.timing, robot.com_height)
+
+    def timings(self, calmer: int = 0, *, slides: bool = False) -> tuple[Timing, ...]:
+        """The timings of a transition to choose from when the pace has yielded so often.
+
+        Where the ground `slides`, standing for longer does not help, so the pace never yields. Judges that know no
+        dynamics begin with the second pace.
+        """
+        config = self.config
+        pace = 0 if slides else calmer + config.one_timing
+        timings = timings_of(config.timings, self.world.timing, self.robot.com_height, pace)
+        return timings[:1] if config.one_timing else timings
 
     @warnings_refused("the contact search", PlanningError)
     def search(
@@ -81,6 +90,7 @@ class ContactPlanner:
         observer: Callable[[Progress], None] | None = None,
         exclusions: Sequence[Exclusion] = (),
         palms: bool = True,
+        calmer: int = 0,
     ) -> SearchResult:
         """Search for contact sequences until the time is up or nothing can improve.
 
@@ -90,6 +100,7 @@ class ContactPlanner:
             observer: Told of progress and of every solution.
             exclusions: Transitions that later stages rejected; the search avoids them.
             palms: Whether this search may use palms, where `config.palms` allows them at all.
+            calmer: How often the pace has yielded, where it is the planner's to choose; see `timings`.
 
         Returns:
             Every solution, or the reason why there is none.
@@ -102,10 +113,10 @@ class ContactPlanner:
         way = self.ground.way(start)
         heuristic_seconds = time.perf_counter() - began
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
-        tally = Tally()
-        strategy = strategy_of(self.config, self._suited(start, com, tally), way.length, slides=way.slides)
+        tally, timings = Tally(), self.timings(calmer, slides=way.slides)
+        strategy = strategy_of(self.config, self._suited(start, com, timings, tally), way.length, slides=way.slides)
         avoided = list(exclusions)
-        parts = self._parts(way, strategy, tally, avoided, palms, time.perf_counter() + time_limit)
+        parts = self._parts(way, strategy, timings, tally, avoided, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
         unit = parts.cost.per_metre
         searches = [(ContactProblem(parts, state), replace(strategy.patient, unit=unit))]
@@ -128,15 +139,16 @@ class ContactPlanner:
             reason="" if result.paths else self._reason(result, tally),
             warning=_UNTRAINED if tally.untrained else "",
             slides=way.slides,
+            may_yield=self.timings(calmer + 1, slides=way.slides) != timings,
             screen=parts.screen,
         )
 
-    def _suited(self, start: Stance, com: np.ndarray, tally: Tally) -> TransitionEvaluator:
+    def _suited(self, start: Stance, com: np.ndarray, timings: tuple[Timing, ...], tally: Tally) -> TransitionEvaluator:
         """The evaluator for the timings: its stand-in where it was trained for none of them.
 
         All evaluators are asked here once, so that what they compile or load at first takes no time of the search.
         """
-        still = [ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], timing) for timing in self.timings]
+        still = [ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], timing) for timing in timings]
         untrained = self._evaluator.evaluate(start, com, np.zeros(3), still).untrained
         tally.untrained += untrained
         stand_in = self._evaluator.stand_in
@@ -146,10 +158,17 @@ class ContactPlanner:
         return stand_in if stand_in is not None and untrained == len(still) else self._evaluator
 
     def _parts(
-        self, way: Way, strategy: Strategy, tally: Tally, exclusions: Sequence[Exclusion], palms: bool, deadline: float
+        self,
+        way: Way,
+        strategy: Strategy,
+        timings: tuple[Timing, ...],
+        tally: Tally,
+        exclusions: Sequence[Exclusion],
+        palms: bool,
+        deadline: float,
     ) -> Parts:
         """The parts of the graphs of one search."""
-        moves, timings = self.ground.moves(way), self.timings
+        moves = self.ground.moves(way)
         table, palms = moves.table, palms and self.config.palms and moves.has_palm_surfaces
         limbs = [limb for limb in PALMS if palms and limb in self.robot.arms]
         candidates = CandidateGenerator(moves, limbs, timings, exclusions, tally.rejected)

@@ -20,6 +20,7 @@ class PlannerConfig:
         palms: Whether palms may be used.
         heuristic: "grid" or "euclidean".
         timings: Timings of a transition to choose from; see `toolkit.world.timing.Timings`.
+        one_timing: Whether the calmest of them serves all transitions, as judges need that know no dynamics.
         rest_friction: Part of the friction that a resting foot may need; steeper ground holds no foot at all. None: the
             evaluator decides.
         cost: Weights of the edge costs.
@@ -34,6 +35,7 @@ class PlannerConfig:
     palms: bool = True
     heuristic: str = "grid"
     timings: Timings = ()
+    one_timing: bool = False
     rest_friction: float | None = None
     cost: CostConfig = field(default_factory=CostConfig)
     acceptable_cost: float = 500.0

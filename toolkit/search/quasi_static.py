@@ -29,7 +29,6 @@ from toolkit.search.moves.moves import MARGINS
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.world.surface import Surface
-from toolkit.world.timing import timings_of
 from toolkit.world.world import World
 
 _FRICTION = 0.9  # part of the friction coefficients that may be used
@@ -135,7 +134,7 @@ def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig 
         config,
         cost=replace(config.cost, dynamics=0.0, time=0.0, steep=0.0),
         rest_friction=None if palms else _FRICTION,
-        timings=timings_of(config.timings, world.timing, robot.com_height)[:1],
+        one_timing=True,
     )
     return ContactPlanner(robot, world, QuasiStaticEvaluator(robot), config)
 

@@ -73,6 +73,7 @@ class SearchResult:
         warning: One line where the judgements are less reliable, else "".
         hasty: Number of first solutions that only had to come soon; better ones follow.
         slides: Whether no way leads over resting ground alone; see `CostConfig.on_ground`.
+        may_yield: Whether a calmer pace is left to search with, where the pace is the planner's to choose.
         screen: The screens of the search, for sequences that are made from what it found; None where there are none.
     """
 
@@ -86,6 +87,7 @@ class SearchResult:
     warning: str = ""
     hasty: int = 0
     slides: bool = False
+    may_yield: bool = False
     screen: SequenceScreen | None = field(default=None, repr=False, compare=False)
 
 

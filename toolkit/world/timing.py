@@ -13,7 +13,11 @@ Timings = tuple["Timing", ...] | Literal["auto"]
 """Timings to choose from; "auto": those of `own_choice`; empty: the world's, or "auto" where it names none."""
 
 _HEIGHT = 1.0  # m; CoM of a body for which the times below hold
-_CHOICES = ((0.6, 0.8), (0.4, 0.6), (0.2, 0.5), (0.05, 0.3))  # s, s; shift and swing, the calmest first
+_PACES = (  # s, s; shifts and swings to choose from, the calmest first; where a pace fails, the next follows
+    ((0.35, 0.6), (0.05, 0.3)),
+    ((0.6, 0.8), (0.35, 0.6)),
+    ((1.0, 1.0), (0.6, 0.8)),
+)
 
 
 @dataclass(frozen=True)
@@ -29,17 +33,19 @@ class Timing:
     swing: float = 1.0
 
 
-def own_choice(com_height: float) -> tuple[Timing, ...]:
+def own_choice(com_height: float, calmer: int = 0) -> tuple[Timing, ...]:
     """The timings that a planner may choose from for every transition, the calmest first.
 
-    They scale as a pendulum of the height of the CoM, in m, does.
+    They scale as a pendulum of the height of the CoM, in m, does. The more often the pace has yielded (`calmer`), the
+    slower they are, down to the paper's.
     """
     scale = math.sqrt(com_height / _HEIGHT)
-    return tuple(Timing(round(scale * shift, 3), round(scale * swing, 3)) for shift, swing in _CHOICES)
+    pace = _PACES[min(calmer, len(_PACES) - 1)]
+    return tuple(Timing(round(scale * shift, 3), round(scale * swing, 3)) for shift, swing in pace)
 
 
-def timings_of(asked: Timings, own: Timing | None, com_height: float) -> tuple[Timing, ...]:
+def timings_of(asked: Timings, own: Timing | None, com_height: float, calmer: int = 0) -> tuple[Timing, ...]:
     """The timings of a search: those `asked` for, else the world's `own`, else the planner's `own_choice`."""
     if isinstance(asked, tuple) and asked:
         return asked
-    return (own,) if own is not None and asked != "auto" else own_choice(com_height)
+    return (own,) if own is not None and asked != "auto" else own_choice(com_height, calmer)
