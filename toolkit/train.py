@@ -58,10 +58,16 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
         summary = collect(args.out, robot, config, pool, tick)
     rate = (summary.labelled - summary.resumed) / max(summary.seconds, 1e-9)
     share = summary.feasible / max(summary.samples, 1)
+    for category, count in summary.labels.items():
+        if count < args.samples:
+            console.print(
+                f"category {int(category)} ({category.words}) has {count} of {args.samples} labels: few worlds give "
+                "any; a collection with another --seed in another folder adds more"
+            )
     console.print(
         f"{summary.labelled} labels in {summary.seconds:.0f} s ({rate:.1f} per s, {summary.resumed} found from "
-        f"before), fewest of a category: {summary.fewest}; with those judged alone {summary.samples} transitions, "
-        f"feasible: {share:.0%}\n{args.out}"
+        f"before), fewest of a category: {min(summary.labels.values())}; with those judged alone {summary.samples} "
+        f"transitions, feasible: {share:.0%}\n{args.out}"
     )
     return 0
 

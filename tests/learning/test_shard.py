@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from toolkit.contacts.category import Category
+from toolkit.learning import shard as shard_module
 from toolkit.learning.collect_config import CollectConfig
 from toolkit.learning.quota import Quota
 from toolkit.learning.samples import PARTS, Samples
@@ -88,3 +89,10 @@ def test_terrain_loads_and_has_what_it_says(walls):
     }
     tilts = [np.degrees(np.arccos(surface.pose.normal[2])) for surface in world.surfaces if surface.serves_foot]
     assert len(tilts) >= 9 and max(tilts) <= 28.1 and max(tilts) > 5  # roll and pitch of 20 degrees together
+
+
+def test_a_shard_ends_where_worlds_give_no_more(monkeypatch, config):
+    seen = []
+    monkeypatch.setattr(shard_module, "draw_sequences", lambda *parts: seen.append(parts) or [])
+    samples = shard_module.collect_shard(replace(config, most_idle=3), 0)
+    assert len(seen) == 3 and not any(len(each) for each in samples.values())

@@ -34,7 +34,7 @@ class Collected:
         feasible: Number of feasible ones.
         labelled: Number of those whose outcome in a whole motion is known.
         resumed: Number of these that were there before this call.
-        fewest: Number of labels of the rarest category.
+        labels: Number of labels of each category.
         seconds: Wall-clock time of this call.
     """
 
@@ -43,7 +43,7 @@ class Collected:
     feasible: int
     labelled: int
     resumed: int
-    fewest: int
+    labels: dict[Category, int]
     seconds: float
 
 
@@ -95,9 +95,9 @@ def collect(
     resumed, done = number("labelled"), config.shards - len(missing)
 
     def state() -> Collected:
-        fewest = min(counts[category, "labelled"] for category in categories_of(robot))
+        labels = {category: counts[category, "labelled"] for category in categories_of(robot)}
         seconds = time.perf_counter() - began
-        return Collected(done, number("all"), number("feasible"), number("labelled"), resumed, fewest, seconds)
+        return Collected(done, number("all"), number("feasible"), number("labelled"), resumed, labels, seconds)
 
     def take(more: Counts) -> None:
         nonlocal done

@@ -16,6 +16,7 @@ class CollectConfig:
         samples_per_category: Least number of labels of each category.
         per_shard: Least number of labels of each category in a shard.
         most_worlds: Most worlds of a shard, which has fewer labels where these do not give enough.
+        most_idle: Most worlds in a row that give a shard none of the labels it still wants; it then ends as well.
         networks: Folder of networks that take part in the search; None for none.
         networks_digest: Digest of their files, so that a collection goes on with the same ones.
         paper_share: Share of worlds with the paper's timing (1 s + 1 s) and friction (0.5).
@@ -39,8 +40,9 @@ class CollectConfig:
     robots: str | None = None
     seed: int = 0
     samples_per_category: int = 5000
-    per_shard: int = 20
+    per_shard: int = 10
     most_worlds: int = 200
+    most_idle: int = 25
     networks: str | None = None
     networks_digest: str = ""
     paper_share: float = 0.25

@@ -23,6 +23,11 @@ class Quota:
         return max(self._wanted - self._labelled[category], 0) if category in self._labelled else 0
 
     @property
+    def missing(self) -> int:
+        """Number of labels that are still wanted, over all categories."""
+        return sum(self.lack(category) for category in self.categories)
+
+    @property
     def lacking(self) -> list[Category]:
         """Categories of which labels are still wanted."""
         return [category for category in self.categories if self.lack(category)]

@@ -51,18 +51,21 @@ def collect_shard(config: CollectConfig, index: int) -> dict[Category, Samples]:
 
     Returns:
         Samples of every category that the robot can perform, at least `config.per_shard` of them with an outcome,
-        unless `config.most_worlds` worlds did not give so many.
+        unless `config.most_worlds` worlds did not give so many, or `config.most_idle` ones in a row none of them.
     """
     rng = np.random.default_rng([config.seed, index])
     robot = robot_of(config.robot, config.robots)
     quota = Quota(config.per_shard, categories_of(robot))
+    idle = 0
     for number in range(min(config.most_worlds, WORLDS)):
-        if not quota.lacking:
+        if not quota.lacking or idle >= config.most_idle:
             break
+        missing = quota.missing
         for sequence, scout in draw_sequences(_place(robot, quota, config, rng), quota, config, rng):
             labelled = label(robot, sequence)
             if labelled is not None:
                 _add(labelled, scout, quota, WORLDS * index + number, config, rng)
+        idle = 0 if quota.missing < missing else idle + 1
     return quota.samples()
 
 
