@@ -22,12 +22,13 @@ class CollectConfig:
         paper_share: Share of worlds with the paper's timing (1 s + 1 s) and friction (0.5).
         planned_share: Share of worlds with the timing at which planners are compared (0.6 s + 0.8 s). The other worlds
             draw timings.
-        shift, swing: Ranges of times in s, drawn uniformly in their logarithm.
+        shift, swing: Ranges of times in s, drawn uniformly in their logarithm, for a body whose CoM is 1 m high; the
+            times of others scale as a pendulum of their height does.
         quick_shift, quick_swing: The same on steep slopes.
         choices: Most timings between which a search may choose.
         friction: Range of the coefficient.
-        tilt: Range of the largest tilt of a world's tiles, in deg.
-        rise: Range of the largest height of a world's tiles, in m.
+        tilt: Range of the largest tilt of a world's tiles, in deg; no more than the ankles of the robot roll.
+        rise: Range of the largest height of a world's tiles, in m. Worlds are to the scale of the robot's legs.
         walled: Share of worlds with walls, while labels of transitions with palms are lacking.
         searches: Number of searches in a world, each with weights of its own.
         expansions: Range of the number of states that a search expands.

@@ -7,6 +7,7 @@ changed until they are not.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -26,7 +27,8 @@ from toolkit.prediction.network import TransitionNetwork
 from toolkit.prediction.networks import load_networks
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
-from toolkit.world.timing import Timing
+from toolkit.world.scaling import scale_of, steepest_tile
+from toolkit.world.timing import Timing, pace_of
 
 WORLDS = 1000
 """Numbers of worlds that a shard may use: those of shard i begin with i times this."""
@@ -74,12 +76,13 @@ def _place(robot: RobotModel, quota: Quota, config: CollectConfig, rng: np.rando
     networks = {}
     if config.networks is not None:
         networks = _networks_of(config.robot, config.robots, config.networks, config.networks_digest)
+    scale, pace = scale_of(robot), pace_of(robot.com_height)
     walls = robot.arms and any(category.palms_before or not category.moving.is_foot for category in quota.lacking)
     kinds = list(WALLED) if rng.random() < (config.walled if walls else 0.2) else [*OPEN, STEEP]
     kind, friction = kinds[int(rng.integers(len(kinds)))], rng.uniform(*config.friction)
     if kind == STEEP:
-        timings = (_random_timing(config.quick_shift, config.quick_swing, rng),)
-        return Place(robot, steep_descent(rng, friction), timings, True, networks)
+        timings = (_random_timing(config.quick_shift, config.quick_swing, pace, rng),)
+        return Place(robot, steep_descent(rng, friction, scale), timings, True, networks)
     which = rng.random()
     if which < config.paper_share:
         timings, friction = (PAPER,), _PAPER_FRICTION
@@ -87,13 +90,17 @@ def _place(robot: RobotModel, quota: Quota, config: CollectConfig, rng: np.rando
         timings = (PLANNED,)
     else:
         count = int(rng.integers(1, config.choices + 1))
-        timings = tuple(_random_timing(config.shift, config.swing, rng) for _ in range(count))
-    return Place(robot, random_world(rng, config, kind, friction), timings, False, networks)
+        timings = tuple(_random_timing(config.shift, config.swing, pace, rng) for _ in range(count))
+    most = min(config.tilt[1], steepest_tile(robot))
+    config = replace(config, tilt=(min(config.tilt[0], most), most))
+    return Place(robot, random_world(rng, config, kind, friction, scale), timings, False, networks)
 
 
-def _random_timing(shift: tuple[float, float], swing: tuple[float, float], rng: np.random.Generator) -> Timing:
-    """A timing whose times are uniform in their logarithm."""
-    return Timing(*(float(np.exp(rng.uniform(*np.log(bounds)))) for bounds in (shift, swing)))
+def _random_timing(
+    shift: tuple[float, float], swing: tuple[float, float], pace: float, rng: np.random.Generator
+) -> Timing:
+    """A timing whose times are uniform in their logarithm, multiplied by `pace`."""
+    return Timing(*(pace * float(np.exp(rng.uniform(*np.log(bounds)))) for bounds in (shift, swing)))
 
 
 def _add(

@@ -13,6 +13,7 @@ from toolkit.learning.collect_config import CollectConfig
 from toolkit.world import generators, regular
 from toolkit.world.authoring import WorldText
 from toolkit.world.loader import load_world
+from toolkit.world.scaling import scaled
 from toolkit.world.world import Goal, World
 
 TILE = 0.4  # m; edge of the square tiles
@@ -150,21 +151,23 @@ STEEP = "steep slope"
 """The kind of world in which no foot can rest; it is crossed fast."""
 
 
-def steep_descent(rng: np.random.Generator, friction: float) -> World:
-    """A slope downwards that is about as steep as friction allows, or steeper."""
+def steep_descent(rng: np.random.Generator, friction: float, scale: float = 1.0) -> World:
+    """A slope downwards that is about as steep as friction allows, or steeper; lengths are multiplied by `scale`."""
     angle = np.degrees(np.arctan(friction)) * rng.uniform(0.8, 1.25)
     text = regular.slope(rng, length=rng.uniform(0.6, 3.0), angle=min(angle, 35.0), width=1.2, friction=friction)
-    return load_world("training.xml", mjcf=text)
+    return load_world("training.xml", mjcf=scaled(text, scale))
 
 
-def random_world(rng: np.random.Generator, config: CollectConfig, kind: str, friction: float) -> World:
-    """A world of one of the kinds `WALLED` and `OPEN`, with a random way through it."""
-    world = load_world("training.xml", mjcf=(WALLED | OPEN)[kind](rng, config, friction))
+def random_world(
+    rng: np.random.Generator, config: CollectConfig, kind: str, friction: float, scale: float = 1.0
+) -> World:
+    """A world of one of the kinds `WALLED` and `OPEN`, with a random way through it and lengths times `scale`."""
+    world = load_world("training.xml", mjcf=scaled((WALLED | OPEN)[kind](rng, config, friction), scale))
     start, goal = world.start.position, world.goal.position
     yaw = np.radians(_TURNED) * rng.normal()
     if rng.random() < _BACK:
         start, goal, yaw = goal, start, yaw + np.arctan2(*(start - goal)[1::-1])
     if rng.random() < _SHORT:
         aside = np.array([start[1] - goal[1], goal[0] - start[0], 0.0]) / np.linalg.norm(goal - start)
-        goal = start + rng.uniform(0.3, 1.0) * (goal - start) + _ASIDE * rng.normal() * aside
+        goal = start + rng.uniform(0.3, 1.0) * (goal - start) + scale * _ASIDE * rng.normal() * aside
     return replace(world, start=Pose.from_yaw(start, yaw), goal=Goal(goal, world.goal.radius))

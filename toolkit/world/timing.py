@@ -33,15 +33,20 @@ class Timing:
     swing: float = 1.0
 
 
+def pace_of(com_height: float) -> float:
+    """Factor on times for a body whose CoM is at a height in m: that of a pendulum of this height."""
+    return math.sqrt(com_height / _HEIGHT)
+
+
 def own_choice(com_height: float, calmer: int = 0) -> tuple[Timing, ...]:
     """The timings that a planner may choose from for every transition, the calmest first.
 
-    They scale as a pendulum of the height of the CoM, in m, does. The more often the pace has yielded (`calmer`), the
+    They scale with the height of the CoM, in m. The more often the pace has yielded (`calmer`), the
     slower they are, down to the paper's.
     """
-    scale = math.sqrt(com_height / _HEIGHT)
+    factor = pace_of(com_height)
     pace = _PACES[min(calmer, len(_PACES) - 1)]
-    return tuple(Timing(round(scale * shift, 3), round(scale * swing, 3)) for shift, swing in pace)
+    return tuple(Timing(round(factor * shift, 3), round(factor * swing, 3)) for shift, swing in pace)
 
 
 def timings_of(asked: Timings, own: Timing | None, com_height: float, calmer: int = 0) -> tuple[Timing, ...]:
