@@ -22,8 +22,8 @@ def test_lengths_scale_and_angles_stay(kind):
     small = [surface for surface in half.surfaces if surface.serves_foot]
     assert len(ground) == len(small)
     for one, other in zip(ground, small, strict=True):
-        assert other.pose.position == pytest.approx(0.5 * one.pose.position, abs=1e-4)
-        assert other.pose.normal == pytest.approx(one.pose.normal, abs=1e-4)
+        assert other.pose.position == pytest.approx(0.5 * one.pose.position, abs=2e-3)
+        assert other.pose.normal == pytest.approx(one.pose.normal, abs=1e-3)
         assert other.friction == one.friction
 
 
