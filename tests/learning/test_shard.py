@@ -15,6 +15,7 @@ from toolkit.learning.terrain import tiles_and_walls
 from toolkit.prediction.features import CONTACT, feature_size
 from toolkit.robot.loader import load_robot
 from toolkit.world.loader import load_world
+from toolkit.world.timing import pace_of
 
 
 @pytest.fixture(scope="module")
@@ -43,10 +44,12 @@ def test_a_shard_holds_labels_of_every_category_and_both_judgements(shard, confi
 
 
 def test_features_are_what_was_asked_for(shard, config):
+    pace = pace_of(load_robot(config.robot).com_height)
     for category, group in shard.items():
         shift, swing, friction = group.features[:, -3:].T
         low, high = np.minimum(config.shift, config.quick_shift)[0], np.maximum(config.shift, config.quick_shift)[1]
-        for values, bounds in ((shift, (low, high)), (swing, config.swing), (friction, config.friction)):
+        shifts, swings = (pace * low, high), (pace * config.swing[0], config.swing[1])  # the paper's times do not scale
+        for values, bounds in ((shift, shifts), (swing, swings), (friction, config.friction)):
             assert (values >= bounds[0] - 1e-6).all() and (values <= bounds[1] + 1e-6).all()
         axes = group.features[:, : CONTACT * len(category.contact_limbs)].reshape(len(group), -1, 3, 3)[:, :, 1:]
         np.testing.assert_allclose(np.linalg.norm(axes, axis=-1), 1.0, rtol=0, atol=1e-5)  # float32

@@ -16,7 +16,7 @@ def test_lengths_scale_and_angles_stay(kind):
     assert half.goal.position == pytest.approx(0.5 * whole.goal.position, abs=1e-5)
     assert half.goal.radius == pytest.approx(0.5 * whole.goal.radius)
     assert half.timing == whole.timing
-    if kind == "mesh_patches":  # what counts as one patch of a mesh is a matter of metres
+    if kind in ("mesh_patches", "training"):  # what counts as one patch, or as covered, is a matter of metres
         return
     ground = [surface for surface in whole.surfaces if surface.serves_foot]
     small = [surface for surface in half.surfaces if surface.serves_foot]
