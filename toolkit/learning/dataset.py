@@ -108,6 +108,15 @@ def begin(folder: Path, wanted: Manifest, command: str = COMMAND) -> None:
     wanted.write(folder)
 
 
+def begun_with(folder: Path, setting: str) -> Any:
+    """A setting that a data set was begun with; None where there is no data set yet.
+
+    Raises:
+        DatasetError: Its manifest cannot be read.
+    """
+    return read_manifest(folder).settings.get(setting) if (folder / "manifest.json").is_file() else None
+
+
 def shards_of(folder: Path, fingerprint: str) -> list[Path]:
     """Files of the shards of a data set, in order; it must belong to the robot with this fingerprint.
 
