@@ -32,7 +32,7 @@ def robots_folder(robots_dir: Path | None = None) -> Path:
 
 
 def find_robots(robots_dir: Path | None = None) -> tuple[str, ...]:
-    """Sorted names of all robots: of those in the given folder, else of those in `robots/` here and the shipped ones."""
+    """Sorted names of the robots in the given folder; where none is given, in `robots/` here and of those shipped."""
     return tuple(sorted({name for folder in _folders(robots_dir) for name in _names(folder)}))
 
 
