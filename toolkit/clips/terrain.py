@@ -45,7 +45,7 @@ def flat(
 
 _RUBBLE = {"tilt": (4.0, 20.0), "rise": (0.01, 0.05)}
 KINDS = {
-    "flat": Kind(flat, {"distance": (1.0, 4.0), "bearing": (-180.0, 180.0)}),
+    "flat": Kind(flat, {"distance": (1.0, 4.0), "bearing": (-60.0, 60.0)}),
     "rubble_field": Kind(GENERATORS["rubble_field"], _RUBBLE, {"rows": (2, 6)}),
     "rubble_corridor": Kind(
         GENERATORS["rubble_corridor"], _RUBBLE | {"wall": (0.6, 0.75), "wall_tilt": (0.0, 20.0)}, {"rows": (2, 6)}
