@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import argparse
 import math
+from typing import TYPE_CHECKING
 
 from toolkit import cli
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from toolkit.clips.attempt import Record
+
+_AHEAD = 16  # attempts that wait on a cluster, whose number of workers nobody knows
 
 DESCRIPTION = """\
 Make a data set of motions: random worlds, each planned, executed in MuJoCo, and kept where the run passes every check.
@@ -69,6 +77,9 @@ def arguments() -> argparse.ArgumentParser:
         "--workers", type=cli.positive(int), default=cli.cores(), metavar="N", help="processes (default: all cores)"
     )
     cli.add_cluster_options(parser)
+    parser.add_argument(
+        "--so-far", action="store_true", help="make nothing; write index, statistics and pictures of what there is"
+    )
     parser.add_argument("--no-sheet", action="store_true", help="leave the page of pictures out")
     return parser
 
@@ -81,25 +92,33 @@ def main(argv: list[str] | None = None) -> int:
         PlanningError: No world passes.
     """
     args = arguments().parse_args(argv)
+    from toolkit.clips.collect import so_far
+    from toolkit.clips.index import pyarrow
+    from toolkit.report.console import make_console
+    from toolkit.report.offscreen import require_rendering
+
+    pyarrow()
+    if not args.no_sheet:
+        require_rendering()
+    console = make_console()
+    records = so_far(args.out) if args.so_far else _collected(args, console)
+    _describe(args, console, records)
+    return 0
+
+
+def _collected(args: argparse.Namespace, console: Console) -> list[Record]:
+    """Make what is lacking; returns the records of all attempts."""
     from toolkit.clips.attempt import ClipConfig
     from toolkit.clips.collect import State, collect
-    from toolkit.clips.index import pyarrow, write_index
-    from toolkit.clips.statistics import PAGE, STATISTICS, page, statistics
-    from toolkit.drafts import write_whole
     from toolkit.exchange.formats import FORMATS
     from toolkit.learning.jobs import executor
     from toolkit.pipeline import planner_kind
     from toolkit.pipeline.warmup import warm_up
     from toolkit.prediction.networks import digest, load_networks
-    from toolkit.report.console import StageConsole, make_console, progress_bar
-    from toolkit.report.files import write_json
-    from toolkit.report.offscreen import require_rendering
+    from toolkit.report.console import StageConsole, progress_bar
     from toolkit.robot.loader import load_robot
 
-    pyarrow()
-    if not args.no_sheet:
-        require_rendering()
-    console, robot = make_console(), load_robot(args.robot, args.robots)
+    robot = load_robot(args.robot, args.robots)
     planning, planner = cli.PlanningOptions.of(args), planner_kind(robot, args.planner)
     if planner == "learned":
         load_networks(robot)  # a planner that lacks its networks is refused before the first world
@@ -133,23 +152,31 @@ def main(argv: list[str] | None = None) -> int:
                 head = f"{state.seconds:.0f} s of motion, {words}; {last['kind']}, {last['seconds']:.0f} s: {outcome}"
                 console.print(head, soft_wrap=True, markup=False)
 
-        ahead = args.workers if args.cluster is None else 16
-        records = collect(args.out, robot, config, args.hours, pool, tick, ahead=ahead)
-    write_index(args.out, robot.name, records)
-    figures = statistics(records)
-    if not args.no_sheet:
-        from toolkit.clips.sheet import write_sheet
+        ahead = args.workers if args.cluster is None else _AHEAD
+        return collect(args.out, robot, config, args.hours, pool, tick, ahead=ahead)
 
+
+def _describe(args: argparse.Namespace, console: Console, records: list[Record]) -> None:
+    """Write index, statistics and pictures of what there is, and say so."""
+    from toolkit.clips.collect import manifest_of
+    from toolkit.clips.index import write_index
+    from toolkit.clips.sheet import write_sheet
+    from toolkit.clips.statistics import PAGE, STATISTICS, page, statistics
+    from toolkit.drafts import write_whole
+    from toolkit.report.files import write_json
+
+    manifest, figures = manifest_of(args.out), statistics(records)
+    write_index(args.out, manifest.robot, records)
+    if not args.no_sheet:
         with console.status("drawing the page of pictures"):
             write_sheet(args.out, records)
     write_json(args.out / STATISTICS, figures)
-    write_whole(args.out / PAGE, page(figures, config, robot.name).encode())
+    write_whole(args.out / PAGE, page(figures, manifest).encode())
     console.print(
         f"{figures['hours']:.3f} h of motion in {figures['clips']} clips, {figures['passed']:.0%} of "
         f"{figures['attempts']} worlds passed"
     )
     console.print(f"written to {args.out}", soft_wrap=True, markup=False)
-    return 0
 
 
 if __name__ == "__main__":

@@ -8,8 +8,8 @@ import pyarrow.parquet
 import pytest
 
 from toolkit.clips import collect as module
-from toolkit.clips.attempt import ATTEMPTS, CLIPS, RUNS, ClipConfig, name_of, read_records
-from toolkit.clips.collect import PATIENCE, collect
+from toolkit.clips.attempt import ATTEMPTS, CLIPS, RUNS, ClipConfig, name_of, read_records, remove_attempt
+from toolkit.clips.collect import PATIENCE, collect, manifest_of, so_far
 from toolkit.clips.index import INDEX, write_index
 from toolkit.clips.statistics import page, statistics
 from toolkit.clips.terrain import KINDS, random_world
@@ -113,6 +113,22 @@ def test_many_workers_make_the_same_data_set_in_any_order(tmp_path, robot, confi
     assert contents(tmp_path / "many") == contents(tmp_path / "one")  # what is too much is removed
 
 
+def test_what_there_is_can_be_listed_before_the_end(tmp_path, robot, config):
+    with pytest.raises(DatasetError, match="no data set here.*make one with: python -m toolkit.dataset"):
+        main(["--so-far", "--no-sheet", "--out", str(tmp_path / "none")])
+    with pytest.raises(KeyboardInterrupt):
+        collect(tmp_path, robot, config, HOURS, Inline(fail_at=6, late=(3,)), ahead=8)
+    remove_attempt(tmp_path, 3)
+    before = contents(tmp_path)
+    assert [record["attempt"] for record in so_far(tmp_path)] == [0, 1, 2]
+    assert main(["--so-far", "--no-sheet", "--out", str(tmp_path)]) == 0
+    assert before.items() <= contents(tmp_path).items()
+    rows = pyarrow.parquet.read_table(tmp_path / INDEX).to_pylist()
+    assert [row["attempt"] for row in rows] == [r["attempt"] for r in so_far(tmp_path) if r["passed"]]
+    # Such a data set goes on.
+    assert collect(tmp_path, robot, config, HOURS, Inline(), ahead=1)[:3] == so_far(tmp_path)[:3]
+
+
 def test_a_longer_data_set_continues_a_shorter_one_and_not_the_other_way(tmp_path, robot, config):
     first = collect(tmp_path / "a", robot, config, HOURS, Inline(), ahead=1)
     more = Inline()
@@ -183,9 +199,9 @@ def test_index_and_statistics_tell_of_every_clip(tmp_path, robot, config):
     assert figures["spread"]["max_slip"]["largest"] == max(record["max_slip"] for record in kept)
     assert sum(row["clips"] for row in figures["kinds"].values()) == len(kept)
     assert [(row["times"], row["reason"]) for row in figures["failures"]] == [(len(records) - len(kept), "slip is #")]
-    text = page(figures, config, robot.name)
+    text = page(figures, manifest_of(tmp_path))
     assert f"in {len(kept)} clips" in text and "| stairs |" in text and "slip is #" in text
-    assert statistics([])["spread"]["speed"] == {} and page(statistics([]), config, robot.name)
+    assert statistics([])["spread"]["speed"] == {} and page(statistics([]), manifest_of(tmp_path))
 
 
 @pytest.mark.parametrize("kind", KINDS)

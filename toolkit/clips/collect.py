@@ -107,6 +107,21 @@ def collect(
     return _ended(folder, records, wanted)
 
 
+def so_far(folder: Path) -> list[Record]:
+    """Records of the attempts that a data set which is not at its end is made of until now, in order."""
+    records = read_records(folder)
+    return [records[index] for index in range(next(index for index in count() if index not in records))]
+
+
+def manifest_of(folder: Path) -> Manifest:
+    """The manifest of a data set of motions.
+
+    Raises:
+        DatasetError: There is none, or it cannot be read.
+    """
+    return read_manifest(folder, SCHEMA, COMMAND)
+
+
 def _begin(folder: Path, robot: RobotModel, config: ClipConfig, hours: float) -> None:
     """Make the data set's folder with its manifest and its robot, or check what is there."""
     settings = plain_settings(config, "robot", "robots", "seed")
@@ -114,7 +129,7 @@ def _begin(folder: Path, robot: RobotModel, config: ClipConfig, hours: float) ->
     wanted = Manifest(SCHEMA, robot.name, robot.fingerprint, config.seed, settings | {"hours": hours}, versions)
     found = hours
     if (folder / "manifest.json").is_file():
-        found = read_manifest(folder, SCHEMA, COMMAND).settings.get("hours", hours)
+        found = manifest_of(folder).settings.get("hours", hours)
         if found > hours:
             raise DatasetError(
                 f"{folder}: begun with --hours {found:g}, now {hours:g}; give at least as many, or another --out"

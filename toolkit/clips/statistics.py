@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.clips.attempt import ATTEMPTS, CLIPS, ROBOT, RUNS, ClipConfig, Record
+from toolkit.clips.attempt import ATTEMPTS, CLIPS, ROBOT, RUNS, Record
 from toolkit.clips.index import INDEX
 from toolkit.exchange.formats import FORMATS
+from toolkit.learning.dataset import Manifest
 
 SHEET, STATISTICS, PAGE = "sheet.jpg", "statistics.json", "README.md"
 _SPREAD = {
@@ -47,7 +48,7 @@ def statistics(records: Sequence[Record]) -> dict[str, Any]:
     }
 
 
-def page(figures: dict[str, Any], config: ClipConfig, robot: str) -> str:
+def page(figures: dict[str, Any], manifest: Manifest) -> str:
     """The text of README.md: what the figures are, and what lies where."""
     kinds = [
         (kind, row["attempts"], row["clips"], f"{row['passed']:.0%}", _length(row["hours"]), row["contacts"],
@@ -60,13 +61,15 @@ def page(figures: dict[str, Any], config: ClipConfig, robot: str) -> str:
         if figures["spread"][name]
     ]
     failures = [(row["times"], row["stage"], row["reason"].replace("|", "/")) for row in figures["failures"]]
-    form = FORMATS[config.format]
+    wanted = manifest.settings["hours"]
+    part = "" if figures["hours"] >= wanted else f" This is a part of the {_length(wanted)} that were asked for."
+    form, fps = FORMATS[manifest.settings["format"]], manifest.settings["fps"]
     parts = [
         "# Motions of a humanoid through random worlds",
-        f"{_length(figures['hours'])} of motion of {robot} in {figures['clips']} clips, each planned, executed in "
-        f"MuJoCo and kept because it passed every check; {figures['passed']:.0%} of {figures['attempts']} worlds did. "
+        f"{_length(figures['hours'])} of motion of {manifest.robot} in {figures['clips']} clips, each planned, "
+        f"executed in MuJoCo and kept because it passed every check; {figures['passed']:.0%} of {figures['attempts']} worlds did. "
         f"All attempts together took {_length(figures['work']['processor_hours'])} of one core's time "
-        f"({_length(figures['work']['wall_hours'])} by the clock).",
+        f"({_length(figures['work']['wall_hours'])} by the clock).{part}",
         f"![Sampled clips]({SHEET})",
         "## Kinds of worlds",
         _table(("kind", "worlds", "clips", "passed", "motion", "contacts", "by palms", "largest slip [mm]"), kinds),
@@ -76,7 +79,7 @@ def page(figures: dict[str, Any], config: ClipConfig, robot: str) -> str:
         _table(("times", "stage", "reason"), failures) if failures else "Nothing.",
         "## What lies where",
         f"- `{INDEX}`: a row for each clip: its folders, its world, its figures.\n"
-        f"- `{CLIPS}/N/`: a clip: {form.about} ({', '.join(form.files) or 'contacts.json'}, {config.fps:g} frames per "
+        f"- `{CLIPS}/N/`: a clip: {form.about} ({', '.join(form.files) or 'contacts.json'}, {fps:g} frames per "
         f"second), `contacts.json`, `labels.csv` with contacts, torques and targets for each frame, `world.xml`, the "
         f"world that was planned in, `terrain.xml` and `terrain.obj`, what the robot collided with. `README.txt` there "
         f"says frames, units and orders.\n"
