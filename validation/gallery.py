@@ -21,7 +21,6 @@ from toolkit.report.offscreen import Patches, require_rendering
 from toolkit.report.plan_file import read_plan
 from toolkit.report.saved_run import SavedRun, read_run
 from toolkit.report.stroboscope import SPACING, stroboscope
-from toolkit.robot.loader import default_robot
 from validation.cases import WORLDS
 from validation.gallery_pictures import moving_picture
 from validation.machine import ROOT, environment
@@ -171,8 +170,12 @@ def main(argv: list[str] | None = None) -> int:
         names = draw(args.results, run, read_plan(run.folder / PLAN), moving=world == moving) if drawn else []
         pictures.append(names)
     command = "python -m validation.gallery"
-    if args.robot is not None and args.robot != default_robot(args.robots):
+    if args.robot is not None:
         command += f" --robot {args.robot}"
+    if worlds != list(NAMES):
+        command += f" --worlds {' '.join(worlds)}"
+    if args.moving is not None:
+        command += f" --moving {args.moving}"
     write_whole(args.results / PAGE, page(runs, pictures, command).encode(), "--results")
     console.print(f"written to {args.results}", soft_wrap=True, markup=False)
     return 0 if all(run.report.verdict == "PASS" for run in runs) else 1

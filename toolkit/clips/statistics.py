@@ -61,15 +61,15 @@ def page(figures: dict[str, Any], manifest: Manifest) -> str:
         if figures["spread"][name]
     ]
     failures = [(row["times"], row["stage"], row["reason"].replace("|", "/")) for row in figures["failures"]]
-    wanted = manifest.settings["hours"]
+    work, wanted = figures["work"], manifest.settings["hours"]
     part = "" if figures["hours"] >= wanted else f" This is a part of the {_length(wanted)} that were asked for."
     form, fps = FORMATS[manifest.settings["format"]], manifest.settings["fps"]
     parts = [
         "# Motions of a humanoid through random worlds",
         f"{_length(figures['hours'])} of motion of {manifest.robot} in {figures['clips']} clips, each planned, "
-        f"executed in MuJoCo and kept because it passed every check; {figures['passed']:.0%} of {figures['attempts']} worlds did. "
-        f"All attempts together took {_length(figures['work']['processor_hours'])} of one core's time "
-        f"({_length(figures['work']['wall_hours'])} by the clock).{part}",
+        f"executed in MuJoCo and kept because it passed every check; {figures['passed']:.0%} of "
+        f"{figures['attempts']} worlds did. All attempts together took {_length(work['processor_hours'])} of one "
+        f"core's time ({_length(work['wall_hours'])} by the clock).{part}",
         f"![Sampled clips]({SHEET})",
         "## Kinds of worlds",
         _table(("kind", "worlds", "clips", "passed", "motion", "contacts", "by palms", "largest slip [mm]"), kinds),

@@ -11,7 +11,7 @@ from toolkit.report.views import ahead_of, best_direction
 
 SPACING = 0.7  # m between two moments, so that the robot does not hide itself
 _MOST = 8  # moments
-_NEAREST, _BESIDE = 2.7, 1.2  # m; least distance of the camera, and how much farther it is than the way is long
+_NEAREST, _BESIDE = 2.9, 1.5  # m; least distance of the camera, and how much farther it is than the way is long
 _ELEVATIONS = (18.0, 35.0, 60.0)  # degrees
 
 
