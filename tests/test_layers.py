@@ -31,6 +31,7 @@ LAYERS = [
     "pipeline",
     "report",
     "exchange",
+    "clips",
 ]
 WITHIN = {
     "toolkit.search": ["anytime", "states", "moves", "costs"]

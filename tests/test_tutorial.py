@@ -75,6 +75,7 @@ def test_the_whole_tutorial_runs(tmp_path):
     assert (tmp_path / "runs" / "first" / "strip.png").is_file()
     assert (tmp_path / "columns" / "trajectory.npz").is_file()
     assert (tmp_path / "contacts" / "contacts.json").is_file()
+    assert (tmp_path / "data" / "motions" / "index.parquet").is_file()
 
 
 def commands() -> list[str]:

@@ -28,6 +28,7 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
     """Run `collect`."""
     from toolkit.learning.collect import collect
     from toolkit.learning.collect_config import CollectConfig
+    from toolkit.learning.dataset import begun_with
     from toolkit.learning.jobs import executor
     from toolkit.prediction.networks import digest
     from toolkit.report.console import progress_bar
@@ -35,11 +36,13 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
 
     robot = load_robot(args.robot, args.robots)
     networks = _searching_networks(args, robot)
+    per_shard = begun_with(args.out, "per_shard")
     config = CollectConfig(
         robot=robot.name,
         robots=str(robot.folder.parent.resolve()),
         seed=args.seed,
         samples_per_category=args.samples,
+        per_shard=min(CollectConfig.per_shard, args.samples) if per_shard is None else per_shard,
         networks=None if networks is None else str(networks.resolve()),
         networks_digest="" if networks is None else digest(networks),
     )
@@ -213,7 +216,10 @@ def main(argv: list[str] | None = None) -> int:
     sub = add("collect", "draw and label whole sequences; continues where it was stopped")
     sub.add_argument("--out", type=Path, required=True, help="data set folder, new or begun")
     sub.add_argument(
-        "--samples", type=cli.positive(int), default=5000, help="labels of each category (default: %(default)s)"
+        "--samples",
+        type=cli.positive(int),
+        default=5000,
+        help="labels of each category at least (default: %(default)s)",
     )
     sub.add_argument(
         "--networks", type=Path, help="folder of networks that search as well (default: the robot's networks/, if any)"

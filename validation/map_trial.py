@@ -10,7 +10,7 @@ from toolkit.errors import PlanningError
 from validation.jobs import Record
 from validation.map_families import Cell
 from validation.options import TrialSettings
-from validation.run_trial import StageLog, make_planner, robot_of, stage_reached
+from validation.run_trial import StageLog, make_planner, robot_of
 
 PASS, NO_SEQUENCE, IMPOSSIBLE, ERROR = "PASS", "no sequence found", "proven impossible", "error"
 FAILURES = {stage: f"FAIL {stage}" for stage in ("start", "dynamics", "wholebody", "execution")}
@@ -41,7 +41,7 @@ def map_trial(settings: TrialSettings, cell: Cell) -> Record:
         if _PROOF in reason:
             return _record(cell, IMPOSSIBLE, "planning", reason)
         return _record(cell, FAILURES["start"], "start", reason)
-    trial, stage = result.trial, stage_reached(result)
+    trial, stage = result.trial, result.stage
     outcome = PASS if result.passed else NO_SEQUENCE if trial is None else FAILURES[stage]
     found = _record(cell, outcome, stage, result.reason)
     found |= {"stages": log.entries, "tested": len(result.trials), "expansions": result.search.expansions}

@@ -93,7 +93,7 @@ def execution_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
         "wholebody": trial is not None and trial.trajectory is not None and trial.trajectory.feasible,
         "arrived": False,
         "held": False,
-        "stage": stage_reached(result),
+        "stage": result.stage,
         "passed": result.passed,
         "reason": result.reason,
     }
@@ -108,18 +108,6 @@ def execution_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
     if not record["passed"]:
         record["folder"] = keep_run(settings, case, result, surface_seconds)
     return record
-
-
-def stage_reached(result: pipeline.PipelineResult) -> str:
-    """Where a run ended: the first stage that the best sequence did not pass, or "done"."""
-    trial = result.trial
-    if trial is None:
-        return "planning"
-    if trial.passed:
-        return "done"
-    if trial.execution is not None:
-        return "execution"
-    return "dynamics" if trial.trajectory is None else "wholebody"
 
 
 def executed(execution: Execution) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -25,6 +26,7 @@ from toolkit.learning.jobs import executor
 from toolkit.learning.samples import Samples
 from toolkit.prediction.features import feature_size
 from toolkit.robot.loader import load_robot
+from toolkit.train import main
 
 
 class InlineExecutor(Executor):
@@ -157,6 +159,21 @@ def test_shards_written_twice_at_once_are_whole(tmp_path, config):
     assert all(np.array_equal(again[category].features, group.features) for category, group in samples.items())
 
 
+def test_few_samples_make_a_small_shard_and_more_go_on_with_such_shards(tmp_path, config, monkeypatch):
+    @contextmanager
+    def inline(*where, **how):
+        yield InlineExecutor()
+
+    monkeypatch.setattr("toolkit.learning.jobs.executor", inline)
+    words = ["collect", "--no-networks", "--out", str(tmp_path)]
+    assert main([*words, "--samples", "3"]) == 0
+    (shard,) = tmp_path.glob("shard-*.npz")
+    assert {group.known.sum() for group in read_shard(shard).values()} == {3}
+    first = contents(tmp_path)
+    assert main([*words, "--samples", "100"]) == 0
+    assert len(list(tmp_path.glob("shard-*.npz"))) == 34 and first.items() <= contents(tmp_path).items()
+
+
 COMMAND = """
 import sys
 from functools import partialmethod
@@ -164,7 +181,8 @@ from toolkit import cli, train
 from toolkit.learning.collect_config import CollectConfig
 
 if __name__ == "__main__":
-    CollectConfig.__init__ = partialmethod(CollectConfig.__init__, per_shard=2, expansions=(40, 60))
+    CollectConfig.__init__ = partialmethod(CollectConfig.__init__, expansions=(40, 60))
+    CollectConfig.per_shard = 2
     cli.run(train.main, ["collect", "--seed", "7", "--samples", "12", "--workers", "2", "--out", sys.argv[1]])
 """
 

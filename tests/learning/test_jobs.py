@@ -37,3 +37,16 @@ def test_a_failure_drops_what_waits(ahead, handed):
     with pytest.raises(RuntimeError, match="refused 1"):
         run_jobs(executor, abs, [(-number,) for number in range(1, 6)], refuse, ahead=ahead)
     assert len(executor.jobs) == handed and all(job.cancelled() for job in executor.jobs[1:])
+
+
+def test_what_has_come_in_decides_whether_there_is_another_job():
+    taken = []
+
+    def until_enough():
+        number = 0
+        while sum(taken) < 10:
+            yield (number := number + 1,)
+
+    with ThreadPoolExecutor(1) as pool:
+        run_jobs(pool, abs, until_enough(), taken.append, ahead=1)
+    assert taken == [1, 2, 3, 4]

@@ -32,8 +32,29 @@ def test_robots_are_found_because_they_are_there(tmp_path: Path) -> None:
 def test_robots_in_the_current_directory_come_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert robots_folder() == Path(__file__).resolve().parents[2] / "robots"
+    shipped = find_robots()
     write_robot(tmp_path / "robots" / "ape")
-    assert find_robots() == ("ape",)
+    assert robots_folder() == tmp_path / "robots" and find_robots() == tuple(sorted(("ape", *shipped)))
+    assert default_robot() == "ape" and load_robot(None).folder == (tmp_path / "robots" / "ape").resolve()
+
+
+def test_shipped_robots_have_their_names_beside_a_folder_of_ones_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name, mine = default_robot(), tmp_path / "robots"
+    own = Path(__file__).resolve().parents[2] / "robots" / name
+    mine.mkdir()
+    assert default_robot() == name  # an empty folder says nothing
+    write_robot(mine / "ape")
+    write_robot(mine / "bear")
+    assert load_robot(name).folder == own
+    with pytest.raises(RobotError, match="which robot is meant. Found ape, bear;"):
+        default_robot()
+    with pytest.raises(RobotError, match=f"robot '{name}' is not in .*robots; "):
+        load_robot(name, mine)  # a folder that is named is the only one
+    write_robot(mine / name)
+    assert load_robot(name).folder == (mine / name).resolve()
 
 
 def test_robot_meant_where_none_is_named(tmp_path: Path) -> None:

@@ -58,7 +58,14 @@ _EXPLAINED = {
 
 
 def write_export(
-    folder: Path, name: str, record: RunRecord, robot: RobotModel, frames: MotionFrames, *, planned: bool = False
+    folder: Path,
+    name: str,
+    record: RunRecord,
+    robot: RobotModel,
+    frames: MotionFrames,
+    *,
+    planned: bool = False,
+    robot_folder: str = "",
 ) -> None:
     """Write every file of an export.
 
@@ -69,6 +76,8 @@ def write_export(
         robot: Its robot.
         frames: The motion.
         planned: Whether the frames are those of the plan.
+        robot_folder: Where `write_robot` has put the robot that many exports share, as seen from `folder`; "" to write
+            it into `folder`.
     """
     form = FORMATS[name]
     for file, encode in form.files.items():
@@ -77,17 +86,25 @@ def write_export(
     write_json(folder / CONTACTS, contact_sequence(record, robot))
     (folder / TERRAIN).write_text(terrain_mjcf(record.scene, record.report["world"]), encoding="utf-8")
     terrain_mesh(record.scene, frames.qpos[:, :3]).export(folder / TERRAIN_MESH, digits=9)
-    (folder / ROBOT).write_text(robot.mjcf, encoding="utf-8")
-    for file, content in robot.assets.items():
-        (folder / file).write_bytes(content)
-    metadata = _metadata(name, record, robot, frames, planned)
+    if not robot_folder:
+        write_robot(folder, robot)
+    common = {f"{robot_folder}/{ROBOT}" if robot_folder and file == ROBOT else file: COMMON[file] for file in COMMON}
+    files = [*form.files, *common, *(f"{robot_folder}/{file}".lstrip("/") for file in robot.assets)]
+    metadata = _metadata(name, record, robot, frames, planned) | {"files": files}
     write_json(folder / METADATA, metadata)
-    (folder / README).write_text(_readme(form, metadata), encoding="utf-8")
+    (folder / README).write_text(_readme(form, common, metadata), encoding="utf-8")
     write_json(folder / REPORT, record.report)
 
 
+def write_robot(folder: Path, robot: RobotModel) -> None:
+    """Write the robot as MJCF with the files that it names into an existing folder."""
+    (folder / ROBOT).write_text(robot.mjcf, encoding="utf-8")
+    for file, content in robot.assets.items():
+        (folder / file).write_bytes(content)
+
+
 def _metadata(name: str, record: RunRecord, robot: RobotModel, frames: MotionFrames, planned: bool) -> dict[str, Any]:
-    """Content of metadata.json."""
+    """Content of metadata.json, but for the names of the files."""
     scene, report = record.scene, record.report
     description = read_description(robot.folder / FILE_NAME)
     return {
@@ -116,16 +133,15 @@ def _metadata(name: str, record: RunRecord, robot: RobotModel, frames: MotionFra
         "kd": robot.kd,
         "mass": scene.body_subtreemass[robot_bodies(scene)[0]],
         "friction": terrain_friction(scene),
-        "files": [*FORMATS[name].files, *COMMON, *robot.assets],
         "toolkit_version": importlib.metadata.version("humanoid-contact-toolkit"),
         "run_versions": report["versions"],
     }
 
 
-def _readme(form: Format, metadata: dict[str, Any]) -> str:
-    """The text of README.txt."""
+def _readme(form: Format, common: dict[str, str], metadata: dict[str, Any]) -> str:
+    """The text of README.txt; `common` says of each file what it is."""
     verdict = f"{metadata['verdict']} ({metadata['reason']})" if metadata["reason"] else metadata["verdict"]
-    files = dict.fromkeys(form.files, "the motion") | COMMON
+    files = dict.fromkeys(form.files, "the motion") | common
     width = max(map(len, files))
     head = [
         f"{metadata['robot']} in {metadata['world']}: {form.about}",

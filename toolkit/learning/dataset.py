@@ -24,7 +24,7 @@ from toolkit.errors import DatasetError
 from toolkit.learning.samples import PARTS, Samples, join
 from toolkit.prediction.features import TARGETS, feature_size
 
-SCHEMA = "transition-data-3"
+SCHEMA, COMMAND = "transition-data-3", "toolkit.train collect"
 _TYPES = ["f", "b", "f", "f", "i"]  # of the arrays of samples
 
 
@@ -53,41 +53,48 @@ class Manifest:
         write_whole(folder / "manifest.json", json.dumps(asdict(self), indent=2).encode())
 
 
-def read_manifest(folder: Path) -> Manifest:
+def read_manifest(folder: Path, schema: str = SCHEMA, command: str = COMMAND) -> Manifest:
     """Manifest of a data set.
+
+    Args:
+        folder: The data set.
+        schema: The layout that is expected.
+        command: What makes such a data set, for messages.
 
     Raises:
         DatasetError: There is none, or it cannot be read.
     """
     path = folder / "manifest.json"
     if not path.is_file():
-        raise DatasetError(
-            f"{folder}: no data set here (manifest.json is missing); make one with: python -m toolkit.train collect"
-        )
+        raise DatasetError(f"{folder}: no data set here (manifest.json is missing); make one with: python -m {command}")
     try:
         manifest = Manifest(**json.loads(path.read_text()))
     except (OSError, ValueError, TypeError, RecursionError) as error:
         raise DatasetError(f"{path}: not a manifest ({error}); collect into another folder") from None
-    if manifest.schema != SCHEMA:
-        raise DatasetError(f"{path}: schema {manifest.schema!r}, expected {SCHEMA!r}; collect the data again")
+    if manifest.schema != schema:
+        raise DatasetError(f"{path}: schema {manifest.schema!r}, expected {schema!r}; collect the data again")
     return manifest
 
 
 def plain_settings(config: Any, *without: str) -> dict:
     """Fields of a configuration except some, as plain values that a manifest can store and return unchanged."""
-    fields = {name: value for name, value in asdict(config).items() if name not in without}
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in fields.items()}
+    return json.loads(json.dumps({name: value for name, value in asdict(config).items() if name not in without}))
 
 
-def begin(folder: Path, wanted: Manifest) -> None:
+def begin(folder: Path, wanted: Manifest, command: str = COMMAND) -> None:
     """Make the folder of a data set with its manifest, or check the manifest that is there.
+
+    Args:
+        folder: The data set.
+        wanted: What the manifest must say, but for the versions.
+        command: What makes such a data set, for messages.
 
     Raises:
         DatasetError: The folder holds something else, or data of other settings or of another robot.
     """
     clear_drafts(folder)
     if (folder / "manifest.json").is_file():
-        found = read_manifest(folder)
+        found = read_manifest(folder, wanted.schema, command)
         for name in ("robot", "fingerprint", "seed", "settings"):
             if getattr(found, name) != getattr(wanted, name):
                 raise DatasetError(
@@ -99,6 +106,15 @@ def begin(folder: Path, wanted: Manifest) -> None:
         raise DatasetError(f"{folder}: not empty and not a data set; use another --out")
     folder.mkdir(parents=True, exist_ok=True)
     wanted.write(folder)
+
+
+def begun_with(folder: Path, setting: str) -> Any:
+    """A setting that a data set was begun with; None where there is no data set yet.
+
+    Raises:
+        DatasetError: Its manifest cannot be read.
+    """
+    return read_manifest(folder).settings.get(setting) if (folder / "manifest.json").is_file() else None
 
 
 def shards_of(folder: Path, fingerprint: str) -> list[Path]:

@@ -13,6 +13,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
+from itertools import islice
 from multiprocessing import get_context
 from typing import TypeVar
 
@@ -56,19 +57,22 @@ def run_jobs(
     Args:
         pool: Where the jobs run.
         work: The function that every job calls.
-        arguments: The arguments of each job.
+        arguments: The arguments of each job. They are asked for when there is room for a job, so that what has come in
+            until then can decide whether there is another one.
         take: Is called with each result in this process.
         ahead: Number of jobs that wait in the pool at a time, None for all.
 
     Raises:
         WorkerError: A process of the pool died.
     """
-    left = list(arguments)[::-1]
+    left = iter(arguments)
     waiting: set[Future[Result]] = set()
     try:
-        while left or waiting:
-            while left and (ahead is None or len(waiting) < ahead):
-                waiting.add(pool.submit(work, *left.pop()))
+        while True:
+            for job in islice(left, None if ahead is None else ahead - len(waiting)):
+                waiting.add(pool.submit(work, *job))
+            if not waiting:
+                return
             finished, waiting = wait(waiting, return_when=FIRST_COMPLETED)
             for job in finished:
                 take(_result_of(job))

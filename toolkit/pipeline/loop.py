@@ -55,6 +55,18 @@ class PipelineResult:
         return self.trial is not None and self.trial.passed
 
     @property
+    def stage(self) -> str:
+        """The first stage that the trial did not pass, "planning" without a trial, or "done"."""
+        trial = self.trial
+        if trial is None:
+            return "planning"
+        if trial.passed:
+            return "done"
+        if trial.execution is not None:
+            return "execution"
+        return "dynamics" if trial.trajectory is None else "wholebody"
+
+    @property
     def cost(self) -> PlanCost | None:
         """The true cost of the trial's plan; None without a plan."""
         return None if self.trial is None else self.trial.candidate.cost

@@ -118,14 +118,28 @@ class OffscreenRenderer:
         self._pixels = np.empty((height, width, 3), np.uint8)
 
     def render(
-        self, qpos: np.ndarray, camera: mujoco.MjvCamera, *, patches: Patches | None = None, text: str = ""
+        self,
+        qpos: np.ndarray,
+        camera: mujoco.MjvCamera,
+        *,
+        patches: Patches | None = None,
+        text: str = "",
+        others: Sequence[np.ndarray] = (),
     ) -> np.ndarray:
-        """(height, width, 3) uint8; picture of a configuration (nq,), with a text in the lower left corner."""
+        """(height, width, 3) uint8; picture of a configuration (nq,), with a text in the lower left corner.
+
+        What moves is drawn in `others`, further configurations, too.
+        """
         self._gl.make_current()
         self._data.qpos[:] = qpos
         mujoco.mj_forward(self._model, self._data)
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(self._model, self._data, self._option, None, camera, everything, self._scene)
+        for configuration in others:
+            self._data.qpos[:] = configuration
+            mujoco.mj_kinematics(self._model, self._data)
+            moving = mujoco.mjtCatBit.mjCAT_DYNAMIC.value
+            mujoco.mjv_addGeoms(self._model, self._data, self._option, mujoco.MjvPerturb(), moving, self._scene)
         if patches is not None:
             for contact in patches.contacts:
                 self._add_patch(contact, patches.half_sizes[contact.limb])

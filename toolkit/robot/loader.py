@@ -27,41 +27,57 @@ DEFAULT_GAINS = (200.0, 8.0)
 
 
 def robots_folder(robots_dir: Path | None = None) -> Path:
-    """The folder with one folder per robot: the given one, else `robots/` here, else the toolkit's own."""
-    if robots_dir is not None:
-        return Path(robots_dir)
-    return Path.cwd() / "robots" if os.path.isdir("robots") else shipped("robots")
+    """The folder in which robots are looked for first: the given one, else `robots/` here, else the toolkit's own."""
+    return _folders(robots_dir)[0]
 
 
 def find_robots(robots_dir: Path | None = None) -> tuple[str, ...]:
-    """Sorted names of the folders with a robot.toml in the `robots_folder`."""
-    return tuple(sorted(path.parent.name for path in robots_folder(robots_dir).glob(f"*/{FILE_NAME}")))
+    """Sorted names of the robots in the given folder; where none is given, in `robots/` here and of those shipped."""
+    return tuple(sorted({name for folder in _folders(robots_dir) for name in _names(folder)}))
+
+
+def _folders(robots_dir: Path | None) -> tuple[Path, ...]:
+    """Where robots are looked for, in order: in the given folder alone, or in `robots/` here and among the shipped."""
+    if robots_dir is not None:
+        return (Path(robots_dir),)
+    return (Path.cwd() / "robots", shipped("robots")) if os.path.isdir("robots") else (shipped("robots"),)
+
+
+def _names(folder: Path) -> list[str]:
+    """Names of the robots in a folder."""
+    return [path.parent.name for path in folder.glob(f"*/{FILE_NAME}")]
 
 
 def _robot_folder(name: str, robots_dir: Path | None) -> Path:
-    """The existing folder of a robot by its name in the robots folder or by a path to a folder with a robot.toml."""
-    folder = robots_folder(robots_dir)
-    for path in (folder / name, Path(name)):
+    """The existing folder of a robot by its name, or by a path to a folder with a robot.toml.
+
+    A path comes before a shipped robot of that name, and after those in `robots_folder`.
+    """
+    first, *others = _folders(robots_dir)
+    for path in (first / name, Path(name), *(folder / name for folder in others)):
         if name and os.path.isfile(path / FILE_NAME):
             return path.resolve()
     if name and os.path.isdir(name):
         raise RobotError(f"{name}: no {FILE_NAME} in this folder")
-    raise RobotError(f"robot '{name}' is not in {folder}; {suggestion(name, find_robots(robots_dir))}")
+    raise RobotError(f"robot '{name}' is not in {first}; {suggestion(name, find_robots(robots_dir))}")
 
 
 def default_robot(robots_dir: Path | None = None) -> str:
     """Name of the robot that is used if none is named: the one in the file `default`, else the only robot.
 
+    Where `robots/` here holds neither, it is that of the toolkit.
+
     Raises:
         RobotError: There is no such file, and there is no robot or more than one.
     """
-    folder = robots_folder(robots_dir)
+    folders = _folders(robots_dir)
+    folder = next((each for each in folders if (each / "default").is_file() or _names(each)), folders[0])
     if os.path.isfile(folder / "default"):
         try:
             return (folder / "default").read_text(encoding="utf-8").strip()
         except (OSError, UnicodeDecodeError) as error:
             raise RobotError(f"{folder / 'default'}: cannot be read ({error}); name a robot with --robot") from None
-    names = find_robots(robots_dir)
+    names = sorted(_names(folder))
     if len(names) != 1:
         found = ", ".join(names) or "none"
         raise RobotError(f"{folder}: which robot is meant? Found {found}; name one with --robot")
@@ -72,8 +88,8 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
     """Load a robot and check that MuJoCo, Pinocchio and placo agree about it.
 
     Args:
-        name: Name of a folder in the robots folder, or a path to a folder with a robot.toml; None for `default_robot`.
-        robots_dir: The robots folder; see `robots_folder`.
+        name: Name of a robot (see `find_robots`), or a path to a folder with a robot.toml; None for `default_robot`.
+        robots_dir: The only folder in which names are looked for; None for `robots/` here, then the shipped robots.
 
     Returns:
         The robot.
