@@ -9,9 +9,6 @@ from typing import Literal
 LONGEST = 10.0
 """Longest shift and longest swing in s. Time and memory grow with them, and slower motions are no different ones."""
 
-Timings = tuple["Timing", ...] | Literal["auto"]
-"""Timings to choose from; "auto": those of `own_choice`; empty: the world's, or "auto" where it names none."""
-
 _HEIGHT = 1.0  # m; CoM of a body for which the times below hold
 _PACES = (  # s, s; shifts and swings to choose from, the calmest first; where a pace fails, the next follows
     ((0.35, 0.6), (0.05, 0.3)),
@@ -31,6 +28,10 @@ class Timing:
 
     shift: float = 1.0
     swing: float = 1.0
+
+
+Timings = tuple[Timing, ...] | Literal["auto"]
+"""Timings to choose from; "auto": those of `own_choice`; empty: the world's, or "auto" where it names none."""
 
 
 def pace_of(com_height: float) -> float:
