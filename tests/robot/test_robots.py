@@ -11,15 +11,16 @@ import numpy as np
 import placo
 import pytest
 
+from tests.shipped_robots import EVERY
 from toolkit.geometry.limb import Limb
 from toolkit.robot.description import FILE_NAME, RobotDescription, read_description
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.robot.picture import standing_scene
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
 
 
-@pytest.fixture(scope="module", params=find_robots())
+@pytest.fixture(scope="module", params=EVERY)
 def robot(request: pytest.FixtureRequest) -> RobotModel:
     return load_robot(request.param)
 
@@ -45,7 +46,7 @@ def within(value: float, bounds: list[float]) -> bool:
 
 
 def test_some_robot_is_there() -> None:
-    assert find_robots()
+    assert EVERY
 
 
 def test_declared_numbers(robot: RobotModel, declared: dict) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import mujoco
 
-from toolkit.errors import InputError, RobotError
+from toolkit.errors import InputError, PackageError, RobotError
 from toolkit.mjcf import one_line, read_spec
 from toolkit.robot.description import RobotDescription, suggestion
 
@@ -36,7 +36,8 @@ def find_model_file(description: RobotDescription) -> Path:
     """The existing model file that a robot.toml names.
 
     Raises:
-        RobotError: The file or the package that contains it is missing, or a package has several such files.
+        PackageError: The package that contains it is not installed.
+        RobotError: The file is missing, or a package has several such files.
     """
     where = description.path
     if description.package is None:
@@ -48,7 +49,7 @@ def find_model_file(description: RobotDescription) -> Path:
         files = importlib.metadata.files(description.package) or []
     except importlib.metadata.PackageNotFoundError:
         package = description.package
-        raise RobotError(f"{where}: package '{package}' is not installed; `pip install {package}`") from None
+        raise PackageError(f"{where}: package '{package}' is not installed; `pip install {package}`") from None
     matches = [file for file in files if f"/{file.as_posix()}".endswith("/" + description.file.lstrip("/"))]
     if len(matches) != 1:
         models = [file.name for file in files if file.suffix in (".urdf", ".xml")]
