@@ -95,6 +95,7 @@ def _list(console: Console, robots_dir: Path | None) -> int:
 def _describe(console: Console, robot: RobotModel) -> None:
     from rich.table import Table
 
+    from toolkit.report.console import print_warnings
     from toolkit.robot.description import FILE_NAME, read_description
 
     facts = read_description(robot.folder / FILE_NAME)
@@ -115,6 +116,7 @@ def _describe(console: Console, robot: RobotModel) -> None:
         numbers = (robot.torque_limit[i], robot.velocity_limit[i], robot.armature[i], robot.home[7 + i])
         joints.add_row(name, f"{robot.lower[i]:.3f}…{robot.upper[i]:.3f}", *(f"{value:g}" for value in numbers))
     console.print(joints)
+    print_warnings(console, robot)
 
 
 def _picture(robot: RobotModel, path: Path) -> None:
