@@ -74,6 +74,8 @@ def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
         lock_joints(spec, locked)
     except RobotError as error:
         raise RobotError(f"{source.path}: {error}") from None
+    except ValueError as error:
+        raise RobotError(f"{source.path}: MuJoCo cannot compile it: {one_line(error)}") from None
     _strip(source, problems)
     _check_names(source, problems)
     problems.check()

@@ -51,7 +51,7 @@ def set_motors(description: RobotDescription, source: ModelSource, bare: mujoco.
     """
     names = [bare.joint(j).name for j in range(bare.njnt) if bare.jnt_type[j] != mujoco.mjtJoint.mjJNT_FREE]
     said = {table: match_joints(problems, table, patterns, names) for table, patterns in description.tables.items()}
-    torque, velocity = _file_torques(bare) | said["limits.torque"], source.velocity | said["limits.velocity"]
+    torque, velocity = file_torques(bare) | said["limits.torque"], source.velocity | said["limits.velocity"]
     position = _positions(description, source, bare, said["limits.position"], names, problems)
     for table, values in (("torque", torque), ("velocity", velocity)):
         lacking = [name for name in names if not np.isfinite(values.get(name, np.nan)) or values[name] <= 0]
@@ -119,7 +119,7 @@ def _height(bare: mujoco.MjModel) -> float:
     return float(np.ptp(data.xpos[1:], axis=0).max())
 
 
-def _file_torques(bare: mujoco.MjModel) -> dict[str, float]:
+def file_torques(bare: mujoco.MjModel) -> dict[str, float]:
     """Torque limits of a compiled model by joint: the smaller of the joint's and its actuators' limits, N m."""
     torques: dict[str, float] = {}
 

@@ -29,11 +29,13 @@ class ModelSource:
         path: The model file.
         spec: Content of the file, including the files that it names.
         velocity: Velocity limits in a URDF by joint, rad/s; MuJoCo ignores them.
+        unread: Links of a URDF whose collision shapes cannot be read and were left out.
     """
 
     path: Path
     spec: mujoco.MjSpec
     velocity: dict[str, float]
+    unread: tuple[str, ...] = ()
 
 
 def find_model_file(description: RobotDescription) -> Path:
@@ -45,7 +47,7 @@ def find_model_file(description: RobotDescription) -> Path:
     """
     where = description.path
     if description.module is not None:
-        return _file_of_module(where, description.module)
+        return file_of_module(str(where), description.module)
     if description.package is None:
         path = description.path.parent / description.file
         if not os.path.isfile(path):
@@ -79,8 +81,17 @@ def file_in_package(where: str, package: str, name: str) -> Path:
     return Path(str(matches[0].locate())).resolve()
 
 
-def _file_of_module(where: Path, name: str) -> Path:
-    """The model file that a module of `robot_descriptions` knows; importing the module may download it."""
+def file_of_module(where: str, name: str) -> Path:
+    """The model file that a module of `robot_descriptions` knows; importing the module may download it.
+
+    Args:
+        where: What asks for it, at the beginning of messages.
+        name: Name of the module.
+
+    Raises:
+        PackageError: The distribution is not installed, or the model cannot be fetched.
+        RobotError: It has no such module.
+    """
     try:
         importlib.import_module("robot_descriptions")
     except ImportError:
@@ -99,11 +110,12 @@ def _file_of_module(where: Path, name: str) -> Path:
     return Path(found).resolve()
 
 
-def read_model(path: Path, mend: Mend | None = None) -> ModelSource:
+def read_model(path: Path, mend: Mend | None = None, *, lenient: bool = False) -> ModelSource:
     """Read an MJCF or URDF file.
 
     A URDF keeps its fixed links and loses visual shapes that MuJoCo cannot draw; its `package://` paths are resolved.
-    Collision shapes that `mend` replaces need not be readable; nothing else of it counts here.
+    Collision shapes that `mend` replaces need not be readable; nothing else of it counts here. Where `lenient`, none
+    needs to be, and links that lose theirs are named.
 
     Raises:
         RobotError: The file is not valid XML or neither MJCF nor URDF, a mesh is missing, or MuJoCo cannot parse it.
@@ -115,12 +127,13 @@ def read_model(path: Path, mend: Mend | None = None) -> ModelSource:
     if root.tag not in ("mujoco", "robot"):
         raise RobotError(f"{path}: root element <{root.tag}>; expected <mujoco> (MJCF) or <robot> (URDF)")
     velocity: dict[str, float] = {}
+    unread: list[str] = []
     try:
         if root.tag == "mujoco":
             spec = read_spec(path)
         else:
             velocity = _velocity_limits(path, root)
-            _prepare_urdf(path, root, mend)
+            unread = _prepare_urdf(path, root, mend, lenient)
             spec = read_spec(path, ElementTree.tostring(root, encoding="unicode"))
             spec.compiler.fusestatic = False
             for geom in spec.geoms:
@@ -131,7 +144,7 @@ def read_model(path: Path, mend: Mend | None = None) -> ModelSource:
         raise RobotError(f"{path}: {error}") from None
     except (ValueError, OSError) as error:
         raise RobotError(f"{path}: MuJoCo cannot load it: {one_line(error)}") from None
-    return ModelSource(path, spec, velocity)
+    return ModelSource(path, spec, velocity, tuple(unread))
 
 
 def _velocity_limits(path: Path, root: ElementTree.Element) -> dict[str, float]:
@@ -149,8 +162,10 @@ def _velocity_limits(path: Path, root: ElementTree.Element) -> dict[str, float]:
     return limits
 
 
-def _prepare_urdf(path: Path, root: ElementTree.Element, mend: Mend | None) -> None:
+def _prepare_urdf(path: Path, root: ElementTree.Element, mend: Mend | None, lenient: bool) -> list[str]:
+    """Make a URDF readable for MuJoCo; returns the links that lost a collision shape which cannot be read."""
     names: set[str] = set()
+    unread: list[str] = []
     for link in root.iter("link"):
         if mend is not None and _is_replaced(mend, link.get("name", "")):
             for shape in link.findall("collision"):
@@ -166,8 +181,9 @@ def _prepare_urdf(path: Path, root: ElementTree.Element, mend: Mend | None) -> N
             readable = file is not None and file.suffix.lower() in _MESH_ENDINGS
             if readable:
                 mesh.set("filename", str(file))
-            elif shape.tag == "visual":
+            elif shape.tag == "visual" or lenient:
                 link.remove(shape)
+                unread += [link.get("name", "")] if shape.tag == "collision" else []
             else:
                 reason = "is missing" if file is None else f"is not one of {', '.join(sorted(_MESH_ENDINGS))}"
                 raise RobotError(
@@ -178,6 +194,7 @@ def _prepare_urdf(path: Path, root: ElementTree.Element, mend: Mend | None) -> N
         root.remove(extension)
     extension = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(extension, "compiler", strippath="false", fusestatic="false", discardvisual="false")
+    return list(dict.fromkeys(unread))
 
 
 def _resolve(path: Path, name: str) -> Path | None:
