@@ -148,15 +148,17 @@ def _inspect(console: Console, what: str, out: Path | None) -> int:
         try:
             robot = load_robot(str(place))
             print_warnings(console, robot)
-            verdict = f"the draft loads: {len(robot.joint_names)} joints, CoM at {robot.com_height:.3f} m"
+            guessed = f", but look up {'; '.join(found.missing)}" if found.missing else ""
+            verdict = f"the draft loads: {len(robot.joint_names)} joints, CoM at {robot.com_height:.3f} m{guessed}"
         except RobotError as error:
             robot, said = None, str(error).replace(f"{place.resolve()}/", "")
             wanted = f"look up {'; '.join(found.missing)}. " if found.missing else ""
             verdict = f"the draft does not load yet: {wanted}{said}"
-    console.print(verdict, style="green" if robot else "red", soft_wrap=True, markup=False)
+    good = robot is not None and not found.missing
+    console.print(verdict, style="green" if good else "red", soft_wrap=True, markup=False)
     if out is not None:
         console.print(f"written to {out / FILE_NAME}", soft_wrap=True, markup=False)
-    return 0 if robot else 1
+    return 0 if good else 1
 
 
 def _describe(console: Console, robot: RobotModel) -> None:

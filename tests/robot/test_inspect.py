@@ -67,6 +67,16 @@ def test_what_is_missing_is_said_at_once(tmp_path: Path, capsys: pytest.CaptureF
     assert "# left_knee =" in text
 
 
+def test_feet_without_shapes_are_said_to_be_guessed(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    file = tmp_path / "biped.urdf"
+    file.write_text(biped_urdf().replace('<box size="0.2 0.1 0.02"/>', '<mesh filename="sole.dae"/>'))
+    assert robots.main(["--inspect", str(file)]) == 1
+    text = capsys.readouterr().out
+    assert "the draft loads: 12 joints, CoM at 0." in text
+    assert ", but look up [limbs.left_foot]: 'left_foot_link' has no shape that can be read" in text
+    assert '[mend]\ncollision = { left_sole = "none", right_sole = "none" }' in text
+
+
 def test_a_base_that_looks_back_a_waist_below_the_trunk_and_an_empty_root(tmp_path: Path) -> None:
     file = tmp_path / "robot.xml"
     start, end = biped_mjcf().index("<freejoint/>"), biped_mjcf().rindex("</body>")
@@ -96,8 +106,6 @@ def test_models_are_found_by_package_and_file(tmp_path: Path) -> None:
 
 def test_a_model_that_cannot_be_compiled_is_one_line(tmp_path: Path) -> None:
     file = tmp_path / "bad.xml"
-    file.write_text(
-        biped_mjcf().replace('mass="8"', 'mass="8" mesh="none" type="mesh"', 1).replace('size="0.08', 'x="')
-    )
+    file.write_text(biped_mjcf().replace('type="box" size="0.08 0.12 0.05"', 'type="mesh" mesh="none"'))
     with pytest.raises(InputError, match=r"bad.xml: MuJoCo cannot"):
         robots.main(["--inspect", str(file)])

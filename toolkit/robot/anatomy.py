@@ -30,6 +30,7 @@ class FoundPatch:
         size: Full size (2,) m along x and y.
         pad: Whether the patch needs a box of its own: the shape is round there, or does not collide.
         joints: Joints from the base to the body, in order.
+        seen: Whether there are shapes; without any, the patch is a small one at the body's frame.
     """
 
     body: str
@@ -37,6 +38,7 @@ class FoundPatch:
     size: np.ndarray
     pad: bool
     joints: tuple[str, ...]
+    seen: bool
 
 
 @dataclass(frozen=True)
@@ -289,4 +291,5 @@ def _patch(
         size=np.maximum(size, _LEAST_PATCH),
         pad=pad,
         joints=_names(model, joints_to(model, body)),
+        seen=bool(len(_drawn(model, body))),
     )

@@ -86,6 +86,9 @@ def _missing_structure(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
     missing = []
     if not anatomy.feet:
         missing.append("two legs of five joints or more, whose ends are equally low in the zero posture")
+    for limb, patch in zip(Limb, [*anatomy.feet, *anatomy.palms], strict=False):
+        if not patch.seen:
+            missing.append(f"[limbs.{limb.label}]: '{patch.body}' has no shape that can be read")
     for j in range(model.njnt):
         if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
             missing.append(f"hinges in place of the ball joint '{model.joint(j).name}'")
