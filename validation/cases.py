@@ -11,6 +11,7 @@ import numpy as np
 from toolkit.errors import InputError
 from toolkit.world.generators import KINDS as GENERATORS
 from toolkit.world.loader import load_world
+from toolkit.world.scaling import Fit, fitted
 from toolkit.world.world import World
 
 WORLDS = Path(__file__).resolve().parent.parent / "worlds"
@@ -63,11 +64,13 @@ class Case:
         kind: a key of `KINDS` or `DRAWN`, or the name of a file in worlds/ without its ending.
         seed: of the world where it is random, and of everything that the run draws.
         options: of the generator, beyond those of the kind.
+        fit: what the terrain has to be like for the robot; files in worlds/ stay as they are.
     """
 
     kind: str
     seed: int
     options: tuple[tuple[str, float], ...] = ()
+    fit: Fit = Fit()  # noqa: B008
 
     @property
     def name(self) -> str:
@@ -82,7 +85,8 @@ class Case:
             return (WORLDS / f"{self.kind}.xml").read_text(encoding="utf-8")
         rng = np.random.default_rng(self.seed)
         drawn = {name: float(rng.uniform(*ends)) for name, ends in kind.ranges.items()}
-        return GENERATORS[kind.generator](rng, **{**kind.options, **drawn, **dict(self.options)})
+        given = {**kind.options, **drawn, **dict(self.options)}
+        return fitted(GENERATORS[kind.generator], rng, self.fit, given)
 
     def world(self) -> World:
         """The world, loaded."""
@@ -104,10 +108,10 @@ def kind_of(name: str) -> Kind:
     return Kind()
 
 
-def make_cases(kinds: Sequence[str], trials: int, seed_offset: int) -> list[Case]:
+def make_cases(kinds: Sequence[str], trials: int, seed_offset: int, fit: Fit | None = None) -> list[Case]:
     """Cases of several kinds: `trials` seeds of a random one, at most `AUTHORED_TRIALS` of any other."""
     cases = []
     for kind in kinds:
         count = trials if kind_of(kind).random else min(trials, AUTHORED_TRIALS)
-        cases += [Case(kind, seed_offset + index) for index in range(count)]
+        cases += [Case(kind, seed_offset + index, fit=fit or Fit()) for index in range(count)]
     return cases

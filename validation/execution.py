@@ -8,6 +8,8 @@ from typing import Any
 from toolkit import cli
 from toolkit.execution.config import ExecutionConfig
 from toolkit.report.console import make_console
+from toolkit.robot.loader import load_robot
+from toolkit.world.scaling import Fit
 from validation import goals, options
 from validation.cases import KINDS, kind_of, make_cases
 from validation.goals import Goal
@@ -33,7 +35,7 @@ Run the whole pipeline on random rubble fields and corridors, the wide gap and s
 Every trial counts, also one without a plan. A trial HOLDS when the robot arrives, the run replays in plain MuJoCo,
 no stance slips 2 cm, nothing but soles and palms touches the world, and torques and velocities stay within the
 robot's limits; it PASSES when every check of the toolkit's own verdict does. Failures keep their reason and the folder
-of their run with its recording.
+of their run with its recording. Generated terrain is to the scale of the robot's legs.
 """
 
 COLUMNS = (
@@ -127,7 +129,7 @@ def main(argv: list[str] | None = None) -> int:
     args = parser.parse_args(argv)
     console = make_console()
     settings = options.settings_of(args)
-    cases = make_cases(args.kinds, args.trials, args.seed_offset)
+    cases = make_cases(args.kinds, args.trials, args.seed_offset, Fit.of(load_robot(args.robot, args.robots)))
     store = TrialFile(args.out / "trials.jsonl", settings.deciding())
     jobs = [Job(case.name, execution_trial, (settings, case)) for case in cases]
     records = run_jobs(jobs, store, options.pool_of(args), console, "trials")

@@ -24,7 +24,7 @@ from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.world.loader import load_world
-from toolkit.world.scaling import scale_of, scaled
+from toolkit.world.scaling import Fit, scaled
 
 CLIPS, RUNS, ATTEMPTS, ROBOT = "clips", "runs", "attempts", "robot"
 """Folders of a data set: the motions, the runs that replay them, a record of each attempt, and the robot."""
@@ -90,7 +90,7 @@ def attempt(config: ClipConfig, index: int, folder: str) -> Record:
     rng = np.random.default_rng([config.seed, index])
     kind = config.kinds[index % len(config.kinds)]
     text, options = random_world(kind, rng)
-    text = scaled(text, scale_of(_robot_of(config.robot, config.robots)))
+    text = scaled(text, Fit.of(_robot_of(config.robot, config.robots)).factor)
     seed = int(rng.integers(2**31))
     record: Record = {"attempt": index, "kind": kind, "options": options, "seed": seed, "passed": False}
     try:

@@ -27,7 +27,7 @@ from toolkit.prediction.network import TransitionNetwork
 from toolkit.prediction.networks import load_networks
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
-from toolkit.world.scaling import scale_of, steepest_tile
+from toolkit.world.scaling import Fit
 from toolkit.world.timing import Timing, pace_of
 
 WORLDS = 1000
@@ -76,13 +76,13 @@ def _place(robot: RobotModel, quota: Quota, config: CollectConfig, rng: np.rando
     networks = {}
     if config.networks is not None:
         networks = _networks_of(config.robot, config.robots, config.networks, config.networks_digest)
-    scale, pace = scale_of(robot), pace_of(robot.com_height)
+    fit, pace = Fit.of(robot), pace_of(robot.com_height)
     walls = robot.arms and any(category.palms_before or not category.moving.is_foot for category in quota.lacking)
     kinds = list(WALLED) if rng.random() < (config.walled if walls else 0.2) else [*OPEN, STEEP]
     kind, friction = kinds[int(rng.integers(len(kinds)))], rng.uniform(*config.friction)
     if kind == STEEP:
         timings = (_random_timing(config.quick_shift, config.quick_swing, pace, rng),)
-        return Place(robot, steep_descent(rng, friction, scale), timings, True, networks)
+        return Place(robot, steep_descent(rng, friction, fit.factor), timings, True, networks)
     which = rng.random()
     if which < config.paper_share:
         timings, friction = (PAPER,), _PAPER_FRICTION
@@ -91,9 +91,9 @@ def _place(robot: RobotModel, quota: Quota, config: CollectConfig, rng: np.rando
     else:
         count = int(rng.integers(1, config.choices + 1))
         timings = tuple(_random_timing(config.shift, config.swing, pace, rng) for _ in range(count))
-    most = min(config.tilt[1], steepest_tile(robot))
+    most = min(config.tilt[1], fit.tilt)
     config = replace(config, tilt=(min(config.tilt[0], most), most))
-    return Place(robot, random_world(rng, config, kind, friction, scale), timings, False, networks)
+    return Place(robot, random_world(rng, config, kind, friction, fit.factor), timings, False, networks)
 
 
 def _random_timing(

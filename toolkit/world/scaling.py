@@ -1,9 +1,11 @@
-"""Worlds to the scale of a robot: the sizes of random terrain are made for one length of leg."""
+"""Terrain in proportion to a robot: a generated world, larger or smaller by the length of the robot's legs."""
 
 from __future__ import annotations
 
-import math
+import inspect
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,28 +13,78 @@ from toolkit.geometry.limb import FEET
 from toolkit.robot.model import RobotModel
 from toolkit.world.authoring import numbers
 
-_LEG = 0.8  # m from hip to ankle; the sizes of the generators are made for it
-_LENGTHS = ("pos", "size", "vertex", "center", "extent")  # attributes that hold lengths
+_LEG = 0.8  # m; thigh and shin of the legs that the generators' numbers are meant for
+_ANKLE_MARGIN = 0.1  # rad; ankles stay so far inside their range on the steepest tile
+_TIMES = ("shift", "swing")  # options of generators that are times
+_LENGTHS = {
+    "statistic": ("center", "extent"),
+    "light": ("pos",),
+    "geom": ("pos", "size"),
+    "site": ("pos", "size"),
+    "body": ("pos",),
+    "mesh": ("vertex",),
+    "hfield": ("size",),
+}
 
 
-def scale_of(robot: RobotModel) -> float:
-    """Length of a robot's legs over that for which the sizes of random terrain are made."""
-    leg = robot.legs[FEET[0]]
-    return (leg.thigh + leg.shin) / _LEG
+@dataclass(frozen=True)
+class Fit:
+    """What terrain has to be like for a robot.
+
+    Attributes:
+        factor: Lengths, as a multiple of the generators'.
+        tilt: Largest roll and pitch of a tile that the ankles follow, deg.
+    """
+
+    factor: float = 1.0
+    tilt: float = 90.0
+
+    @classmethod
+    def of(cls, robot: RobotModel) -> Fit:
+        """The fit to a robot; the factor is rounded to 1 %, so that a robot of the usual size gets the usual worlds."""
+        legs = [robot.legs[foot] for foot in FEET]
+        factor = round(float(np.mean([leg.thigh + leg.shin for leg in legs])) / _LEG, 2)
+        ends = [abs(end) for leg in legs for role in ("ankle_roll", "ankle_pitch") for end in leg.ranges[role]]
+        return cls(factor, float(np.floor(np.degrees(max(min(ends) - _ANKLE_MARGIN, 0.0)))))
 
 
-def steepest_tile(robot: RobotModel) -> float:
-    """Largest roll in deg of ground on which the soles can lie flat while the legs are upright."""
-    ranges = (robot.legs[foot].ranges["ankle_roll"] for foot in FEET)
-    return math.degrees(min(abs(end) for bounds in ranges for end in bounds))
+def fitted(generator: Callable[..., str], rng: np.random.Generator, fit: Fit, given: Mapping[str, float]) -> str:
+    """A world of a generator that fits a robot, as MJCF text.
+
+    All lengths are multiplied by the fit's factor. Times are multiplied by its root, as those of a pendulum are, and
+    tiles are no steeper than the robot's ankles follow.
+
+    Args:
+        generator: One of `toolkit.world.generators.KINDS`.
+        rng: Source of everything random.
+        fit: The fit to the robot.
+        given: Options of the generator. Times and tilts among them stay as they are; lengths are those before the
+            world is scaled.
+
+    Raises:
+        ValueError: The options make no world.
+    """
+    options: dict[str, float] = dict(given)
+    for name, usual in _defaults(generator).items():
+        if name in _TIMES and name not in given:
+            options[name] = round(usual * float(np.sqrt(fit.factor)), 3)
+        if name == "tilt" and name not in given:
+            options[name] = min(usual, fit.tilt)
+    return scaled(generator(rng, **options), fit.factor)
+
+
+def _defaults(generator: Callable[..., str]) -> dict[str, float]:
+    parameters = inspect.signature(generator).parameters.values()
+    return {item.name: item.default for item in parameters if item.kind is inspect.Parameter.KEYWORD_ONLY}
 
 
 def scaled(mjcf: str, factor: float) -> str:
     """A generated world with all its lengths multiplied by a factor; angles, times and friction stay."""
-    root = ElementTree.fromstring(mjcf, ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True)))
+    if factor == 1.0:
+        return mjcf
+    root = ElementTree.fromstring(mjcf)
     for element in root.iter():
-        for name in _LENGTHS:
-            value = element.get(name)
-            if value is not None:
-                element.set(name, numbers(factor * np.array(value.split(), float)))
-    return ElementTree.tostring(root, encoding="unicode")
+        for name in _LENGTHS.get(element.tag, ()):
+            if element.get(name) is not None:
+                element.set(name, numbers(factor * np.array(element.get(name, "").split(), float)))
+    return ElementTree.tostring(root, encoding="unicode") + "\n"

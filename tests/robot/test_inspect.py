@@ -1,0 +1,111 @@
+"""`python -m toolkit.robots --inspect`: a model nobody has described, and the draft that loads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.robot.samples import LEG, biped_mjcf, biped_urdf, write_robot
+from tests.shipped_robots import OWN
+from toolkit import robots
+from toolkit.errors import InputError, PackageError
+from toolkit.geometry.limb import FEET, PALMS
+from toolkit.geometry.pose import Pose
+from toolkit.robot.anatomy import find_anatomy
+from toolkit.robot.loader import load_robot
+from toolkit.robot.located import locate
+from toolkit.robot.source import read_model
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_patches_are_found_where_a_person_put_them(name: str) -> None:
+    robot = load_robot(name)
+    (path,) = robot.folder.glob("*.xml")
+    anatomy = find_anatomy(read_model(path).spec.compile())
+    assert anatomy.base == robot.base and anatomy.forward == pytest.approx([1, 0], abs=1e-9)
+    for found, labels in ((anatomy.feet, FEET), (anatomy.palms, PALMS)):
+        for patch, limb in zip(found, labels, strict=True):
+            site = robot.mujoco_model.site(limb.label)
+            expected = Pose.from_quaternion(site.pos, site.quat)
+            assert patch.body == robot.limbs[limb].body
+            np.testing.assert_allclose(patch.pose.position, expected.position, atol=2e-3)
+            assert patch.pose.rotation[:, 2] @ expected.rotation[:, 2] > 0.999
+            np.testing.assert_allclose(patch.size, 2 * robot.limbs[limb].half_size, atol=2e-3)
+
+
+def solid(urdf: str) -> str:
+    """The URDF with a trunk that collides."""
+    box = '<collision><origin xyz="0 0 0.2"/><geometry><box size="0.2 0.2 0.4"/></geometry></collision></link>'
+    return urdf.replace("</link>", box, 1)
+
+
+def test_a_draft_loads(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    file = tmp_path / "biped.urdf"
+    file.write_text(solid(biped_urdf()))
+    out = tmp_path / "robots" / "biped"
+    assert robots.main(["--inspect", str(file), "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert "left_knee: about y, 0.000…2.400 rad, 250 N m, 7.5 rad/s, armature 0" in text
+    assert "the draft loads: 12 joints" in text and "no armature" in text
+    assert 'file = "../../biped.urdf"' in (out / "robot.toml").read_text()
+    robot = load_robot("biped", tmp_path / "robots")
+    assert robot.joint_names[:6] == tuple(f"left_{joint}" for joint, *_ in LEG)
+    np.testing.assert_allclose(2 * robot.limbs[FEET[0]].half_size, [0.2, 0.1])
+    np.testing.assert_allclose(robot.legs[FEET[0]].ankle_in_sole, [-0.02, 0, 0.08], atol=1e-9)
+    with pytest.raises(InputError, match="has a robot.toml already; choose another folder"):
+        robots.main(["--inspect", str(file), "--out", str(out)])
+
+
+def test_what_is_missing_is_said_at_once(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    file = tmp_path / "biped.xml"
+    file.write_text(biped_mjcf())
+    assert robots.main(["--inspect", str(file)]) == 1
+    text = capsys.readouterr().out
+    assert "does not load yet: look up [limits.velocity] of 12 joints (left_hip_pitch, " in text
+    assert "# left_knee =" in text
+
+
+def test_feet_without_shapes_are_said_to_be_guessed(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    file = tmp_path / "biped.urdf"
+    file.write_text(biped_urdf().replace('<box size="0.2 0.1 0.02"/>', '<mesh filename="sole.dae"/>'))
+    assert robots.main(["--inspect", str(file)]) == 1
+    text = capsys.readouterr().out
+    assert "the draft loads: 12 joints, CoM at 0." in text
+    assert ", but look up [limbs.left_foot]: 'left_foot_link' has no shape that can be read" in text
+    assert '[mend]\ncollision = { left_sole = "none", right_sole = "none" }' in text
+
+
+def test_a_base_that_looks_back_a_waist_below_the_trunk_and_an_empty_root(tmp_path: Path) -> None:
+    file = tmp_path / "robot.xml"
+    start, end = biped_mjcf().index("<freejoint/>"), biped_mjcf().rindex("</body>")
+    inner = biped_mjcf()[start + len("<freejoint/>") : end]
+    waist = f'<body name="waist" quat="0 0 0 1"><joint name="waist" axis="0 0 1" range="-1 1"/>{inner}</body>'
+    trunk = f'<geom size="0.1" mass="1"/>{waist}'
+    text = biped_mjcf()[:start] + "<freejoint/>" + trunk + biped_mjcf()[end:]
+    file.write_text(text.replace("</worldbody>", '<body name="map"/></worldbody>'))
+    anatomy = find_anatomy(read_model(file).spec.compile())
+    assert anatomy.shared == ("waist",) and anatomy.others == ("map",)
+    np.testing.assert_allclose(anatomy.forward, [-1, 0], atol=1e-9)
+    assert [patch.body for patch in anatomy.feet] == ["left_foot_link", "right_foot_link"]
+
+
+def test_models_are_found_by_package_and_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nowhere.xml: no such file; give an MJCF or URDF file, or PACKAGE:FILE"):
+        locate("nowhere.xml")
+    with pytest.raises(PackageError, match="'no-such-package' is neither a file nor an installed package; `pip ins"):
+        locate("no-such-package")
+    with pytest.raises(InputError, match="package 'numpy' has 0 models; name one as numpy:FILE: none"):
+        locate("numpy")
+    located = locate(str(write_robot(tmp_path / "a") / "robot.xml"))
+    assert located.lines(tmp_path / "b") == ['file = "../a/robot.xml"']
+    with pytest.raises(InputError, match="--out is the folder of a draft; it needs --inspect"):
+        robots.main(["--out", "there"])
+
+
+def test_a_model_that_cannot_be_compiled_is_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "bad.xml"
+    file.write_text(biped_mjcf().replace('type="box" size="0.08 0.12 0.05"', 'type="mesh" mesh="none"'))
+    with pytest.raises(InputError, match=r"bad.xml: MuJoCo cannot"):
+        robots.main(["--inspect", str(file)])

@@ -1,0 +1,295 @@
+"""Find legs, soles, arms and palms in the tree of a compiled model that nobody has described yet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from toolkit.geometry.pose import Pose
+from toolkit.robot.chain import bodies_above, joints_to
+from toolkit.robot.mend import geom_points
+
+FLAT = 0.001  # m; points so near to the lowest one belong to the sole
+_AROUND = 48  # points around round shapes
+_LEAST_PATCH = 0.02  # m; least side of a patch that is proposed
+_HAND_DEPTH = 0.01  # m; points so near to the end of a hand belong to its palm
+_ARM_JOINTS = 7  # most joints of an arm; what comes after them is a finger
+_STEEPEST = 0.7  # least cosine between the normal of a sole and straight down in the zero posture
+
+
+@dataclass(frozen=True)
+class FoundPatch:
+    """A contact patch that a shape suggests.
+
+    Attributes:
+        body: Name of the body.
+        pose: The contact frame in that body.
+        size: Full size (2,) m along x and y.
+        pad: Whether the patch needs a box of its own: the shape is round there, or does not collide.
+        joints: Joints from the base to the body, in order.
+        seen: Whether there are shapes; without any, the patch is a small one at the body's frame.
+    """
+
+    body: str
+    pose: Pose
+    size: np.ndarray
+    pad: bool
+    joints: tuple[str, ...]
+    seen: bool
+
+
+@dataclass(frozen=True)
+class Anatomy:
+    """What a model's tree and shapes suggest.
+
+    Attributes:
+        base: Name of the root body of the robot.
+        others: Names of further root bodies.
+        forward: Direction (2,) of the toes in the axes of the base.
+        feet: Soles, left one first; empty where no two legs were found.
+        palms: Palms, left one first; empty where no two arms were found.
+        shared: Joints that both legs hang on, such as a waist below a floating trunk.
+        fingers: Joints beyond the hands.
+    """
+
+    base: str
+    others: tuple[str, ...]
+    forward: np.ndarray
+    feet: tuple[FoundPatch, ...]
+    palms: tuple[FoundPatch, ...]
+    shared: tuple[str, ...]
+    fingers: tuple[str, ...]
+
+
+def find_anatomy(model: mujoco.MjModel) -> Anatomy:
+    """Legs and arms of a model, whose base is above its feet and whose z axis points up in the zero posture."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    roots = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
+    base = max(roots, key=lambda b: float(model.body_subtreemass[b]))
+    tips = _tips(model, base)
+    feet = _feet(model, data, tips)
+    if len(feet) != 2:
+        others = tuple(model.body(b).name for b in roots if b != base)
+        return Anatomy(model.body(base).name, others, np.array([1.0, 0.0]), (), (), (), ())
+    first, second = (joints_to(model, foot) for foot in feet)
+    shared = [j for j in first if j in second]
+    forward = _forward(model, data, base, [j for j in first if j not in shared])
+    across = np.array([-forward[1], forward[0], 0.0])
+    feet = sorted(feet, key=lambda b: -float(across @ data.xpos[b]))
+    legs = {j for foot in feet for j in joints_to(model, foot)}
+    arms = _arms(model, data, tips, legs, across, base)
+    hands = [hand for hand, _ in arms]
+    fingers = sorted({j for _, beyond in arms for j in beyond})
+    return Anatomy(
+        base=model.body(base).name,
+        others=tuple(model.body(b).name for b in roots if b != base),
+        forward=forward,
+        feet=tuple(_sole(model, data, foot, forward) for foot in feet),
+        palms=tuple(_palm(model, data, hand, legs, forward) for hand in hands),
+        shared=_names(model, shared),
+        fingers=_names(model, fingers),
+    )
+
+
+def _names(model: mujoco.MjModel, joints: list[int]) -> tuple[str, ...]:
+    return tuple(model.joint(j).name for j in joints)
+
+
+def _tips(model: mujoco.MjModel, base: int) -> list[int]:
+    """Bodies with a joint of their own and none below them, under a base."""
+    single = model.jnt_type != mujoco.mjtJoint.mjJNT_FREE
+    moved = {int(body) for body in model.jnt_bodyid[single]}
+    inner = {above for body in moved for above in list(bodies_above(model, body))[1:]}
+    return [b for b in sorted(moved - inner) if base in bodies_above(model, b)]
+
+
+def _drawn(model: mujoco.MjModel, body: int) -> np.ndarray:
+    """All shapes of a body and of what is fixed to it."""
+    return np.flatnonzero(model.body_weldid[model.geom_bodyid] == model.body_weldid[body])
+
+
+def _rigid(model: mujoco.MjModel, body: int) -> tuple[np.ndarray, bool]:
+    """The colliding shapes of a body and of what is fixed to it, or all where none does, and whether they collide."""
+    shapes = _drawn(model, body)
+    colliding = shapes[(model.geom_contype[shapes] | model.geom_conaffinity[shapes]) != 0]
+    return (colliding, True) if len(colliding) else (shapes, False)
+
+
+def _points(model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray) -> np.ndarray:
+    """Points (n, 3) m in the world on shapes; round ones as points around them."""
+    clouds = [np.empty((0, 3))]
+    for geom in geoms.tolist():
+        kind, size = model.geom_type[geom], model.geom_size[geom]
+        rotation = data.geom_xmat[geom].reshape(3, 3)
+        if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+            local = size[0] * _sphere(rotation)
+        elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+            local = np.concatenate([size[0] * _sphere(rotation) + [0, 0, end * size[1]] for end in (-1, 1)])
+        elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+            ring = size[0] * _ring(rotation)
+            local = np.concatenate([ring + [0, 0, end * size[1]] for end in (-1, 1)])
+        else:
+            pose = Pose.from_quaternion(model.geom_pos[geom], model.geom_quat[geom])
+            local = pose.inverse() @ geom_points(model, geom)
+        clouds.append(local @ rotation.T + data.geom_xpos[geom])
+    return np.concatenate(clouds)
+
+
+def _sphere(rotation: np.ndarray) -> np.ndarray:
+    """Unit vectors (n, 3) all around, in a shape's axes; straight down in the world is exactly one of them."""
+    angles = np.linspace(0, np.pi, _AROUND // 2 + 1)
+    rings = [np.column_stack([_circle() * np.sin(a), np.full(_AROUND, -np.cos(a))]) for a in angles]
+    return np.concatenate(rings) @ rotation
+
+
+def _ring(rotation: np.ndarray) -> np.ndarray:
+    """Unit vectors (n, 3) around a shape's z axis; the lowest in the world is exactly one of them."""
+    down = rotation.T @ [0.0, 0.0, -1.0]
+    start = np.arctan2(down[1], down[0])
+    c, s = np.cos(start), np.sin(start)
+    return np.column_stack([_circle() @ np.array([[c, s], [-s, c]]), np.zeros(_AROUND)])
+
+
+def _circle() -> np.ndarray:
+    angles = 2 * np.pi * np.arange(_AROUND) / _AROUND
+    return np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _lowest(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> float:
+    points = _points(model, data, _rigid(model, body)[0])
+    return float(min(points[:, 2].min(initial=np.inf), data.xpos[body, 2]))
+
+
+def _feet(model: mujoco.MjModel, data: mujoco.MjData, tips: list[int]) -> list[int]:
+    """The two lowest ends of chains with at least five joints, if they stand equally high."""
+    long = [tip for tip in tips if len(joints_to(model, tip)) >= 5]
+    lowest = sorted(long, key=lambda tip: _lowest(model, data, tip))[:2]
+    height = float(np.ptp(data.xpos[1:, 2])) if model.nbody > 1 else 0.0
+    if len(lowest) < 2 or abs(_lowest(model, data, lowest[0]) - _lowest(model, data, lowest[1])) > 0.1 * height:
+        return []
+    return lowest
+
+
+def _forward(model: mujoco.MjModel, data: mujoco.MjData, base: int, leg: list[int]) -> np.ndarray:
+    """Level direction (2,) of the toes: a knee bends about the axis to the left, and the shin goes back."""
+    bend = np.sum(model.jnt_range[leg[3]]) if len(leg) > 3 else 0.0
+    left = np.sign(bend) * data.xaxis[leg[3]] if bend else data.xmat[base].reshape(3, 3)[:, 1]
+    ahead = np.array([left[1], -left[0]])
+    if np.linalg.norm(ahead) < 0.5:
+        ahead = data.xmat[base].reshape(3, 3)[:2, 0]
+    return ahead / np.linalg.norm(ahead)
+
+
+def _sole(model: mujoco.MjModel, data: mujoco.MjData, foot: int, forward: np.ndarray) -> FoundPatch:
+    shapes, colliding = _rigid(model, foot)
+    points = _points(model, data, shapes)
+    if len(points) < 4:
+        points = data.xpos[foot] + 0.5 * _LEAST_PATCH * np.array([[x, y, 0.0] for x in (-1, 1) for y in (-1, 1)])
+    down = max(_downs(points), key=lambda direction: _area(points, direction, forward))
+    sole = points[points @ down > (points @ down).max() - FLAT]
+    ahead = np.append(forward, 0.0)
+    ahead = ahead - down * (down @ ahead)
+    ahead /= np.linalg.norm(ahead)
+    axes = np.column_stack([ahead, np.cross(-down, ahead), -down])
+    low, high = (sole @ axes).min(0), (sole @ axes).max(0)
+    centre = axes @ np.append((low[:2] + high[:2]) / 2, (points @ axes)[:, 2].min())
+    end = float((points @ down).max()) - FLAT
+    touching = [g for g in shapes if (_points(model, data, shapes[shapes == g]) @ down).max(initial=-np.inf) > end]
+    boxes = all(model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX for geom in touching)
+    return _patch(model, data, foot, Pose(axes, centre), (high - low)[:2], not (boxes and colliding))
+
+
+def _downs(points: np.ndarray) -> list[np.ndarray]:
+    """Directions that may be those of a sole: straight down, and across the largest facet that faces down."""
+    downs = [np.array([0.0, 0.0, -1.0])]
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return downs
+    normals = hull.equations[:, :3]
+    corners = points[hull.simplices]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    facing = normals[:, 2] < -_STEEPEST
+    if facing.any():
+        same = normals @ normals[facing].T > 0.9998
+        downs.append(normals[facing][(areas[:, None] * same).sum(0).argmax()])
+    return downs
+
+
+def _area(points: np.ndarray, down: np.ndarray, forward: np.ndarray) -> float:
+    """Area in m^2 of the rectangle around the points that are lowest in a direction."""
+    sole = points[points @ down > (points @ down).max() - FLAT]
+    along = sole @ np.column_stack([np.append(forward, 0.0), [-forward[1], forward[0], 0.0]])
+    return float(np.prod(np.ptp(along, axis=0)))
+
+
+def _arms(
+    model: mujoco.MjModel, data: mujoco.MjData, tips: list[int], legs: set[int], across: np.ndarray, base: int
+) -> list[tuple[int, list[int]]]:
+    """The left and the right hand with the joints beyond them; none where there are not both."""
+    others = [tip for tip in tips if not legs & set(joints_to(model, tip)[-1:])]
+    side = {tip: float(across @ (data.xpos[tip] - data.xpos[base])) for tip in others}
+    found = []
+    for sign in (1.0, -1.0):
+        ends = [tip for tip in others if sign * side[tip] > 0.02]
+        if not ends:
+            return []
+        end = max(ends, key=lambda tip: len(joints_to(model, tip)))
+        chain = [b for b in bodies_above(model, end) if not _carries(model, b, set(others) - set(ends), legs)]
+        arm = [tip for tip in ends if chain and chain[-1] in bodies_above(model, tip)]
+        common = set.intersection(*(set(bodies_above(model, tip)) for tip in arm)) if arm else set()
+        moved = [b for b in chain if b in common and model.body_jntnum[b]]
+        if not moved:
+            return []
+        joints = [j for j in joints_to(model, max(moved)) if int(model.jnt_bodyid[j]) in chain][:_ARM_JOINTS]
+        if len(joints) < 4:
+            return []
+        hand = int(model.jnt_bodyid[joints[-1]])
+        found.append((hand, [j for tip in arm for j in joints_to(model, tip) if j > max(joints)]))
+    return found
+
+
+def _carries(model: mujoco.MjModel, body: int, tips: set[int], legs: set[int]) -> bool:
+    """Whether a body is above some of the tips, or above a leg."""
+    if any(body in bodies_above(model, tip) for tip in tips):
+        return True
+    return any(body in bodies_above(model, int(model.jnt_bodyid[j])) for j in legs)
+
+
+def _palm(model: mujoco.MjModel, data: mujoco.MjData, hand: int, legs: set[int], forward: np.ndarray) -> FoundPatch:
+    joints = [j for j in joints_to(model, hand) if j not in legs]
+    elbow = data.xanchor[joints[-4] if len(joints) >= 7 else joints[-2]]
+    points = _points(model, data, _drawn(model, hand))
+    if not len(points):
+        points = data.xpos[hand][None]
+    middle = (points.min(0) + points.max(0)) / 2
+    out = middle - elbow
+    out = out / max(float(np.linalg.norm(out)), 1e-9)
+    palm = points[points @ out > (points @ out).max() - _HAND_DEPTH]
+    ahead = np.append(forward, 0.0)
+    ahead = ahead - out * (out @ ahead)
+    if np.linalg.norm(ahead) < 0.3:
+        ahead = np.array([0.0, 0.0, 1.0]) - out * out[2]
+    ahead /= np.linalg.norm(ahead)
+    axes = np.column_stack([ahead, np.cross(-out, ahead), -out])
+    low, high = (palm @ axes).min(0), (palm @ axes).max(0)
+    centre = middle + out * float((points @ out).max() - middle @ out)
+    return _patch(model, data, hand, Pose(axes, centre), (high - low)[:2], True)
+
+
+def _patch(
+    model: mujoco.MjModel, data: mujoco.MjData, body: int, pose: Pose, size: np.ndarray, pad: bool
+) -> FoundPatch:
+    world_from_body = Pose(data.xmat[body].reshape(3, 3), data.xpos[body])
+    return FoundPatch(
+        body=model.body(body).name,
+        pose=world_from_body.inverse() @ pose,
+        size=np.maximum(size, _LEAST_PATCH),
+        pad=pad,
+        joints=_names(model, joints_to(model, body)),
+        seen=bool(len(_drawn(model, body))),
+    )

@@ -1,0 +1,255 @@
+"""Draft of a robot.toml for a model that nobody has described yet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from toolkit.geometry.limb import Limb
+from toolkit.robot.anatomy import Anatomy, FoundPatch, find_anatomy
+from toolkit.robot.motors import file_torques
+from toolkit.robot.source import ModelSource
+
+_KNEE = 0.7  # rad; flexion of the knees where no keyframe says how to stand
+_SPREAD = 0.25  # rad; arms out to the sides
+_ARM_JOINTS = 7  # most joints of an arm
+_LEAST_MASS, _LEAST_INERTIA = 1e-3, 1e-6  # kg and kg m^2, of bodies without any
+_STANDING = ("home", "stand", "standing", "default")  # names of keyframes that are likely to be postures to stand in
+_GAIN = 3.0  # stiffness of the joints that carry the robot, as a multiple of m g h
+_DAMPING = 0.01  # s; damping over stiffness
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A robot.toml to begin with.
+
+    Attributes:
+        text: The robot.toml.
+        missing: What the file does not have and a person has to look up, one line each.
+        anatomy: What the tree and the shapes suggest.
+        model: The compiled file.
+    """
+
+    text: str
+    missing: tuple[str, ...]
+    anatomy: Anatomy
+    model: mujoco.MjModel
+
+
+def draft(source: ModelSource, where: Sequence[str]) -> Draft:
+    """A robot.toml for a model file.
+
+    Args:
+        source: The model file, read without the collision shapes that cannot be read.
+        where: Lines of [model] that name the file.
+
+    Raises:
+        ValueError: MuJoCo cannot compile the file.
+    """
+    model, inertia = _compiled(source.spec)
+    anatomy = find_anatomy(model)
+    locked = _locked(model, anatomy)
+    moved = [name for name in _joints(model) if name not in locked]
+    missing = [*_missing_structure(model, anatomy), *_missing_numbers(model, source, moved)]
+    parts = [
+        ['description = ""', 'licence = "unknown"   # look it up', f'source = "{source.path.name}"'],
+        ["[model]", *where, f'base = "{anatomy.base}"', *_lock_lines(model, locked)],
+        _mend(model, source, anatomy, inertia),
+        *(_limb(limb, patch) for limb, patch in zip(list(Limb)[:2], anatomy.feet, strict=False)),
+        *(_palm(limb, patch, model) for limb, patch in zip(list(Limb)[2:], anatomy.palms, strict=False)),
+        _home(model, anatomy, moved),
+        _gains(model, anatomy),
+        _limits(source, moved),
+    ]
+    text = "\n\n".join("\n".join(part) for part in parts if part) + "\n"
+    return Draft(text, tuple(missing), anatomy, model)
+
+
+def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, list[str]]:
+    """The compiled spec, and the lines of [mend] that it takes because of inertias which no body can have."""
+    try:
+        return spec.compile(), []
+    except ValueError as error:
+        if "inertia" not in str(error):
+            raise
+    spec = spec.copy()
+    compiler = spec.compiler
+    compiler.balanceinertia, compiler.boundmass, compiler.boundinertia = True, _LEAST_MASS, _LEAST_INERTIA
+    lines = ["balance_inertia = true   # some bodies have an inertia that no body can have, or none"]
+    return spec.compile(), [*lines, f"least_mass = {_LEAST_MASS}", f"least_inertia = {_LEAST_INERTIA}"]
+
+
+def _missing_structure(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
+    missing = []
+    if not anatomy.feet:
+        missing.append("two legs of five joints or more, whose ends are equally low in the zero posture")
+    for limb, patch in zip(Limb, [*anatomy.feet, *anatomy.palms], strict=False):
+        if not patch.seen:
+            missing.append(f"[limbs.{limb.label}]: '{patch.body}' has no shape that can be read")
+    for j in range(model.njnt):
+        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
+            missing.append(f"hinges in place of the ball joint '{model.joint(j).name}'")
+    if model.ntendon:
+        missing.append("a file without tendons")
+    return missing
+
+
+def _missing_numbers(model: mujoco.MjModel, source: ModelSource, moved: list[str]) -> list[str]:
+    torques = file_torques(model)
+    lacking = {
+        "limits.position": [name for name in moved if not model.jnt_limited[model.joint(name).id]],
+        "limits.torque": [name for name in moved if not torques.get(name)],
+        "limits.velocity": [name for name in moved if name not in source.velocity],
+    }
+    return [
+        f"[{table}] of {len(names)} joint{'s' * (len(names) > 1)} ({', '.join(names[:3])}{', ...' * (len(names) > 3)})"
+        for table, names in lacking.items()
+        if names
+    ]
+
+
+def _joints(model: mujoco.MjModel) -> list[str]:
+    """Names of all joints but the free one."""
+    free = mujoco.mjtJoint.mjJNT_FREE
+    return [model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] != free]
+
+
+def _locked(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
+    """Joints that the toolkit cannot move: those that carry both legs, fingers, and those tied to others."""
+    tied = set()
+    for equality in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
+        tied.update(model.joint(j).name for j in (model.eq_obj1id[equality], model.eq_obj2id[equality]) if j >= 0)
+    return [*anatomy.shared, *anatomy.fingers, *sorted(tied - {*anatomy.shared, *anatomy.fingers})]
+
+
+def _lock_lines(model: mujoco.MjModel, names: list[str]) -> list[str]:
+    if not names:
+        return []
+    values = ", ".join(f"{_key(name)} = {_within(model, name, 0.0):g}" for name in names)
+    return [f"locked_joints = {{ {values} }}"]
+
+
+def _mend(model: mujoco.MjModel, source: ModelSource, anatomy: Anatomy, inertia: list[str]) -> list[str]:
+    lines = list(inertia)
+    bodies = [model.body(b).name for b in range(1, model.nbody)]
+    same = [name for name in _joints(model) if name in bodies and name not in anatomy.shared]
+    if same:
+        lines.append("rename_bodies = { " + ", ".join(f'{_key(name)} = "{name}_link"' for name in same) + " }")
+    empty = [name for name in anatomy.others if not float(model.body_subtreemass[model.body(name).id])]
+    if empty:
+        lines.append(f"drop = [{', '.join(_text(name) for name in empty)}]")
+    if anatomy.forward[0] < 0.98:
+        x, y = np.round(anatomy.forward, 6) + 0.0
+        lines.append(f"forward = [{float(x)}, {float(y)}]   # the knees say where the toes point")
+    if source.unread:
+        shapes = ", ".join(f'{_key(name)} = "none"' for name in source.unread)
+        lines.append(f"collision = {{ {shapes} }}   # their files cannot be read; boxes [[centre], [size]] are better")
+    elif not (model.geom_contype | model.geom_conaffinity).any() and model.ngeom:
+        groups = sorted(set(model.geom_group.tolist()))
+        lines.append(f'collision = {{ "*" = "group {groups[-1]}" }}   # nothing collides; groups: {groups}')
+    return ["[mend]", *lines] if lines else []
+
+
+def _limb(limb: Limb, patch: FoundPatch) -> list[str]:
+    pose = patch.pose
+    quaternion = pose.quaternion_wxyz * (1.0 if pose.quaternion_wxyz[0] >= 0 else -1.0)
+    lines = [f"[limbs.{limb.label}]", f"body = {_text(patch.body)}", f"position = {_numbers(pose.position)}"]
+    if abs(quaternion[0]) < 1 - 1e-9:
+        lines.append(f"quaternion_wxyz = {_numbers(quaternion, 9)}")
+    lines.append(f"patch = {_numbers(np.floor(patch.size * 1e3 + 1e-6) / 1e3)}")
+    return [*lines, "pad = 0.01"] if patch.pad else lines
+
+
+def _palm(limb: Limb, patch: FoundPatch, model: mujoco.MjModel) -> list[str]:
+    joints = list(patch.joints)
+    elbow = joints[-4] if len(joints) >= 7 else joints[-2]
+    torque = file_torques(model).get(elbow)
+    lines = _limb(limb, patch)
+    if not torque:
+        return lines
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    body = model.body(patch.body).id
+    palm = data.xmat[body].reshape(3, 3) @ patch.pose.position + data.xpos[body]
+    lever = max(float(np.linalg.norm(palm - data.xanchor[model.joint(elbow).id])), 0.05)
+    return [*lines, f"max_force = {torque / lever:.0f}.0   # what '{elbow}' holds on a lever of {lever:.2f} m"]
+
+
+def _home(model: mujoco.MjModel, anatomy: Anatomy, moved: list[str]) -> list[str]:
+    if not anatomy.feet:
+        return []
+    lines = ["[home]"]
+    keys = [model.key(k).name for k in range(model.nkey)]
+    standing = next((name for name in _STANDING if name in keys), keys[0] if keys and keys[0] else None)
+    lines.append("flat_soles = true")
+    if standing:
+        return [*lines, f"keyframe = {_text(standing)}"]
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    left = np.array([-anatomy.forward[1], anatomy.forward[0], 0.0])
+    for foot in anatomy.feet:
+        leg = [name for name in foot.joints if name not in anatomy.shared]
+        pitch = [name for name in leg if abs(float(left @ data.xaxis[model.joint(name).id])) > 0.72]
+        for name, angle in zip(pitch, (-_KNEE / 2, _KNEE), strict=False):
+            sign = float(np.sign(left @ data.xaxis[model.joint(name).id]))
+            lines.append(f"{_key(name)} = {_within(model, name, sign * angle):g}")
+    ahead, spread = np.array([*anatomy.forward, 0.0]), {}
+    for palm, side in zip(anatomy.palms, (1.0, -1.0), strict=False):
+        for name in palm.joints[-_ARM_JOINTS:]:
+            along = float(ahead @ data.xaxis[model.joint(name).id])
+            if name not in spread and abs(along) > 0.72:
+                spread[name] = side * float(np.sign(along)) * _SPREAD
+                break  # the shoulder's, not the wrist's
+    used = {name for foot in anatomy.feet for name in foot.joints}
+    for name in (name for name in moved if name not in used):
+        value = _within(model, name, spread.get(name, 0.0))
+        if value:
+            lines.append(f"{_key(name)} = {value:g}")
+    return lines
+
+
+def _gains(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
+    """Stiff legs, and a tenth of that elsewhere."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    base = model.body(anatomy.base).id
+    height = float(data.subtree_com[base, 2] - data.xpos[1:, 2].min())
+    stiffness = float(f"{_GAIN * 9.81 * float(model.body_subtreemass[base]) * height:.1g}")
+    lines = ["[gains]", f'"*" = [{stiffness / 10}, {_DAMPING * stiffness / 10:g}]']
+    legs = [name for foot in anatomy.feet for name in foot.joints if name not in anatomy.shared]
+    return lines + [f"{_key(name)} = [{stiffness}, {_DAMPING * stiffness:g}]" for name in legs]
+
+
+def _limits(source: ModelSource, moved: list[str]) -> list[str]:
+    lacking = [name for name in moved if name not in source.velocity]
+    if not lacking:
+        return []
+    lines = ["# rad/s, of the motors' data sheets; remove the # before each line", "# [limits.velocity]"]
+    return [*lines, *(f"# {_key(name)} =" for name in lacking)]
+
+
+def _within(model: mujoco.MjModel, name: str, value: float) -> float:
+    """A position, moved into the joint's range by a tenth of it where it is out."""
+    joint = model.joint(name).id
+    low, high = model.jnt_range[joint]
+    if not model.jnt_limited[joint] or low <= value <= high:
+        return value
+    return float(np.round(low + 0.1 * (high - low) if value < low else high - 0.1 * (high - low), 4))
+
+
+def _key(name: str) -> str:
+    bare = name.replace("_", "").replace("-", "")
+    return name if bare.isascii() and bare.isalnum() else _text(name)
+
+
+def _text(name: str) -> str:
+    escaped = name.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def _numbers(values: Iterable[float], digits: int = 5) -> str:
+    return "[" + ", ".join(repr(float(np.round(value, digits)) + 0.0) for value in values) + "]"
