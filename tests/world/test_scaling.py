@@ -46,7 +46,10 @@ def test_lengths_follow_the_legs(kind):
     np.testing.assert_allclose(small.geom_quat, usual.geom_quat, atol=1e-6)
     np.testing.assert_allclose(small.site_pos, 0.6 * usual.site_pos, atol=2e-6)
     worlds = [load_world("world.xml", mjcf=text) for text in texts]
-    assert worlds[1].timing.swing == pytest.approx(np.sqrt(0.6) * worlds[0].timing.swing, abs=1e-3)
+    if worlds[0].timing is None:
+        assert worlds[1].timing is None
+    else:
+        assert worlds[1].timing.swing == pytest.approx(np.sqrt(0.6) * worlds[0].timing.swing, abs=1e-3)
     assert worlds[1].goal.radius == pytest.approx(0.6 * worlds[0].goal.radius) and worlds[1].surfaces
 
 
