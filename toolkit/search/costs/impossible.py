@@ -110,7 +110,7 @@ class Proof:
                 break
         between = mark_between(ground.max(2) > -np.inf, stride, self._beyond)
         between = binary_dilation(between, iterations=int(np.ceil(_BESIDE / self._cell)))
-        self._levels[~between] = -np.inf
+        self._levels[np.logical_not(between)] = -np.inf
         self._rise = climb(robot) + 2 * self._merge
         self._goal = self._levels > -np.inf
         self._goal &= self._within(world.goal.position[:2], world.goal.radius + self._cell)[..., None]
