@@ -111,8 +111,7 @@ class Ground:
             PlanningError: Nothing leads to the goal.
         """
         feet, forced = start.mean_feet, self._terrain.forced_acceleration()
-        strides = [self._stride(slides=False), self._longest] if self._config.drawn else [self._stride(slides=False)]
-        slides = False
+        strides, slides = self._strides, False
         if forced > 0.0:
             projector = self._projected(1.0)
             rests: list[float] = []
@@ -126,6 +125,25 @@ class Ground:
         length = float(distance(feet.position[None], np.array([feet.yaw]))[0])
         return Way(distance, length, stride + self._projector.config.shift, slides, forced)
 
+    @property
+    def _strides(self) -> list[float]:
+        """Lengths in m of the longest steps, the usual ones first."""
+        usual = self._stride(slides=False)
+        return [usual, self._longest] if self._config.drawn else [usual]
+
+    def obstacle(self, start: Stance) -> str | None:
+        """One line on what keeps the robot from the goal; None where no proof says that something does.
+
+        `way` asks for it only where its grid finds no way.
+        """
+        return self._obstacle(start.mean_feet, self._strides)
+
+    def _obstacle(self, feet: Pose, strides: list[float]) -> str | None:
+        """See `obstacle`, for these lengths of steps."""
+        surfaces = resting_surfaces(self._world.surfaces, self._config.rest_friction)
+        longest = strides[-1] + self._projector.config.shift
+        return self._terrain.obstacle(feet, longest, strides[0], surfaces)
+
     def _distance(self, feet: Pose, strides: list[float]) -> tuple[Distance, float]:
         """Distance to the goal with the first of the longest steps in m that leads there, and that step."""
         config = self._config
@@ -134,9 +152,7 @@ class Ground:
         distance, stride = self._first(feet, strides, narrow=False)
         if distance is not None and distance.sound(feet.position):
             return distance, stride
-        longest = strides[-1] + self._projector.config.shift
-        surfaces = resting_surfaces(self._world.surfaces, config.rest_friction)
-        obstacle = self._terrain.obstacle(feet, longest, strides[0], surfaces)
+        obstacle = self._obstacle(feet, strides)
         if obstacle is None:
             if distance is None:
                 distance, stride = self._first(feet, strides, narrow=True)

@@ -20,8 +20,8 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.plane import plane_height
 from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
-from toolkit.search.costs.grid_kernels import spread
 from toolkit.search.costs.proof_kernels import (
+    collect_heights,
     disc,
     enter_heights,
     flood,
@@ -101,16 +101,17 @@ class Proof:
         self._corner, self._shape = low, np.ceil((high - low) / self._cell).astype(int) + 1
         stride = longest / self._cell + 2 * np.sqrt(2.0)
         around = np.insert(disc(stride / 2), 0, 0, axis=0)
+        half, between = float(robot.half_sizes[Limb.LEFT_FOOT].min()), None
         for self._merge in _MERGE:
-            ground = self._ground(surfaces, float(robot.half_sizes[Limb.LEFT_FOOT].min()))
-            self._levels = ground.copy()
-            spread(ground, around[1:], self._merge, self._levels)
+            ground = self._ground(surfaces, half)
+            if between is None:
+                between = mark_between(ground.max(2) > -np.inf, stride, self._beyond)
+                between = binary_dilation(between, iterations=int(np.ceil(_BESIDE / self._cell)))
+            self._levels = np.full(ground.shape, -np.inf)
+            collect_heights(ground, between, around, self._merge, self._levels)
             self._known = bool((np.stack([ground, self._levels])[..., -1] == -np.inf).all())
             if self._known:
                 break
-        between = mark_between(ground.max(2) > -np.inf, stride, self._beyond)
-        between = binary_dilation(between, iterations=int(np.ceil(_BESIDE / self._cell)))
-        self._levels[np.logical_not(between)] = -np.inf
         self._rise = climb(robot) + 2 * self._merge
         self._goal = self._levels > -np.inf
         self._goal &= self._within(world.goal.position[:2], world.goal.radius + self._cell)[..., None]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
+from scipy.ndimage import distance_transform_edt
 
 from toolkit.compiled import compiled
 from toolkit.search.costs.grid_kernels import add_level
@@ -30,6 +32,31 @@ def enter_heights(levels, i, j, z, merge):
             add_level(levels[i[k], j[k]], z[k], merge)
 
 
+@compiled(kept=True)
+def collect_heights(ground, cells, offsets, merge, levels):
+    """Enter in levels (nx, ny, L) of some cells (nx, ny) the heights of the ground (nx, ny, L) at offsets (k, 2)."""
+    nx, ny, depth = ground.shape
+    for a in range(nx):
+        for b in range(ny):
+            if not cells[a, b]:
+                continue
+            for k in range(len(offsets)):
+                i, j = a + offsets[k, 0], b + offsets[k, 1]
+                if i < 0 or j < 0 or i >= nx or j >= ny:
+                    continue
+                for m in range(depth):
+                    z = ground[i, j, m]
+                    if z == -np.inf:
+                        break
+                    known = False
+                    for n in range(depth):
+                        if known or levels[a, b, n] == -np.inf:
+                            break
+                        known = abs(levels[a, b, n] - z) < merge
+                    if not known:
+                        add_level(levels[a, b], z, merge)
+
+
 def mark_between(ground: np.ndarray, stride: float, border: np.ndarray) -> np.ndarray:
     """(nx, ny) bool; cells on the way from one foot to the other, both of them on ground (nx, ny).
 
@@ -38,19 +65,29 @@ def mark_between(ground: np.ndarray, stride: float, border: np.ndarray) -> np.nd
     """
     cells = disc(stride)
     sector = np.floor((np.arctan2(cells[:, 1], cells[:, 0]) / np.pi + 1.0) * (_SECTORS / 2)).astype(np.int64) % _SECTORS
-    between = np.zeros(ground.shape, np.bool_)
-    _mark_between(ground, cells, sector, np.hypot(*cells.T), stride, border, between)
+    between, asked = ground.copy(), np.ones(ground.shape, np.bool_)
+    if ground.any() and not border.any():  # feet stand around the cells between them, and one of them near by
+        hull = shapely.convex_hull(shapely.multipoints(np.argwhere(ground).astype(float))).buffer(2.0)
+        shapely.prepare(hull)
+        asked = shapely.contains_xy(hull, *np.indices(ground.shape))
+        asked &= distance_transform_edt(np.logical_not(ground)) <= stride / 2 + 1.0
+    _mark_between(ground, asked, cells, sector, np.hypot(*cells.T), stride, border, between)
     return between
 
 
 @compiled(kept=True)
-def _mark_between(ground, offsets, sectors, lengths, stride, border, between):
-    """See `mark_between`: fill between (nx, ny), looking at offsets (k, 2) with their sectors and lengths (k,)."""
+def _mark_between(ground, asked, offsets, sectors, lengths, stride, border, between):
+    """Fill between (nx, ny) where it is asked for, looking at offsets (k, 2) with their sectors and lengths (k,).
+
+    See `mark_between`.
+    """
     nx, ny = ground.shape
     nearest = np.empty(_SECTORS)
     for a in range(nx):
         for b in range(ny):
             between[a, b] = ground[a, b] or _leaves(a, b, nx, ny, border)
+            if not asked[a, b]:
+                continue
             nearest[:] = np.inf
             for k in range(len(offsets)):
                 if between[a, b]:
