@@ -162,6 +162,8 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
         enter("arm reach", knots[here], limb, outside)
     floor, foot = lowest_foot(p)
     enter("CoM height", np.arange(n + 1), foot, floor + p.min_height + margins.height - motion.com[:, 2])
+    if p.room is not None:
+        enter("room of the body", p.room.knot, foot[p.room.knot], p.room.excess(motion.com))
     return BodyResiduals(violation)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from toolkit.centroidal.build import initial_com
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.centroidal.sequence import SequenceConfig, optimise
+from toolkit.centroidal.surroundings import Surroundings
 from toolkit.contacts.room import RoomConfig, landing_room, moved_sequence
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
@@ -46,6 +47,7 @@ def plan_motion(
     final_rest: float,
     landing: RoomConfig | None,
     config: SequenceConfig,
+    surroundings: Surroundings | None = None,
 ) -> MotionPlan:
     """Optimise the motion of a contact sequence from rest to rest.
 
@@ -60,24 +62,31 @@ def plan_motion(
         final_rest: s at rest after the last transition.
         landing: How far feet may land from where the sequence has them; None for not at all.
         config: Settings of the optimiser.
+        surroundings: What limits where the body may be; None: nothing does.
 
     Returns:
         The plan; `motion.feasible` says whether there is a motion.
     """
     schedule = ContactSchedule.of(sequence, initial_rest=initial_rest, final_rest=final_rest)
     com, rest = initial_com(robot, sequence.start), np.zeros(3)
-    motion = optimise(robot, schedule, com, rest, config=config)
+    if surroundings is not None:
+        com[2] -= surroundings.sink(sequence.start)
+    motion = optimise(robot, schedule, com, rest, config=config, surroundings=surroundings)
     plan = MotionPlan(robot, world, sequence, schedule, motion)
     if landing is None or (motion.feasible and motion.kept is None):
         return plan
-    moved = slid(plan, landing, config)
+    moved = slid(plan, landing, config, surroundings=surroundings)
     if moved is None or not moved.motion.feasible or (motion.feasible and not keeps_margins(moved, plan)):
         return plan
     return moved
 
 
 def slid(
-    plan: MotionPlan, landing: RoomConfig, config: SequenceConfig, share: np.ndarray | None = None
+    plan: MotionPlan,
+    landing: RoomConfig,
+    config: SequenceConfig,
+    share: np.ndarray | None = None,
+    surroundings: Surroundings | None = None,
 ) -> MotionPlan | None:
     """The plan with landing points where the optimiser moves them, and the motion to it.
 
@@ -86,6 +95,7 @@ def slid(
         landing: How far feet may land from where the plan has them.
         config: Settings of the optimiser.
         share: (transitions,) part of this room that each transition's contact has; None for all of it.
+        surroundings: What limits where the body may be; None: nothing does.
 
     Returns:
         The new plan; `motion.feasible` says whether there is a motion. None where no contact has room to move.
@@ -96,7 +106,8 @@ def slid(
         room *= share[:, None, None]
     if not room.any():
         return None
-    moved = optimise(robot, schedule, problem.com, problem.com_velocity, config=config, room=room)
+    given = robot, schedule, problem.com, problem.com_velocity
+    moved = optimise(*given, config=config, room=room, surroundings=surroundings)
     sequence = moved_sequence(plan.sequence, schedule, moved.problem.times, moved.solved.position)
     return MotionPlan(robot, world, sequence, schedule.through(sequence), moved)
 

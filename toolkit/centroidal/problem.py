@@ -63,6 +63,27 @@ class Margins:
 
 
 @dataclass(frozen=True)
+class ComRoom:
+    """Where the world lets the CoM be at the knots of a motion.
+
+    Attributes:
+        sink: (N + 1,) m; by how much the CoM has to be lower than at home, 0 where it does not.
+        knot: (n,) int; knots at which a half space holds the CoM.
+        normal: (n, 3); outward unit normals of the half spaces.
+        bound: (n,) m; largest part of the CoM along the normals, in the world.
+    """
+
+    sink: np.ndarray
+    knot: np.ndarray
+    normal: np.ndarray
+    bound: np.ndarray
+
+    def excess(self, com: np.ndarray) -> np.ndarray:
+        """(n,) m; by how much a motion of the CoM (N + 1, 3) m leaves the half spaces; negative inside."""
+        return (self.normal * com[self.knot]).sum(1) - self.bound
+
+
+@dataclass(frozen=True)
 class CentroidalProblem:
     """One motion: N steps, 4 limbs (indexed by `Limb`), world frame, SI units.
 
@@ -90,6 +111,7 @@ class CentroidalProblem:
             the last knot respects its reach and, for a foot, the least height above it.
         landing_position, landing_rotation: (3,) m and (3, 3); that contact, as in `position` and `rotation`. None
             without one.
+        room: Where the world lets the CoM be; None where it does not limit it.
     """
 
     mass: float
@@ -116,6 +138,13 @@ class CentroidalProblem:
     landing_limb: int = -1
     landing_position: np.ndarray | None = None
     landing_rotation: np.ndarray | None = None
+    room: ComRoom | None = None
+
+    @property
+    def home_heights(self) -> np.ndarray:
+        """(N + 1,) m; wanted heights of the CoM above the mean of the feet: the home height, less what it must sink."""
+        sink = np.zeros(self.steps + 1) if self.room is None else self.room.sink
+        return self.final_center[2] - self.position[-1, :2, 2].mean() + (sink[-1] - sink)
 
     @property
     def steps(self) -> int:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.centroidal.body import BodyMargins, knot_contacts, lowest_foot, mean_feet, swing_ankles
-from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalProblem, Margins
+from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalProblem, ComRoom, Margins
 from toolkit.centroidal.stages.blocks import Block
 from toolkit.centroidal.stages.method import Blocks, Prices
 from toolkit.centroidal.stages.rows import (
@@ -23,6 +23,7 @@ from toolkit.centroidal.stages.rows import (
     FINAL_ROWS,
     LEG_ROWS,
     MARGINS,
+    STRETCH,
     TORQUE_ROWS,
 )
 from toolkit.centroidal.stages.steps import STATE, WRENCH, Steps
@@ -240,7 +241,7 @@ class Program:
         squares = [weight * p.mass**2 * duration for weight in momenta]
         squares = np.stack([*squares, reg.jerk / (0.2 * np.maximum(p.dt, 0.02)), reg.height * duration], 1)
         squares[0, 4] *= not np.any(p.com_velocity)  # the acceleration before a start in motion is unknown
-        height = mean_feet(p)[:, 2] + (p.final_center[2] - p.position[-1, :2, 2].mean())
+        height = mean_feet(p)[:, 2] + p.home_heights
         return Steps(
             dt=np.ascontiguousarray(p.dt, float),
             first=np.searchsorted(step, np.arange(p.steps + 1)),
@@ -395,7 +396,16 @@ class Program:
                 if largest - least >= NARROW:
                     variable = np.full((2, 1), layout.landing[item.step] + axis)
                     parts.append((np.full(2, item.step), variable, np.array([[1.0, least], [-1.0, -largest]])))
+        if self.problem.room is not None:
+            parts = [_sums(*part) for part in parts] + [self._room(self.problem.room)]
         return _joined(parts, 1)
+
+    @staticmethod
+    def _room(room: ComRoom) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Stages, variables and parameters of the half spaces that hold the CoM, but for the first, which is given."""
+        later = room.knot > 0
+        parameters = STRETCH * np.column_stack([-room.normal, -room.bound])[later]
+        return room.knot[later], np.tile(np.arange(3), (len(parameters), 1)), parameters
 
 
 def contact_block(layout: Layout, active: np.ndarray, parameters: np.ndarray) -> Block:
@@ -441,6 +451,11 @@ def _joined(parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]], rows: int) -
     stage, variables, parameters = (np.concatenate(part) for part in zip(*parts, strict=True))
     order = np.argsort(stage, kind="stable")
     return Block.of(stage[order], variables[order], parameters[order], rows)
+
+
+def _sums(stage: np.ndarray, variable: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bounds of single variables (n, 1) as bounds of sums of three, two of which count nothing."""
+    return stage, variable.repeat(3, 1), np.insert(parameters, [1, 1], 0.0, axis=1)
 
 
 def wanted_friction(problem: CentroidalProblem, step: np.ndarray, foot: int | np.ndarray) -> np.ndarray:

@@ -14,10 +14,18 @@ import numpy as np
 
 from toolkit.centroidal.body import BodyMargins, mean_feet
 from toolkit.centroidal.build import ProblemConfig, sequence_problem, transition_problem
-from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalMotion, CentroidalProblem, Margins, Weights
+from toolkit.centroidal.problem import (
+    STANDARD_GRAVITY,
+    CentroidalMotion,
+    CentroidalProblem,
+    ComRoom,
+    Margins,
+    Weights,
+)
 from toolkit.centroidal.program import Landing, Program, Regularisers, indices
 from toolkit.centroidal.stages.method import Options, Squares, Work, minimise
 from toolkit.centroidal.stages.steps import WRENCH
+from toolkit.centroidal.surroundings import Surroundings
 from toolkit.centroidal.verdict import judged
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.schedule import ContactSchedule
@@ -59,6 +67,7 @@ def optimise(
     *,
     config: SequenceConfig = SequenceConfig(),
     room: np.ndarray | None = None,
+    surroundings: Surroundings | None = None,
 ) -> CentroidalMotion:
     """Optimise the motion of a whole schedule, which ends at rest.
 
@@ -70,6 +79,7 @@ def optimise(
         config: Settings.
         room: (transitions, 2, 2) m; lowest and highest displacement of each transition's contact along its own axes,
             where feet may land elsewhere; `CentroidalMotion.landed` says where they do. None: contacts stay as planned.
+        surroundings: What limits where the CoM may be; None: nothing does.
 
     Returns:
         The motion. Feasible where NumPy confirms it within the margins that it keeps and the body's limits; else its
@@ -79,6 +89,8 @@ def optimise(
         InputError: As `sequence_problem`, or a contact is not finite.
     """
     problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem)
+    if surroundings is not None:
+        problem = _confined(problem, surroundings.room(problem))
     landings = None if room is None else _landings(problem, schedule, room)
     motion = _solved(robot, problem, config, landings)
     failure = None if motion.failure is None else _placed(motion.failure, problem, schedule)
@@ -130,6 +142,13 @@ def _solved(
     return replace(motion, iterations=iterations, seconds=time.perf_counter() - start)
 
 
+def _confined(problem: CentroidalProblem, room: ComRoom | None) -> CentroidalProblem:
+    """The problem with the room that the world leaves to the CoM, which also ends as low as it must."""
+    if room is None:
+        return problem
+    return replace(problem, room=room, final_center=problem.final_center - [0.0, 0.0, room.sink[-1]])
+
+
 def _placed(failure: Failure, problem: CentroidalProblem, schedule: ContactSchedule) -> Failure:
     """The failure with its transition, which the reason then names too."""
     if failure.knot is None or failure.time is None:
@@ -155,7 +174,8 @@ def guess(program: Program) -> np.ndarray:
     p, layout = program.problem, program.layout
     n = p.steps
     y = np.zeros((n + 1, int(layout.size.max())))
-    com = mean_feet(p) + [0.0, 0.0, p.final_center[2] - p.position[-1, :2, 2].mean()]
+    com = mean_feet(p)
+    com[:, 2] += p.home_heights
     width = max(n // 20, 3)
     padded = np.concatenate([np.repeat(p.com[None], width, 0), com, np.repeat(com[-1:], width, 0)])
     window = np.hanning(2 * width + 3)[1:-1]

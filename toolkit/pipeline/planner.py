@@ -20,6 +20,7 @@ from toolkit.prediction.networks import SLIDING, NetworkEvaluator, load_networks
 from toolkit.prediction.optimiser import OptimiserEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import Progress
+from toolkit.search.moves.body_room import BodyRoom
 from toolkit.search.moves.exclusion import Exclusion
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult
@@ -72,7 +73,9 @@ def make_planner(
     optimiser = OptimiserEvaluator(robot)
     judge = _networks(robot, optimiser) if kind == "learned" else optimiser
     at_rest = OptimiserEvaluator(robot, final_at_rest=True)
-    return ContactPlanner(robot, world, judge, config, partial(_objective, robot, world), at_rest)
+    return ContactPlanner(
+        robot, world, judge, config, partial(_objective, robot, world, BodyRoom(robot, world)), at_rest
+    )
 
 
 def _networks(robot: RobotModel, stand_in: OptimiserEvaluator) -> NetworkEvaluator:
@@ -82,9 +85,10 @@ def _networks(robot: RobotModel, stand_in: OptimiserEvaluator) -> NetworkEvaluat
     return NetworkEvaluator(load_networks(robot), stand_in, sliding)
 
 
-def _objective(robot: RobotModel, world: World, sequence: ContactSequence) -> float | Failure:
+def _objective(robot: RobotModel, world: World, surroundings: BodyRoom, sequence: ContactSequence) -> float | Failure:
     """Objective of a sequence's motion as a run plans it by default, or why there is none."""
     run = PipelineConfig()
     rests = {"initial_rest": run.initial_rest, "final_rest": run.final_rest}
-    motion = plan_motion(robot, world, sequence, **rests, landing=run.landing, config=run.sequence).motion
+    settings = {"landing": run.landing, "config": run.sequence, "surroundings": surroundings}
+    motion = plan_motion(robot, world, sequence, **rests, **settings).motion
     return motion.objective if motion.feasible else motion.failure or Failure(motion.outcome)

@@ -20,6 +20,7 @@ from toolkit.pipeline.candidate import Candidate
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.pipeline.observer import Observer
 from toolkit.robot.model import RobotModel
+from toolkit.search.moves.body_room import BodyRoom
 from toolkit.search.result import Solution
 from toolkit.wholebody.plan import WholeBodyPlan, whole_body
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
@@ -73,6 +74,7 @@ class Tester:
     def __init__(self, robot: RobotModel, world: World, config: PipelineConfig, observer: Observer):
         """Prepare for a robot in a world; the observer is told of every stage after the optimiser."""
         self._robot, self._world, self._config, self._observer = robot, world, config, observer
+        self._surroundings = BodyRoom(robot, world)
 
     @cached_property
     def _scene(self) -> mujoco.MjModel:
@@ -106,11 +108,12 @@ class Tester:
             final_rest=config.final_rest,
             landing=landing,
             config=config.sequence,
+            surroundings=self._surroundings,
         )
 
     def slide(self, plan: MotionPlan, landing: RoomConfig, share: np.ndarray) -> MotionPlan | None:
         """Move the landing points of a plan; see `toolkit.centroidal.plan.slid`."""
-        return slid(plan, landing, self._config.sequence, share)
+        return slid(plan, landing, self._config.sequence, share, self._surroundings)
 
     def test(self, candidate: Candidate) -> Trial:
         """Put a candidate through the stages after the optimiser; stop at the first that fails."""

@@ -74,7 +74,7 @@ class Nominal:
 
 def _rested(motion: CentroidalMotion) -> CentroidalMotion:
     """The same motion with a rest at its end."""
-    problem = motion.solved
+    problem, room = motion.solved, motion.solved.room
     rest = int(np.ceil(HORIZON / REST)) + 1
     step = np.append(np.arange(problem.steps), np.full(rest, problem.steps - 1))
     zero = np.zeros((rest, 3))
@@ -86,6 +86,7 @@ def _rested(motion: CentroidalMotion) -> CentroidalMotion:
         rotation=problem.rotation[step],
         friction=problem.friction[step],
         yaw=np.append(problem.yaw, np.full(rest, problem.yaw[-1])),
+        room=None if room is None else replace(room, sink=np.append(room.sink, np.full(rest, room.sink[-1]))),
     )
     return replace(
         motion,

@@ -16,7 +16,7 @@ from toolkit.errors import InputError, PlanningError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
-from toolkit.search.costs.heuristic import Distance, EuclideanDistance
+from toolkit.search.costs.heuristic import Distance, EuclideanDistance, GridDistance
 from toolkit.search.costs.terrain_distance import TerrainDistance, resting_surfaces
 from toolkit.search.moves.drawn import DrawnSteps, longest_step
 from toolkit.search.moves.moves import MoveGenerator
@@ -111,33 +111,64 @@ class Ground:
             PlanningError: Nothing leads to the goal.
         """
         feet, forced = start.mean_feet, self._terrain.forced_acceleration()
-        strides = [self._stride(slides=False), self._longest] if self._config.drawn else [self._stride(slides=False)]
-        slides = False
+        strides, slides = self._strides, False
         if forced > 0.0:
             projector = self._projected(1.0)
             rests: list[float] = []
             if projector.table.foot.any():
                 resting = self._distances(projector)
                 rests = [stride for stride in strides if resting.distance(feet, stride) is not None]
+                if not rests and resting.distance(feet, strides[-1], narrow=True) is not None:
+                    rests = strides
             slides, strides = not rests, rests or [self._stride(slides=True), *strides[1:]]
         distance, stride = self._distance(feet, strides)
         length = float(distance(feet.position[None], np.array([feet.yaw]))[0])
         return Way(distance, length, stride + self._projector.config.shift, slides, forced)
+
+    @property
+    def _strides(self) -> list[float]:
+        """Lengths in m of the longest steps, the usual ones first."""
+        usual = self._stride(slides=False)
+        return [usual, self._longest] if self._config.drawn else [usual]
+
+    def obstacle(self, start: Stance) -> str | None:
+        """One line on what keeps the robot from the goal; None where no proof says that something does.
+
+        `way` asks for it only where its grid finds no way.
+        """
+        return self._obstacle(start.mean_feet, self._strides)
+
+    def _obstacle(self, feet: Pose, strides: list[float]) -> str | None:
+        """See `obstacle`, for these lengths of steps."""
+        surfaces = resting_surfaces(self._world.surfaces, self._config.rest_friction)
+        longest = strides[-1] + self._projector.config.shift
+        return self._terrain.obstacle(feet, longest, strides[0], surfaces)
 
     def _distance(self, feet: Pose, strides: list[float]) -> tuple[Distance, float]:
         """Distance to the goal with the first of the longest steps in m that leads there, and that step."""
         config = self._config
         if config.heuristic == "euclidean":
             return EuclideanDistance(self._world.goal), strides[-1]
+        distance, stride = self._first(feet, strides, narrow=False)
+        if distance is not None and distance.sound(feet.position):
+            return distance, stride
+        obstacle = self._obstacle(feet, strides)
+        if obstacle is None:
+            if distance is None:
+                distance, stride = self._first(feet, strides, narrow=True)
+            return distance or EuclideanDistance(self._world.goal), stride
+        if config.rest_friction is not None:
+            if self._distances(self._projected(None)).distance(feet, strides[-1]) is not None:
+                raise PlanningError(self._terrain.too_steep(config.rest_friction))
+        raise PlanningError(obstacle)
+
+    def _first(self, feet: Pose, strides: list[float], *, narrow: bool) -> tuple[GridDistance | None, float]:
+        """Distance with the first of the longest steps in m with which a way leads to the goal, else None; the step."""
         for stride in strides:
-            distance = self._terrain.distance(feet, stride)
+            distance = self._terrain.distance(feet, stride, narrow=narrow)
             if distance is not None:
                 return distance, stride
-        stride = strides[-1]
-        if config.rest_friction is not None:
-            if self._distances(self._projected(None)).distance(feet, stride) is not None:
-                raise PlanningError(self._terrain.too_steep(config.rest_friction))
-        raise PlanningError(self._terrain.obstacle(feet, stride, strides[0]))
+        return None, strides[-1]
 
     def _model(self, slides: bool) -> TransitionModel:
         steps = steps_60() if self._config.steps == 60 else steps_38()

@@ -33,7 +33,7 @@ def pieces(moving: bool = False) -> dict[str, Piece]:
     """All pieces by their names; contacts are displaced by variables where `moving`. Building takes tens of ms once."""
     made = [_stage(contacts, moving) for contacts in range(1, 5)]
     made += [_contact(), leg(moving), torque(moving), _distance(moving), _height(moving), _final(moving)]
-    made += [_bound(), _price(), _fixed(STATE + 6 * moving), _fixed(3)]
+    made += [_bound(1), _bound(3), _price(), _fixed(STATE + 6 * moving), _fixed(3)]
     made += [_carry()] * moving
     return {piece.name: piece for piece in made}
 
@@ -170,11 +170,11 @@ def _price() -> Piece:
     return Piece("price", value, p.vector, rho=ca.sqrt(quadratic) * (value - wanted), linear=linear * value)
 
 
-def _bound() -> Piece:
-    """Lower bound of a variable times a factor; parameters: the factor and the bound."""
+def _bound(size: int) -> Piece:
+    """Lower bound of variables times factors; parameters: the factors and the bound."""
     p = Parameters()
-    value, factor, bound = ca.SX.sym("u"), p(), p()
-    return Piece("bound", value, p.vector, rows=factor * value - bound)
+    values, factors, bound = ca.SX.sym("u", size), p(size), p()
+    return Piece("bound" if size == 1 else f"bound{size}", values, p.vector, rows=ca.dot(factors, values) - bound)
 
 
 def _fixed(size: int) -> Piece:

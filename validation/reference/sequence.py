@@ -42,6 +42,8 @@ class Reference:
         self._equal: list[np.ndarray] = []
         p, n = program.problem, program.problem.steps
         for name, block in zip(NAMES, program.blocks, strict=True):
+            if name == "bound" and block.variables.shape[1] > 1:
+                name = f"bound{block.variables.shape[1]}"
             self._add(name, self.offset[block.stage][:, None] + block.variables, block.parameters)
         prices = program.prices
         single = (self.offset[prices.stage] + prices.variable)[:, None]

@@ -7,7 +7,7 @@ import numpy as np
 from toolkit.compiled import compiled
 from toolkit.contacts.projection_kernels import cell_of, sole_fits
 from toolkit.geometry.plane import plane_height
-from toolkit.search.moves.occupancy import body_free
+from toolkit.search.moves.occupancy import lowest_drop
 
 LEVELS = 4  # heights kept per cell
 
@@ -53,19 +53,19 @@ def sole_levels(corner, cell, half, offsets, merge, table, result):
 
 @compiled(kept=True)
 def spread(levels, disc, merge, result):
-    """Add to a copy of the heights (nx, ny, 4) of each cell those of the cells around it, the nearest first."""
+    """Add to a copy of the heights (nx, ny, L) of each cell those of the cells around it, the nearest first."""
     for a in range(levels.shape[0]):
         for b in range(levels.shape[1]):
             for k in range(len(disc)):
                 i, j = a + disc[k, 0], b + disc[k, 1]
                 if i < 0 or j < 0 or i >= levels.shape[0] or j >= levels.shape[1]:
                     continue
-                for m in range(LEVELS):
+                for m in range(levels.shape[2]):
                     z = levels[i, j, m]
                     if z == -np.inf:
                         break
                     new = True
-                    for n in range(LEVELS):
+                    for n in range(levels.shape[2]):
                         new &= not abs(result[a, b, n] - z) < merge
                     if new:
                         add_level(result[a, b], z, merge)
@@ -73,8 +73,11 @@ def spread(levels, disc, merge, result):
 
 
 @compiled(kept=True)
-def number_nodes(levels, corner, cell, occupancy, box, nodes):
-    """Number the cells in which the body fits, in nodes (nx, ny, 4, yaws), and return their number."""
+def number_nodes(levels, corner, cell, occupancy, body, nodes, low):
+    """Number the cells in which the body fits, in nodes (nx, ny, 4, yaws), and return their number.
+
+    Fills low, of the same shape: whether the body fits there only with a lowered CoM. See `GridBody`.
+    """
     count = 0
     yaws = nodes.shape[3]
     for a in range(levels.shape[0]):
@@ -85,14 +88,16 @@ def number_nodes(levels, corner, cell, occupancy, box, nodes):
                     break
                 x, y = corner[0] + a * cell, corner[1] + b * cell
                 for k in range(yaws):
-                    if body_free(occupancy, box, x, y, z, k * np.pi / yaws):
+                    drop = lowest_drop(occupancy, body.box, body.drops, x, y, z, k * np.pi / yaws)
+                    if drop >= 0:
                         nodes[a, b, m, k] = count
+                        low[a, b, m, k] = drop > 0
                         count += 1
     return count
 
 
 @compiled(kept=True)
-def link_nodes(nodes, levels, cell, climb, turn, start, end, weight):
+def link_nodes(nodes, low, levels, cell, climb, body, start, end, weight):
     """Compressed rows of the grid graph, whose edges all go both ways.
 
     Fills start (count + 1,) and returns the number of edges; fills their ends and lengths where there is room for them.
@@ -111,8 +116,9 @@ def link_nodes(nodes, levels, cell, climb, turn, start, end, weight):
                         other = nodes[a, b, m, (k + step) % yaws]
                         if other >= 0 and other != node:
                             if write:
-                                end[used], weight[used] = other, turn
+                                end[used], weight[used] = other, body.turn
                             used += 1
+                    c, s = np.cos(k * np.pi / yaws), np.sin(k * np.pi / yaws)
                     for i in range(max(a - 1, 0), min(a + 2, nodes.shape[0])):
                         for j in range(max(b - 1, 0), min(b + 2, nodes.shape[1])):
                             if i == a and j == b:
@@ -121,8 +127,11 @@ def link_nodes(nodes, levels, cell, climb, turn, start, end, weight):
                                 other = nodes[i, j, n, k]
                                 if other >= 0 and abs(levels[i, j, n] - levels[a, b, m]) <= climb:
                                     if write:
+                                        length = cell * np.sqrt(float((i - a) ** 2 + (j - b) ** 2))
+                                        across = abs(c * (j - b) - s * (i - a)) * cell
+                                        bent = low[a, b, m, k] or low[i, j, n, k]
                                         end[used] = other
-                                        weight[used] = cell * np.sqrt(float((i - a) ** 2 + (j - b) ** 2))
+                                        weight[used] = length + body.sideways * across + body.bent * length * bent
                                     used += 1
                     start[node + 1] = used
     return used

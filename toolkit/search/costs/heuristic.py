@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,14 +18,12 @@ from toolkit.contacts.projection import Projector
 from toolkit.contacts.surface_table import SurfaceTable
 from toolkit.geometry.limb import Limb
 from toolkit.search.costs.grid_kernels import LEVELS, add_level, link_nodes, number_nodes, query, sole_levels, spread
+from toolkit.search.costs.proof_kernels import disc, flood, mark_between, mark_stances
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.world import Goal
 
-_CELL = 0.1  # m; larger where the world would need more than _MAX_CELLS
-_MAX_CELLS = 200_000  # cells in XY
-_YAWS = 8  # layers over half a turn (the box is the same both ways)
+_MAX_NODES = 1_600_000  # cells in XY times layers of yaw; cells are larger where the world would need more
 _MERGE = 0.3  # m; heights in one cell that differ by less are one
-_TURN = 1e-4  # m; cost of one yaw layer, only there to prefer straight ways
 _OCTILE = 1.0 / 1.0823923  # largest ratio of 8-connected to straight distance, inverted: keeps the estimate low
 
 
@@ -43,6 +42,37 @@ class EuclideanDistance:
         return np.maximum(np.hypot(*(position[:, :2] - self.goal.position[:2]).T) - self.goal.radius, 0.0)
 
 
+class GridBody(NamedTuple):
+    """The body that moves over a grid, and what makes its way longer.
+
+    Attributes:
+        box: The body, standing straight.
+        drops: (k,) m; rising heights by which the CoM may be lower.
+        turn: Cost in m of one layer of yaw.
+        sideways: Length that is added to a m of way across the heading.
+        bent: Length that is added to a m of way with a lowered CoM.
+    """
+
+    box: BodyBox
+    drops: np.ndarray
+    turn: float
+    sideways: float
+    bent: float
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """How fine a grid is.
+
+    Attributes:
+        cell: Edge of a cell in m.
+        yaws: Layers of yaw over half a turn; a box is the same both ways.
+    """
+
+    cell: float
+    yaws: int
+
+
 class GridDistance:
     """Distance to the goal on a grid with bounds (xmin, ymin, xmax, ymax) m, with steps of at most `stride` m.
 
@@ -56,7 +86,8 @@ class GridDistance:
         self,
         projector: Projector,
         occupancy: Occupancy,
-        box: BodyBox,
+        body: GridBody,
+        mesh: Mesh,
         goal: Goal,
         bounds: tuple[float, float, float, float],
         stride: float,
@@ -65,13 +96,16 @@ class GridDistance:
     ):
         self._goal = goal
         extent = np.array(bounds[2:]) - bounds[:2]
-        self._cell = cell = max(_CELL, float(np.sqrt(extent.prod() / _MAX_CELLS)))
+        self._cell = cell = max(mesh.cell, float(np.sqrt(extent.prod() * mesh.yaws / _MAX_NODES)))
         shape = np.ceil(extent / cell).astype(np.int64) + 1
         self._corner = np.array(bounds[:2], float)
-        levels = self._levels(projector, footholds, shape, stride)
-        self._height = levels
-        nodes = np.full((*levels.shape, _YAWS), -1, np.int32)
-        count = number_nodes(levels, self._corner, cell, occupancy, box, nodes)
+        self._soles = self._grounds(projector, footholds, shape)
+        levels, around = self._soles.copy(), disc(stride / 2 / cell)
+        spread(self._soles, around, _MERGE, levels)
+        self._height, self._stride, self._climb = levels, stride, climb
+        nodes = np.full((*levels.shape, mesh.yaws), -1, np.int32)
+        low = np.zeros(nodes.shape, np.bool_)
+        count = number_nodes(levels, self._corner, cell, occupancy, body, nodes, low)
         self._distance = np.full(nodes.shape, np.inf, np.float64)
         middle = self._corner + cell * np.stack(np.meshgrid(*(np.arange(k) for k in shape), indexing="ij"), axis=-1)
         inside = np.hypot(*(middle - goal.position[:2]).transpose(2, 0, 1)) <= max(goal.radius, 0.75 * cell)
@@ -80,7 +114,7 @@ class GridDistance:
         self.supported = bool((levels[inside] > -np.inf).any())
         if len(targets):
             start, none = np.zeros(count + 1, np.int32), np.zeros(0)
-            grid = (nodes, levels, cell, climb, _TURN, start)
+            grid = (nodes, low, levels, cell, climb, body, start)
             edges = link_nodes(*grid, none.astype(np.int32), none)
             end, weight = np.empty(edges, np.int32), np.empty(edges)
             link_nodes(*grid, end, weight)
@@ -91,13 +125,12 @@ class GridDistance:
             distance = dijkstra(graph, directed=True, indices=targets, min_only=True)
             self._distance[nodes >= 0] = distance[nodes[nodes >= 0]]
 
-    def _levels(self, projector: Projector, footholds: Footholds, shape: np.ndarray, stride: float) -> np.ndarray:
-        """(nx, ny, 4) float heights of ground in reach of each cell, -inf where there is none."""
-        cell = self._cell
+    def _grounds(self, projector: Projector, footholds: Footholds, shape: np.ndarray) -> np.ndarray:
+        """(nx, ny, 4) float heights of ground in each cell, -inf where there is none."""
         low = np.full((*shape, LEVELS), -np.inf)
         sole_levels(
             self._corner,
-            cell,
+            self._cell,
             projector.half_sizes[Limb.LEFT_FOOT],
             np.ascontiguousarray(projector.offsets),
             _MERGE,
@@ -105,13 +138,23 @@ class GridDistance:
             low,
         )
         self._add_footholds(projector.table, footholds, low)
-        reach = stride / 2 / cell
-        k = int(np.floor(reach))
-        disc = [(i, j) for i in range(-k, k + 1) for j in range(-k, k + 1) if 0 < i * i + j * j <= reach**2]
-        disc.sort(key=lambda ij: (ij[0] ** 2 + ij[1] ** 2, ij))
-        levels = low.copy()
-        spread(low, np.array(disc, np.int64).reshape(-1, 2), _MERGE, levels)
-        return levels
+        return low
+
+    def sound(self, place: np.ndarray) -> bool:
+        """Whether a way leads to the goal from a place (3,) m with the body always between the feet.
+
+        The grid itself only knows that there is ground near the body, such as beside the end of a wall.
+        """
+        ground, none = self._soles.max(2) > -np.inf, np.zeros(4, np.bool_)
+        reach = self._stride / self._cell
+        between = mark_between(ground, reach + 1.0, none)
+        reached = self._distance.min(3) == 0.0
+        free = np.isfinite(self._distance).any(3) & between[..., None]
+        reached &= free
+        mark_stances(self._height, self._soles, np.insert(disc(reach / 2), 0, 0, axis=0), self._climb, _MERGE, reached)
+        flood(self._height, free, self._climb, none, reached)
+        i, j = np.clip(np.round((place[:2] - self._corner) / self._cell).astype(int), 1, np.array(ground.shape) - 2)
+        return bool(reached[i - 1 : i + 2, j - 1 : j + 2].any())
 
     def _add_footholds(self, table: SurfaceTable, footholds: Footholds, levels: np.ndarray) -> None:
         """Add the heights of surfaces that no sole of the grid met, but others fit on: stones, beams."""

@@ -12,13 +12,22 @@ from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projector
 from toolkit.geometry.pose import Pose, steepness
 from toolkit.robot.model import RobotModel
-from toolkit.search.costs.heuristic import GridDistance
-from toolkit.search.moves.limits import climb
+from toolkit.search.costs.heuristic import GridBody, GridDistance, Mesh
+from toolkit.search.costs.impossible import Proof
+from toolkit.search.moves.limits import climb, drops
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.surface import Surface
 from toolkit.world.world import World
 
 _DETOURS = (2.0, 8.0)  # m around start and goal that the grid covers; the larger where the smaller has no way
+_BENT = 0.3  # m by which a m of way with bent knees seems longer
+_TURN = 1e-4  # m; cost of one layer of yaw, only there to prefer straight ways
+_WIDE, _CELL = Mesh(cell=0.1, yaws=8), 0.05  # and the edge in m of the cells that a body may hit
+# Where no way is wide enough for these: narrow places that bodies pass sideways. A quarter turn takes about six steps,
+# and steps to the side lead half as far as others. Cells count as occupied that are only touched, so the body loses
+# what that adds.
+_NARROW, _FINE = Mesh(cell=0.05, yaws=24), 0.025
+_QUARTER, _SIDEWAYS, _TOUCHED = 1.0, 1.0, 0.04  # m of a quarter turn, m added to a m of way to the side, m
 
 
 def resting_surfaces(surfaces: Sequence[Surface], friction: float | None) -> tuple[Surface, ...]:
@@ -42,12 +51,13 @@ class TerrainDistance:
 
     Attributes:
         box: The body.
-        occupancy: Cells that the body can hit, around start and goal.
+        occupancy: Cells that the body can hit, around start and goal; finer where the way is narrow.
     """
 
     def __init__(self, robot: RobotModel, world: World, projector: Projector, footholds: Footholds):
-        self._world, self._projector, self._footholds, self._climb = world, projector, footholds, climb(robot)
-        self.box = BodyBox.of(robot)
+        self._robot, self._world, self._projector, self._footholds = robot, world, projector, footholds
+        self._climb = climb(robot)
+        self.box, self._drops = BodyBox.of(robot), drops(robot)
         table = projector.table
         first, last = table.edge_start[:-1], table.edge_start[1:]
         owner = np.repeat(np.arange(len(first)), last - first)
@@ -56,8 +66,8 @@ class TerrainDistance:
         upper = np.maximum.reduceat(points, first)[table.foot]
         self._ground = lower, upper  # corners of the boxes around foot surfaces
         self._bounds = [self._around(detour) for detour in _DETOURS]
-        self.occupancy = self._occupy(self._bounds[0])
-        self._detour = 0
+        self._detour, self._cell = 0, _CELL
+        self.occupancy = self._occupy(self._bounds[0], _CELL)
 
     def _around(self, detour: float) -> tuple[float, float, float, float]:
         """Bounds in XY around start and goal, no larger than the ground."""
@@ -67,51 +77,87 @@ class TerrainDistance:
         high = np.minimum(ends.max(0) + detour, np.maximum(upper[:, :2].max(0), ends.max(0)) + 0.3)
         return (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
 
-    def _occupy(self, bounds: tuple[float, float, float, float]) -> Occupancy:
+    def _occupy(self, bounds: tuple[float, float, float, float], cell: float) -> Occupancy:
         low, high = np.array(bounds[:2]) - 0.5, np.array(bounds[2:]) + 0.5
         lower, upper = self._ground
         near = (upper[:, :2] >= low).all(1) & (lower[:, :2] <= high).all(1)
         heights = np.append(np.concatenate([lower[near, 2], upper[near, 2]]), self._world.start.position[2])
         bottom, top = heights.min() + self.box.bottom - 0.3, heights.max() + self.box.top + 0.3
-        return Occupancy.of(self._world.mujoco_model, np.array([*low, bottom]), np.array([*high, top]))
+        return Occupancy.of(self._world.mujoco_model, np.array([*low, bottom]), np.array([*high, top]), cell)
 
-    def distance(self, start: Pose, stride: float) -> GridDistance | None:
-        """Distance to the goal with steps of at most `stride` m; None where no way leads there from `start`."""
-        for detour in range(self._detour, len(_DETOURS)):
+    def distance(self, start: Pose, stride: float, *, narrow: bool = False) -> GridDistance | None:
+        """Distance to the goal with steps of at most `stride` m; None where no way leads there from `start`.
+
+        Where narrow places count, the grid is finer and knows that they are passed sideways.
+        """
+        cell = _FINE if narrow else _CELL
+        for detour in range(0 if narrow else self._detour, len(_DETOURS)):
             if detour > 0 and self._bounds[detour] == self._bounds[detour - 1]:
                 continue
-            if detour > self._detour:
-                self.occupancy, self._detour = self._occupy(self._bounds[detour]), detour
-            grid = self._grid(self.occupancy, stride)
+            if (detour, cell) != (self._detour, self._cell):
+                self.occupancy = self._occupy(self._bounds[detour], cell)
+                self._detour, self._cell = detour, cell
+            grid = self._narrow(stride) if narrow else self._grid(self.occupancy, stride)
             if np.isfinite(self._at(grid, start)):
                 return grid
         return None
 
     def _grid(self, occupancy: Occupancy, stride: float) -> GridDistance:
-        bounds = self._bounds[self._detour]
-        goal = self._world.goal
-        return GridDistance(self._projector, occupancy, self.box, goal, bounds, stride, self._climb, self._footholds)
+        body = GridBody(self.box, self._drops, _TURN, 0.0, _BENT)
+        return self._distance(occupancy, body, _WIDE, stride)
+
+    def _narrow(self, stride: float) -> GridDistance:
+        box = self.box._replace(half_depth=self.box.half_depth - _TOUCHED, half_width=self.box.half_width - _TOUCHED)
+        body = GridBody(box, self._drops, 2 * _QUARTER / _NARROW.yaws, _SIDEWAYS, _BENT)
+        return self._distance(self.occupancy, body, _NARROW, stride)
+
+    def _distance(self, occupancy: Occupancy, body: GridBody, mesh: Mesh, stride: float) -> GridDistance:
+        bounds, goal = self._bounds[self._detour], self._world.goal
+        return GridDistance(self._projector, occupancy, body, mesh, goal, bounds, stride, self._climb, self._footholds)
 
     @staticmethod
     def _at(grid: GridDistance, start: Pose) -> float:
         return float(grid(start.position[None], np.array([start.yaw]))[0])
 
-    def obstacle(self, start: Pose, stride: float, usual: float) -> str:
-        """One line on what blocks the way to the goal with steps of at most `stride` m; `usual` ones are shorter."""
-        world = self._world
-        x, y = world.goal.position[:2]
-        head = f"{world.path}: nothing leads to the goal at ({x:.3g}, {y:.3g})"
-        grid = self._grid(self.occupancy, stride)
-        if not grid.supported:
+    def obstacle(self, start: Pose, longest: float, usual: float, surfaces: Sequence[Surface]) -> str | None:
+        """One line on what keeps the robot from the goal; None where no proof says that something does.
+
+        Steps are at most `longest` m long and lead over the surfaces alone; `usual` ones are shorter.
+        """
+        found = self._proof(start, longest, surfaces)
+        if found is None:
+            return None
+        if found[0] == "body":  # where usual steps do not even lead there, it is the ground
+            plain = self._proof(start, usual, surfaces)
+            found = found if plain is None else plain
+        what, (x, y) = found
+        goal = self._world.goal.position
+        head = f"{self._world.path}: nothing leads to the goal at ({goal[0]:.3g}, {goal[1]:.3g})"
+        if what == "goal":
             return f"{head}: no surface within its radius holds a sole; move the goal onto walkable ground"
-        open_air = Occupancy(self.occupancy.corner, self.occupancy.cell, np.zeros_like(self.occupancy.below))
-        if np.isfinite(self._at(self._grid(open_air, usual), start)):
-            room = f"{2 * self.box.half_width:.2g} m wide and {self.box.top:.2g} m high"
-            return f"{head}: walls or a ceiling leave no room for the body ({room}) on any way; make more room"
+        place = f"near ({x:.3g}, {y:.3g})"
+        if what == "body":
+            deep, high = 2 * self.box.half_depth, self.box.top - self._drops[-1]
+            room = f"{deep:.2g} m wide even sideways, {high:.2g} m high crouched"
+            return f"{head}: walls or a ceiling leave no room for the body ({room}) {place}; make more room there"
         return (
-            f"{head}: the ground is interrupted by a gap wider than the longest step ({stride:.2g} m) or a rise higher "
-            f"than {self._climb:.2g} m; bring the surfaces closer together"
+            f"{head}: the ground is interrupted {place} by a gap wider than the longest step ({longest:.2g} m) or a "
+            f"rise higher than {self._climb:.2g} m; bring the surfaces closer together"
         )
+
+    def _proof(self, start: Pose, longest: float, surfaces: Sequence[Surface]) -> tuple[str, np.ndarray] | None:
+        """What keeps the robot from the goal, and where; see `Proof.place`."""
+        found = None
+        for bounds in dict.fromkeys(self._bounds):
+            if found is None:
+                beyond = self._beyond(bounds)
+                found = Proof(self._robot, self._world, surfaces, bounds, beyond, longest).place(start)
+        return found
+
+    def _beyond(self, bounds: tuple[float, float, float, float]) -> tuple[bool, bool, bool, bool]:
+        """Whether ground goes on beyond bounds, at low x, high x, low y and high y."""
+        low, high = self._ground[0].min(0), self._ground[1].max(0)
+        return bool(low[0] < bounds[0]), bool(high[0] > bounds[2]), bool(low[1] < bounds[1]), bool(high[1] > bounds[3])
 
     def too_steep(self, friction: float) -> str:
         """One line on the ground that is too steep for a robot whose feet must rest."""

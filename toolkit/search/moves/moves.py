@@ -23,7 +23,16 @@ from toolkit.search.moves.legs import legs_of, stances_violated
 from toolkit.search.moves.limits import MARGINS, climb, drops
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.search.moves.reasons import Reason
-from toolkit.search.moves.screen import Body, Sole, Soles, StepLimits, screen_palms, screen_steps, screen_swings
+from toolkit.search.moves.screen import (
+    Body,
+    Sole,
+    Soles,
+    StepLimits,
+    screen_midway,
+    screen_palms,
+    screen_steps,
+    screen_swings,
+)
 from toolkit.search.moves.shanks import shanks_of
 from toolkit.search.states.contact_table import ContactTable
 
@@ -140,10 +149,11 @@ class MoveGenerator:
         return Sole(table.position[number], table.rotation[number], float(table.yaw[number]))
 
     def swings(self, limb: Limb, numbers: np.ndarray, old: int, standing: int, longest: float) -> np.ndarray:
-        """Codes (n,) of the ways of a foot from `old` to each new place; see `screen_swings`."""
+        """Codes (n,) of the ways of a foot from `old` to each new place; see `screen_swings` and `screen_midway`."""
         table, codes = self.table, np.empty(len(numbers), np.int64)
         places, feet = (table.position[numbers], table.yaw[numbers]), (self._sole(old), self._sole(standing))
         screen_swings(*places, *feet, self._limits.half, longest, _STILL, _STILL_YAW, codes)
+        screen_midway(*places, *feet, self._limits, self._body, codes)
         return codes
 
     def palms(self, limb: Limb, left: int, right: int) -> Moves:

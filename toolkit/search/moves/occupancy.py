@@ -14,7 +14,8 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.moves.obstacles import world_triangles
 
 _MAX_CELLS = 20_000_000
-_MARGIN = 0.02  # m around the body
+MARGIN = 0.02
+"""m around the body."""
 
 
 class BodyBox(NamedTuple):
@@ -62,7 +63,7 @@ class BodyBox(NamedTuple):
         width = max(-low[1], high[1])
         for limb, arm in robot.arms.items():
             width = max(width, abs(arm.shoulder_in_com[1]) + 1.5 * float(robot.half_sizes[limb].min()))
-        return cls(max(-low[0], high[0]) + _MARGIN, width + _MARGIN, bottom, float(high[2]) + _MARGIN)
+        return cls(max(-low[0], high[0]) + MARGIN, width + MARGIN, bottom, float(high[2]) + MARGIN)
 
 
 def _arm_bodies(robot: RobotModel) -> set[int]:
@@ -114,12 +115,15 @@ class Occupancy(NamedTuple):
 
 
 @compiled
-def body_free(occupancy, box, x, y, z, yaw):
-    """Whether a `BodyBox` over a place between the soles meets no occupied cell; outside the grid all is free."""
+def body_free(occupancy, box, x, y, z, yaw, drop=0.0):
+    """Whether a `BodyBox` over a place between the soles meets no occupied cell; outside the grid all is free.
+
+    The top of the box may be lower by a drop of the CoM in m.
+    """
     corner, cell, below = occupancy.corner, occupancy.cell, occupancy.below
     depth, width = box.half_depth, box.half_width
     first = min(max(int(np.floor((z + box.bottom - corner[2]) / cell)), 0), below.shape[2] - 1)
-    last = min(max(int(np.ceil((z + box.top - corner[2]) / cell)), 0), below.shape[2] - 1)
+    last = min(max(int(np.ceil((z + box.top - drop - corner[2]) / cell)), 0), below.shape[2] - 1)
     if last <= first:
         return True
     c, s = np.cos(yaw), np.sin(yaw)
@@ -134,6 +138,15 @@ def body_free(occupancy, box, x, y, z, yaw):
             if abs(c * dx + s * dy) <= depth and abs(-s * dx + c * dy) <= width:
                 return False
     return True
+
+
+@compiled
+def lowest_drop(occupancy, box, drops, x, y, z, yaw):
+    """Number of the first of the rising drops (k,) m of the CoM with which the body is free; -1 where there is none."""
+    for k in range(len(drops)):
+        if body_free(occupancy, box, x, y, z, yaw, drops[k]):
+            return k
+    return -1
 
 
 @compiled

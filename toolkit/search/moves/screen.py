@@ -12,7 +12,7 @@ import numpy as np
 from toolkit.compiled import compiled
 from toolkit.geometry.heading import mean_heading, wrapped
 from toolkit.search.moves.legs import Legs, reach
-from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
+from toolkit.search.moves.occupancy import BodyBox, Occupancy, lowest_drop
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.shanks import leg_free, legs_apart
 
@@ -49,7 +49,7 @@ class Body(NamedTuple):
     Attributes:
         legs: Both legs.
         shanks: (2,) m; radius of the capsules inside thighs and shins.
-        box: The body from the knees up.
+        box: The body from the knees up, standing straight.
         occupancy: Occupied cells of the world.
     """
 
@@ -88,21 +88,24 @@ def rectangles_overlap(ax, ay, ayaw, bx, by, byaw, hx, hy):
 
 
 @compiled
-def _legs_code(body, limits, side, position, rotation, stand, heading):
-    """Why the legs cannot stand on a new sole and a standing one with any allowed CoM; 0 where they can."""
+def _legs_code(body, limits, least, side, position, rotation, stand, heading):
+    """Why the legs cannot stand on a new sole and a standing one with any allowed CoM; 0 where they can.
+
+    Of the drops of the CoM only those from number `least` on are allowed.
+    """
     p, q = position, stand.position
     x, y, z = (p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2 + limits.com_height
     code = 0
     for m in range(len(_SHIFTS)):
         cx, cy = x + _SHIFTS[m] * (p[0] - q[0]), y + _SHIFTS[m] * (p[1] - q[1])
-        for k in range(len(limits.drops)):
+        for k in range(least, len(limits.drops)):
             com = (cx, cy, z - limits.drops[k])
             broken, new = reach(body.legs, side, com, heading, p, rotation)
             old = new
             if broken == 0:
                 broken, old = reach(body.legs, 1 - side, com, heading, q, stand.rotation)
             if broken > 0:
-                if m == 0 and k == 0:
+                if m == 0 and k == least:
                     code = broken
             elif not legs_apart(body.shanks, new, old):
                 code = Reason.KNEES
@@ -129,12 +132,15 @@ def screen_steps(soles, side, stand, limits, body, codes):
         elif abs(p[2] - q[2]) > limits.climb:
             codes[row] = Reason.HIGH
         else:
-            heading = mean_heading(yaw, stand.yaw)
-            codes[row] = _legs_code(body, limits, side, p, soles.rotation[row], stand, heading)
+            heading, rotation = mean_heading(yaw, stand.yaw), soles.rotation[row]
+            codes[row] = _legs_code(body, limits, 0, side, p, rotation, stand, heading)
             if codes[row] == 0:
                 x, y, z = (p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2
-                if not body_free(body.occupancy, body.box, x, y, z, heading):
+                least = lowest_drop(body.occupancy, body.box, limits.drops, x, y, z, heading)
+                if least < 0:
                     codes[row] = Reason.BODY
+                elif least > 0:
+                    codes[row] = _legs_code(body, limits, least, side, p, rotation, stand, heading)
 
 
 @compiled(kept=True)
@@ -161,6 +167,20 @@ def screen_swings(position, yaw, old, stand, half, longest, still, still_yaw, co
                 if rectangles_overlap(x, y, angle, q[0], q[1], stand.yaw, half[0], half[1]):
                     codes[row] = Reason.CROSSES
                     break
+
+
+@compiled(kept=True)
+def screen_midway(position, yaw, old, stand, limits, body, codes):
+    """Fill codes (n,) int of those swings that have passed `screen_swings`: is the body free half-way?"""
+    p, r = old.position, stand.position
+    before = mean_heading(old.yaw, stand.yaw)
+    for row in range(len(yaw)):
+        if codes[row] == 0:
+            q = position[row]
+            x, y, z = (p[0] + q[0] + 2 * r[0]) / 4, (p[1] + q[1] + 2 * r[1]) / 4, (p[2] + q[2] + 2 * r[2]) / 4
+            heading = before + wrapped(mean_heading(yaw[row], stand.yaw) - before) / 2
+            if lowest_drop(body.occupancy, body.box, limits.drops, x, y, z, heading) < 0:
+                codes[row] = Reason.BODY
 
 
 def screen_palms(

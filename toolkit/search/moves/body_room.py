@@ -1,0 +1,225 @@
+"""BodyRoom: where the world lets the CoM be along a motion: below ceilings, and between walls that are near."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from toolkit.centroidal.problem import CentroidalProblem, ComRoom
+from toolkit.compiled import compiled
+from toolkit.contacts.stance import Stance
+from toolkit.geometry.limb import FEET
+from toolkit.robot.model import RobotModel
+from toolkit.search.moves.legs import Legs, legs_of, reach
+from toolkit.search.moves.limits import MARGINS, drops
+from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
+from toolkit.search.moves.shanks import leg_free, shanks_of
+from toolkit.world.world import World
+
+_CELL = 0.025  # m; edge of the cells
+_AROUND = 1.0  # m around the feet that are looked at
+_AHEAD, _ASIDE = 0.12, 0.05  # m; the CoM may be so far from the middle of the feet when it meets a ceiling
+_FAR, _STEP, _LEAST = 0.12, 0.01, 0.015  # m; walls farther away do not matter; spacing of tries; room that is left
+
+
+class _Walker(NamedTuple):
+    """The robot as the kernels see it.
+
+    Attributes:
+        legs, shanks, box: See `toolkit.search.moves.screen.Body`.
+        com_height: m; height of the CoM above the soles at home.
+        deepest: m; the most that the CoM sinks.
+    """
+
+    legs: Legs
+    shanks: np.ndarray
+    box: BodyBox
+    com_height: float
+    deepest: float
+
+
+class BodyRoom:
+    """The room of one robot's body in one world; see `toolkit.centroidal.surroundings.Surroundings`.
+
+    The body is an upright box over the middle of the feet. Its top sinks with the CoM. Where walls before and behind it
+    are near, as for a robot that passes a slot sideways, knees and thighs count as well.
+    """
+
+    def __init__(self, robot: RobotModel, world: World):
+        self._world = world
+        box = BodyBox.of(robot)
+        self._walker = _Walker(
+            legs_of(robot, MARGINS), shanks_of(robot), box, robot.com_height, float(drops(robot)[-1])
+        )
+        self._occupancy: Occupancy | None = None
+        self._bounds = np.zeros((2, 3))  # of the occupancy
+
+    def sink(self, stance: Stance) -> float:
+        """See `Surroundings`."""
+        feet = stance.mean_feet
+        place, yaw = feet.position[None], np.array([feet.yaw])
+        sink, occupancy = np.zeros(1), self._around(place)
+        if occupancy is not None:
+            _fill_sinks(occupancy, self._walker, place, yaw, sink)
+        return float(sink[0])
+
+    def room(self, problem: CentroidalProblem) -> ComRoom | None:
+        """See `Surroundings`."""
+        feet = _feet(problem)
+        places, yaw = feet.mean(1), np.ascontiguousarray(problem.yaw)
+        occupancy = self._around(places)
+        if occupancy is None:
+            return None
+        sink, reach = np.zeros(len(places)), np.full((len(places), 2), np.inf)
+        _fill_sinks(occupancy, self._walker, places, yaw, sink)
+        on = np.pad(problem.active[:, : len(FEET)], ((1, 1), (0, 0)))
+        standing = on[:-1] | on[1:]
+        later = np.minimum(np.arange(len(places)), problem.steps - 1)
+        turns = np.ascontiguousarray(problem.rotation[later][:, : len(FEET)])
+        _fill_reach(occupancy, self._walker, places, yaw, sink, feet, turns, standing, reach)
+        low, near = np.flatnonzero(sink > 0.0), np.isfinite(reach)
+        if not (len(low) or near.any()):
+            return None
+        up = np.tile([0.0, 0.0, 1.0], (len(low), 1))
+        knots, normals = [low], [up]
+        bounds = [places[low, 2] + self._walker.com_height - sink[low]]
+        for side, sign in enumerate((1.0, -1.0)):
+            at = np.flatnonzero(near[:, side])
+            normal = sign * np.column_stack([np.cos(yaw[at]), np.sin(yaw[at]), np.zeros(len(at))])
+            knots.append(at)
+            normals.append(normal)
+            bounds.append((normal * places[at]).sum(1) + reach[at, side])
+        return ComRoom(sink, np.concatenate(knots), np.concatenate(normals), np.concatenate(bounds))
+
+    def _around(self, places: np.ndarray) -> Occupancy | None:
+        """Cells around places (n, 3) m; None where nothing is there at the height of the body."""
+        box = self._walker.box
+        low, high = places.min(0) + [-_AROUND, -_AROUND, box.bottom], places.max(0) + [_AROUND, _AROUND, box.top]
+        occupancy = self._occupancy
+        if occupancy is None or (low < self._bounds[0]).any() or (high > self._bounds[1]).any():
+            if occupancy is not None:
+                low, high = np.minimum(low, self._bounds[0]), np.maximum(high, self._bounds[1])
+            self._bounds = np.stack([low - _AROUND, high + _AROUND])
+            occupancy = self._occupancy = Occupancy.of(self._world.mujoco_model, *self._bounds, cell=_CELL)
+        first, last = (np.floor((end - occupancy.corner) / occupancy.cell).astype(int) for end in (low, high))
+        near = occupancy.below[first[0] : last[0] + 1, first[1] : last[1] + 1]
+        return occupancy if (near[:, :, last[2] + 1] > near[:, :, first[2]]).any() else None
+
+
+def _feet(problem: CentroidalProblem) -> np.ndarray:
+    """(N + 1, 2, 3) m; places of the feet at the knots, on the line between two contacts while they are in the air."""
+    times, knots = problem.times, np.arange(problem.steps + 1)
+    feet = np.empty((len(knots), len(FEET), 3))
+    for foot in FEET:
+        on = problem.active[:, foot]
+        held = np.flatnonzero(np.append(on, False) | np.append(False, on))
+        step = np.where(np.append(on, False)[held], held, held - 1)
+        for axis in range(3):
+            feet[:, foot, axis] = np.interp(times, times[held], problem.position[step, foot, axis])
+    return feet
+
+
+@compiled(kept=True)
+def _fill_sinks(occupancy, walker, places, yaw, sink):
+    """Fill sink (n,) m: by how much the CoM over places (n, 3) m with headings (n,) rad is lowered below ceilings.
+
+    Columns that are occupied below the top of the lowest body are walls, of which ceilings know nothing.
+    """
+    corner, cell, below, box = occupancy.corner, occupancy.cell, occupancy.below, walker.box
+    depth, width = box.half_depth + _AHEAD, box.half_width + _ASIDE
+    for row in range(len(yaw)):
+        x, y, z = places[row]
+        c, s = np.cos(yaw[row]), np.sin(yaw[row])
+        ex, ey = abs(c) * depth + abs(s) * width, abs(s) * depth + abs(c) * width
+        most = below.shape[2] - 1
+        first = min(max(int(np.floor((z + box.bottom - corner[2]) / cell)), 0), most)
+        wall = min(max(int(np.floor((z + box.top - walker.deepest - corner[2]) / cell)), 0), most)
+        last = min(max(int(np.ceil((z + box.top - corner[2]) / cell)), 0), most)
+        i0, i1 = int(np.floor((x - ex - corner[0]) / cell)), int(np.floor((x + ex - corner[0]) / cell))
+        j0, j1 = int(np.floor((y - ey - corner[1]) / cell)), int(np.floor((y + ey - corner[1]) / cell))
+        lowest = last
+        for i in range(max(i0, 0), min(i1, below.shape[0] - 1) + 1):
+            for j in range(max(j0, 0), min(j1, below.shape[1] - 1) + 1):
+                column = below[i, j]
+                if column[last] == column[wall] or column[wall] > column[first]:
+                    continue
+                dx, dy = corner[0] + (i + 0.5) * cell - x, corner[1] + (j + 0.5) * cell - y
+                if abs(c * dx + s * dy) <= depth and abs(-s * dx + c * dy) <= width:
+                    k = wall
+                    while column[k + 1] == column[wall]:
+                        k += 1
+                    lowest = min(lowest, k)
+        if lowest < last:
+            sink[row] = max(z + box.top - (corner[2] + lowest * cell), 0.0)
+
+
+class _Posture(NamedTuple):
+    """A posture for the kernels.
+
+    Attributes:
+        place: (3,) m; the middle of the feet.
+        yaw: rad; heading.
+        sink: m; by how much the CoM is lowered.
+        feet, turns: (2, 3) m and (2, 3, 3); the soles.
+        standing: (2,) bool; which of them bear a leg.
+    """
+
+    place: np.ndarray
+    yaw: float
+    sink: float
+    feet: np.ndarray
+    turns: np.ndarray
+    standing: np.ndarray
+
+
+@compiled(kept=True)
+def _fill_reach(occupancy, walker, places, yaw, sink, feet, turns, standing, reached):
+    """Fill reached (n, 2) m: how far the body can move forwards and backwards where walls are near; else inf stays.
+
+    The arrays are those of `_Posture`, for n postures.
+    """
+    for row in range(len(yaw)):
+        posture = _Posture(places[row], yaw[row], sink[row], feet[row], turns[row], standing[row])
+        if _body_free(occupancy, walker, posture, 0.0):
+            for side in range(2):
+                reached[row, side] = _reach_of(occupancy, walker, posture, 1.0 - 2.0 * side)
+
+
+@compiled
+def _reach_of(occupancy, walker, posture, sign):
+    """How far the body can move forwards (sign 1) or backwards (-1) in m; inf where it is far."""
+    tries = int(_FAR / _STEP)
+    free = tries
+    for k in range(tries, 0, -1):
+        if not _body_free(occupancy, walker, posture, sign * k * _STEP):
+            free = k - 1
+    if free == tries:
+        return np.inf
+    if _legs_free(occupancy, walker, posture, 0.0):
+        for k in range(free, 0, -1):
+            if not _legs_free(occupancy, walker, posture, sign * k * _STEP):
+                free = k - 1
+    return max(free * _STEP, _LEAST)
+
+
+@compiled
+def _body_free(occupancy, walker, posture, away):
+    """Whether the body is free where it has moved so many m forwards."""
+    x, y, z = posture.place
+    x, y = x + away * np.cos(posture.yaw), y + away * np.sin(posture.yaw)
+    return body_free(occupancy, walker.box, x, y, z, posture.yaw, posture.sink)
+
+
+@compiled
+def _legs_free(occupancy, walker, posture, away):
+    """Whether the legs that stand are free where the body has moved so many m forwards; those that do not reach are."""
+    x, y, z = posture.place
+    x, y = x + away * np.cos(posture.yaw), y + away * np.sin(posture.yaw)
+    com = (x, y, z + walker.com_height - posture.sink)
+    for side in range(2):
+        if posture.standing[side]:
+            code, points = reach(walker.legs, side, com, posture.yaw, posture.feet[side], posture.turns[side])
+            if code == 0 and not leg_free(occupancy, walker.shanks, points):
+                return False
+    return True
