@@ -135,4 +135,5 @@ def _add(course: _Course, kinds: dict[str, _Kind], rng: np.random.Generator) -> 
 
 def _between(rng: np.random.Generator, axis: Axis) -> float:
     """A value between the ends of an axis."""
-    return float(rng.uniform(*sorted((axis.easy, axis.hard))))
+    low, high = sorted((axis.easy, axis.hard))
+    return float(rng.uniform(low, high))

@@ -6,18 +6,19 @@ import numpy as np
 import pytest
 
 from tests.centroidal.walks import walk
+from tests.shipped_robots import OWN
 from toolkit.centroidal.body import body_residuals
 from toolkit.centroidal.build import initial_com
 from toolkit.centroidal.problem import ComRoom
 from toolkit.centroidal.program import Program
 from toolkit.centroidal.sequence import SequenceConfig, guess, optimise
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from validation.reference.sequence import solve
 
 CONFIG = SequenceConfig()
 
 
-@pytest.fixture(scope="module", params=find_robots())
+@pytest.fixture(scope="module", params=OWN)
 def walker(request):
     return load_robot(request.param)
 

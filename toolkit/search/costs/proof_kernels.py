@@ -70,7 +70,7 @@ def mark_between(ground: np.ndarray, stride: float, border: np.ndarray) -> np.nd
         hull = shapely.convex_hull(shapely.multipoints(np.argwhere(ground).astype(float))).buffer(2.0)
         shapely.prepare(hull)
         asked = shapely.contains_xy(hull, *np.indices(ground.shape))
-        asked &= distance_transform_edt(np.logical_not(ground)) <= stride / 2 + 1.0
+        asked &= np.asarray(distance_transform_edt(np.logical_not(ground))) <= stride / 2 + 1.0
     _mark_between(ground, asked, cells, sector, np.hypot(*cells.T), stride, border, between)
     return between
 
