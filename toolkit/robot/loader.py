@@ -15,7 +15,7 @@ from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import Pose
 from toolkit.mjcf import warnings_refused
 from toolkit.robot.agreement import check_agreement
-from toolkit.robot.assemble import Assembly, assemble, exclude_pairs
+from toolkit.robot.assemble import Assembly, assemble, finish
 from toolkit.robot.chain import joints_to
 from toolkit.robot.description import FILE_NAME, RobotDescription, match_joints, read_description
 from toolkit.robot.geometry import derive_limbs
@@ -96,8 +96,9 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
         where, problems = description.path, Problems(description.path)
         home = home_posture(description, assembly.mujoco_model, assembly.home)
         check_patches(description, assembly)
-        assembly = exclude_pairs(assembly, touching_neighbours(description, assembly.mujoco_model, home))
+        assembly = finish(assembly, touching_neighbours(description, assembly.mujoco_model, home))
         model = assembly.mujoco_model
+        home = home_posture(description, model, assembly.home)  # with the digits of the text
         joint_names = tuple(model.joint(j).name for j in range(1, model.njnt))
         try:
             urdf = urdf_from_model(model, folder.name)
