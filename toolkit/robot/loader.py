@@ -95,10 +95,10 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
         assembly = assemble(description, read_model(find_model_file(description), description.mend))
         where, problems = description.path, Problems(description.path)
         home = home_posture(description, assembly.mujoco_model, assembly.home)
-        check_patches(description, assembly)
         assembly = finish(assembly, touching_neighbours(description, assembly.mujoco_model, home))
         model = assembly.mujoco_model
         home = home_posture(description, model, assembly.home)  # with the digits of the text
+        check_patches(description, assembly)
         joint_names = tuple(model.joint(j).name for j in range(1, model.njnt))
         try:
             urdf = urdf_from_model(model, folder.name)
