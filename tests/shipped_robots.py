@@ -4,11 +4,14 @@ What holds for any robot's model is tested with all of them; those whose package
 motions, which take long, are tested with the robots whose model lies in their folder.
 """
 
+from functools import cache
+
 import pytest
 
 from toolkit.errors import PackageError
 from toolkit.robot.description import FILE_NAME, read_description
-from toolkit.robot.loader import find_robots, robots_folder
+from toolkit.robot.loader import find_robots, load_robot, robots_folder
+from toolkit.robot.model import RobotModel
 from toolkit.robot.source import find_model_file
 
 _DESCRIPTIONS = {name: read_description(robots_folder() / name / FILE_NAME) for name in find_robots()}
@@ -31,3 +34,9 @@ EVERY = [
     for name, reason in ((name, _missing(name)) for name in _DESCRIPTIONS)
 ]
 """Parameters for all robots; those whose package is missing are skipped."""
+
+
+@cache
+def loaded(name: str) -> RobotModel:
+    """A robot that all tests share; meshes take seconds to load."""
+    return load_robot(name)

@@ -4,14 +4,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.shipped_robots import EVERY
+from tests.shipped_robots import EVERY, loaded
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.robot.loader import load_robot
 
 
 @pytest.fixture(scope="module", params=EVERY)
 def robot(request):
-    return load_robot(request.param)
+    return loaded(request.param)
 
 
 def test_legs_carry_feet_and_arms_do_not(robot):

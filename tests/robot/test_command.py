@@ -15,6 +15,7 @@ from toolkit.errors import InputError, PackageError, RobotError, ToolkitError
 from toolkit.robot.loader import find_robots, load_robot
 
 
+@pytest.mark.slow
 def test_lists_every_robot(capsys: pytest.CaptureFixture) -> None:
     assert robots.main([]) == 0
     text = capsys.readouterr().out

@@ -7,15 +7,14 @@ import numpy as np
 import pinocchio
 import pytest
 
-from tests.shipped_robots import EVERY
-from toolkit.robot.loader import load_robot
+from tests.shipped_robots import EVERY, loaded
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import PinocchioMap, pinocchio_map, pinocchio_model, placo_wrapper
 
 
 @pytest.fixture(scope="module", params=EVERY)
 def robot(request: pytest.FixtureRequest) -> RobotModel:
-    return load_robot(request.param)
+    return loaded(request.param)
 
 
 @pytest.fixture(scope="module")

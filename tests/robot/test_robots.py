@@ -11,10 +11,9 @@ import numpy as np
 import placo
 import pytest
 
-from tests.shipped_robots import EVERY
+from tests.shipped_robots import EVERY, loaded
 from toolkit.geometry.limb import Limb
 from toolkit.robot.description import FILE_NAME, RobotDescription, read_description
-from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.robot.picture import standing_scene
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
@@ -22,7 +21,7 @@ from toolkit.robot.placo import pinocchio_map, placo_wrapper
 
 @pytest.fixture(scope="module", params=EVERY)
 def robot(request: pytest.FixtureRequest) -> RobotModel:
-    return load_robot(request.param)
+    return loaded(request.param)
 
 
 @pytest.fixture(scope="module")

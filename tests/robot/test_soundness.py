@@ -107,3 +107,13 @@ def test_home_legs_too_straight_to_step(tmp_path: Path) -> None:
 def test_no_shape_above_the_knees(tmp_path: Path) -> None:
     robot = load_robot(str(write_robot(tmp_path / "biped", biped_urdf(), URDF_TOML, "biped.urdf")))
     assert any(item.startswith("no shape above the knees collides") for item in robot.warnings)
+
+
+def test_gains_follow_the_body(tmp_path: Path) -> None:
+    robot = load_robot(
+        str(write_robot(tmp_path / "arm", biped_mjcf("left"), arm_toml("left") + '[gains]\n"*knee" = [9.0, 1.0]'))
+    )
+    stiff = 3 * robot.mass * 9.81 * robot.com_height
+    gains = dict(zip(robot.joint_names, zip(robot.kp, robot.kd, strict=True), strict=True))
+    assert gains["left_hip_yaw"] == pytest.approx((stiff, stiff / 100))
+    assert gains["left_elbow"] == pytest.approx((stiff / 10, stiff / 1000)) and gains["left_knee"] == (9.0, 1.0)

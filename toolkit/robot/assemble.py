@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import mujoco
@@ -19,6 +20,7 @@ from toolkit.robot.mend import mended
 from toolkit.robot.motors import set_motors
 from toolkit.robot.problems import Problems
 from toolkit.robot.reader import suggestion
+from toolkit.robot.skeleton import skeleton
 from toolkit.robot.source import ModelSource
 
 ROOT_JOINT = "root_joint"
@@ -29,15 +31,18 @@ class Assembly:
     """A robot's model in its final form.
 
     Attributes:
+        path: The model file.
         mjcf: Self-contained MJCF text.
         assets: Content of each file by its name.
-        mujoco_model: The compiled `mjcf`.
+        mujoco_model: The compiled model: that of `mjcf` after `finish`, which differs from the one before by the digits
+            of the text.
         velocity: Velocity limit of each actuated joint, rad/s.
         bodies: Name of the body that carries the site of each limb.
         home: Positions of joints in the home posture, rad; those that are not there are at 0.
         warnings: What was assumed or changed, one line each.
     """
 
+    path: Path
     mjcf: str
     assets: dict[str, bytes] = field(repr=False)
     mujoco_model: mujoco.MjModel = field(repr=False)
@@ -79,16 +84,15 @@ def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
     _strip(source, problems)
     _check_names(source, problems)
     problems.check()
-    bare = _compiled(source, spec)
+    bare = _compiled(source, skeleton(spec))
     motors = set_motors(description, source, bare, problems)
     bodies = {limb: _add_site(item, spec, bare, problems) for limb, item in description.limbs.items()}
     problems.check()
-    _compiled(source, spec)
+    model = _compiled(source, spec)
     mjcf, assets = spec.to_xml(), dict(spec.assets)
-    model = _compiled(source, mjcf)
     home = _home(description, model, keyframe, problems)
     problems.check()
-    return Assembly(mjcf, assets, model, motors.velocity, bodies, home, motors.warnings)
+    return Assembly(source.path, mjcf, assets, model, motors.velocity, bodies, home, motors.warnings)
 
 
 def _keyframe(description: RobotDescription, source: ModelSource) -> dict[str, float]:
@@ -103,7 +107,7 @@ def _keyframe(description: RobotDescription, source: ModelSource) -> dict[str, f
     if description.keyframe not in names:
         wanted = f"[home] keyframe '{description.keyframe}' does not exist in {source.path.name}"
         raise RobotError(f"{description.path}: {wanted}; {suggestion(description.keyframe, names)}")
-    model = _compiled(source, source.spec)
+    model = _compiled(source, skeleton(source.spec))
     qpos = model.key(description.keyframe).qpos
     single = [j for j in range(model.njnt) if model.jnt_type[j] != mujoco.mjtJoint.mjJNT_FREE]
     return {model.joint(j).name: float(qpos[model.jnt_qposadr[j]]) for j in single}
@@ -123,26 +127,32 @@ def _home(
     return home
 
 
-def _compiled(source: ModelSource, what: mujoco.MjSpec | str) -> mujoco.MjModel:
-    """Compile a spec, or MJCF text with the files of the source."""
+def _compiled(source: ModelSource, spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Compile a spec of a source, or of a part of it."""
     try:
-        if isinstance(what, str):
-            what = mujoco.MjSpec.from_string(what, assets=dict(source.spec.assets))
-        return compile_spec(what)
+        return compile_spec(spec)
     except InputError as error:
         raise RobotError(f"{source.path}: {error}") from None
     except ValueError as error:
         raise RobotError(f"{source.path}: MuJoCo cannot compile it: {one_line(error)}") from None
 
 
-def exclude_pairs(assembly: Assembly, pairs: Sequence[tuple[str, str]]) -> Assembly:
-    """The same robot without contacts between pairs of its bodies."""
-    if not pairs:
-        return assembly
-    lines = [f"<exclude body1={quoteattr(first)} body2={quoteattr(second)}/>" for first, second in pairs]
-    end = assembly.mjcf.rindex("</mujoco>")  # MuJoCo merges sections of one kind
-    mjcf = "\n    ".join([f"{assembly.mjcf[:end]}\n  <contact>", *lines]) + "\n  </contact>\n</mujoco>\n"
-    return replace(assembly, mjcf=mjcf, mujoco_model=mujoco.MjModel.from_xml_string(mjcf, assembly.assets))
+def finish(assembly: Assembly, pairs: Sequence[tuple[str, str]]) -> Assembly:
+    """The same robot, compiled from its text, without contacts between pairs of its bodies.
+
+    Raises:
+        RobotError: MuJoCo cannot compile the text.
+    """
+    mjcf = assembly.mjcf
+    if pairs:
+        lines = [f"<exclude body1={quoteattr(first)} body2={quoteattr(second)}/>" for first, second in pairs]
+        end = mjcf.rindex("</mujoco>")  # MuJoCo merges sections of one kind
+        mjcf = "\n    ".join([f"{mjcf[:end]}\n  <contact>", *lines]) + "\n  </contact>\n</mujoco>\n"
+    try:
+        model = compile_spec(mujoco.MjSpec.from_string(mjcf, assets=assembly.assets))
+    except (ValueError, InputError) as error:
+        raise RobotError(f"{assembly.path}: MuJoCo cannot compile it: {one_line(error)}") from None
+    return replace(assembly, mjcf=mjcf, mujoco_model=model)
 
 
 def _check_tree(description: RobotDescription, source: ModelSource, problems: Problems) -> None:

@@ -15,6 +15,7 @@ from toolkit.geometry.triangles import mesh_vertices
 from toolkit.robot.assemble import Assembly
 from toolkit.robot.chain import joints_to
 from toolkit.robot.description import RobotDescription
+from toolkit.robot.skeleton import colliding_only
 
 MAX_SOLE_TILT = 0.02  # rad
 MAX_SOLE_STEP = 0.005  # m
@@ -96,17 +97,18 @@ def check_patches(description: RobotDescription, assembly: Assembly) -> None:
             quat=site.quat,
             size=[*(item.patch / 2), 1e-4],
             mass=0.0,
-            contype=0,
-            conaffinity=0,
+            contype=1,
+            conaffinity=1,
         )
-    model = spec.compile()
+    model = colliding_only(spec).compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     colliding = (model.geom_contype | model.geom_conaffinity) != 0
     for limb in description.limbs:
         patch, body = model.geom(f"{limb.label}_patch").id, assembly.bodies[limb]
         rigid = model.body_weldid[model.geom_bodyid] == model.body_weldid[model.body(body).id]
-        shapes = np.flatnonzero(colliding & rigid).tolist()
+        others = np.arange(model.ngeom) != patch
+        shapes = np.flatnonzero(colliding & rigid & others).tolist()
         gap = min((mujoco.mj_geomDistance(model, data, patch, shape, 1e3, None) for shape in shapes), default=np.inf)
         if gap > MAX_GAP:
             far = f"{1e3 * gap:.0f} mm from the nearest" if shapes else "on a body without any"

@@ -11,10 +11,12 @@ import mujoco
 import numpy as np
 
 from toolkit.errors import RobotError
+from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import Pose
 from toolkit.mjcf import warnings_refused
 from toolkit.robot.agreement import check_agreement
-from toolkit.robot.assemble import Assembly, assemble, exclude_pairs
+from toolkit.robot.assemble import Assembly, assemble, finish
+from toolkit.robot.chain import joints_to
 from toolkit.robot.description import FILE_NAME, RobotDescription, match_joints, read_description
 from toolkit.robot.geometry import derive_limbs
 from toolkit.robot.home import check_patches, home_posture, touching_neighbours
@@ -26,7 +28,10 @@ from toolkit.robot.source import find_model_file, read_model
 from toolkit.robot.urdf import urdf_from_model
 from toolkit.shipped import shipped
 
-DEFAULT_GAINS = (200.0, 8.0)
+STIFFNESS = 3.0
+"""Default stiffness of legs, as a multiple of m g h, which an ankle needs to hold the robot up; arms take a tenth."""
+DAMPING = 0.01
+"""Default damping over stiffness, s."""
 
 
 def robots_folder(robots_dir: Path | None = None) -> Path:
@@ -106,12 +111,11 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
         assembly = assemble(description, read_model(find_model_file(description), description.mend))
         where, problems = description.path, Problems(description.path)
         home = home_posture(description, assembly.mujoco_model, assembly.home)
-        check_patches(description, assembly)
-        assembly = exclude_pairs(assembly, touching_neighbours(description, assembly.mujoco_model, home))
+        assembly = finish(assembly, touching_neighbours(description, assembly.mujoco_model, home))
         model = assembly.mujoco_model
+        home = home_posture(description, model, assembly.home)  # with the digits of the text
+        check_patches(description, assembly)
         joint_names = tuple(model.joint(j).name for j in range(1, model.njnt))
-        gains = match_joints(problems, "gains", description.gains, joint_names)
-        kp, kd = np.array([gains.get(joint, DEFAULT_GAINS) for joint in joint_names]).T
         try:
             urdf = urdf_from_model(model, folder.name)
             legs, arms = derive_limbs(model, home, assembly.bodies)
@@ -123,6 +127,7 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
         data.qpos[:] = home
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
+        kp, kd = _gains(description, assembly, joint_names, float(data.subtree_com[1, 2]))
         robot = RobotModel(
             name=folder.name,
             folder=folder,
@@ -153,6 +158,19 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
         )
         check_agreement(robot)
         return robot
+
+
+def _gains(
+    description: RobotDescription, assembly: Assembly, joint_names: tuple[str, ...], com_height: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness (n,) in N m/rad and damping (n,) in N m s/rad; by the body where the robot.toml says nothing."""
+    model = assembly.mujoco_model
+    said = match_joints(Problems(description.path), "gains", description.gains, joint_names)
+    legs = {model.joint(j).name for foot in FEET for j in joints_to(model, model.body(assembly.bodies[foot]).id)}
+    stiff = STIFFNESS * float(model.body_subtreemass[1]) * 9.81 * com_height
+    usual = {name: stiff if name in legs else stiff / 10 for name in joint_names}
+    kp, kd = np.array([said.get(name, (usual[name], DAMPING * usual[name])) for name in joint_names]).T
+    return kp, kd
 
 
 def _fingerprint(description: RobotDescription, assembly: Assembly, home: np.ndarray) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.errors import RobotError
 from toolkit.geometry.pose import Pose
+from toolkit.robot.skeleton import skeleton
 
 
 def lock_joints(spec: mujoco.MjSpec, positions: Mapping[str, float]) -> None:
@@ -23,7 +24,7 @@ def lock_joints(spec: mujoco.MjSpec, positions: Mapping[str, float]) -> None:
     """
     if not positions:
         return
-    model = spec.compile()
+    model = skeleton(spec).compile()
     for name in positions:
         for actuator in list(spec.actuators):
             if actuator.target == name and actuator.trntype == mujoco.mjtTrn.mjTRN_JOINT:
