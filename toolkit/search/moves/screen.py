@@ -12,10 +12,11 @@ import numpy as np
 from toolkit.compiled import compiled
 from toolkit.geometry.heading import mean_heading, wrapped
 from toolkit.search.moves.legs import Legs, reach
-from toolkit.search.moves.occupancy import BodyBox, Occupancy, lowest_drop
+from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free, lowest_drop
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.shanks import leg_free, legs_apart
 
+_WALL = (0.4, 0.6)  # m above the soles; what is there stops a foot, however high it is lifted
 _SHIFTS = (0.0, -0.25, 0.25)  # parts of the way from one sole to the other, from their middle, where the CoM may be
 
 
@@ -171,9 +172,14 @@ def screen_swings(position, yaw, old, stand, half, longest, still, still_yaw, co
 
 @compiled(kept=True)
 def screen_midway(position, yaw, old, stand, limits, body, codes):
-    """Fill codes (n,) int of those swings that have passed `screen_swings`: is the body free half-way?"""
+    """Fill codes (n,) int of those swings that have passed `screen_swings`: does the body or the foot hit a wall?
+
+    The body is looked at half-way between the stances, and the foot on the straight way, at a height to which it is not
+    lifted.
+    """
     p, r = old.position, stand.position
     before = mean_heading(old.yaw, stand.yaw)
+    foot = BodyBox(limits.half[0], limits.half[1], _WALL[0], _WALL[1])
     for row in range(len(yaw)):
         if codes[row] == 0:
             q = position[row]
@@ -181,6 +187,12 @@ def screen_midway(position, yaw, old, stand, limits, body, codes):
             heading = before + wrapped(mean_heading(yaw[row], stand.yaw) - before) / 2
             if lowest_drop(body.occupancy, body.box, limits.drops, x, y, z, heading) < 0:
                 codes[row] = Reason.BODY
+            z, turn = max(p[2], q[2]), wrapped(yaw[row] - old.yaw)
+            for k in range(1, 8):
+                t = k / 8.0
+                x, y = p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])
+                if codes[row] == 0 and not body_free(body.occupancy, foot, x, y, z, old.yaw + t * turn):
+                    codes[row] = Reason.SHANK
 
 
 def screen_palms(
