@@ -1,14 +1,20 @@
+"""Velocity dampers: their rows are derivatives of distances, and they keep arms and legs clear."""
+
 import mujoco
 import numpy as np
 import pytest
 
-from tests.wholebody.conftest import world_of
-from toolkit.geometry.limb import PALMS, Limb
-from toolkit.wholebody.avoidance import NOTICE, TIME, ArmAvoidance
+from tests.wholebody.conftest import planned_walk, world_of
+from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.geometry.pose import Pose
+from toolkit.wholebody.avoidance import ARM, BODY, Avoidance
+from toolkit.wholebody.check import check
 from toolkit.wholebody.collision import first_collision
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import solve_ik
 from toolkit.world.scene import compose_scene
+
+TICK = 0.01  # s
 
 
 @pytest.fixture
@@ -33,36 +39,112 @@ def outermost(robot, qpos):
     return data.geom_xpos[:, 1].max()
 
 
-def test_nothing_pushes_in_the_open(robot, hand):
+def dampers(avoidance, qpos, reaching=(), standing=Limb.LEFT_FOOT, drift=None):
+    drift = np.zeros(len(qpos) - 1) if drift is None else drift
+    return avoidance.dampers(qpos, drift, TICK, set(reaching), standing)
+
+
+def knee_height(robot):
+    return robot.legs[Limb.LEFT_FOOT].shin + abs(robot.legs[Limb.LEFT_FOOT].ankle_in_sole[2])
+
+
+def bar_before_the_shin(robot, gap, qpos=None):
+    """A bar from the middle to the left, `gap` m in front of the left shin in a posture, the home one if None."""
+    leg = robot.legs[Limb.LEFT_FOOT]
+    x, height = 1.0, 0.7 * (leg.shin + abs(leg.ankle_in_sole[2]))
+    spec = mujoco.MjSpec.from_string(robot.mjcf, assets=robot.assets)
+    spec.worldbody.add_geom(name="bar", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.5, 0.01], pos=[x, 0.5, height])
+    scene = spec.compile()
+    data, bar = mujoco.MjData(scene), scene.geom("bar").id
+    shin = scene.geom_bodyid == scene.jnt_bodyid[robot.joints_to(Limb.LEFT_FOOT)[3] + 1]
+    data.qpos[:] = robot.home if qpos is None else qpos
+    for _ in range(100):  # it comes nearer by what is left of the gap, which is never more than its own way
+        mujoco.mj_kinematics(scene, data)
+        geoms = np.flatnonzero(shin & (scene.geom_contype != 0)).tolist()
+        left = min(mujoco.mj_geomDistance(scene, data, geom, bar, 2.0, None) for geom in geoms) - gap
+        x = scene.geom_pos[bar, 0] = x - left
+    assert left == pytest.approx(0.0, abs=1e-3)
+    return world_of(f'<geom name="bar" type="box" size="0.1 0.5 0.01" pos="{x} 0.5 {height}"/>')
+
+
+def moved(robot, direction, foot):
+    """The home posture with its joints moved while a foot stays, or the base where there is none."""
+    data, qpos = mujoco.MjData(robot.mujoco_model), robot.home.copy()
+    poses = []
+    for angles in (robot.home[7:], robot.home[7:] + direction):
+        qpos[7:] = angles
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(robot.mujoco_model, data)
+        body = data.body(robot.base if foot is None else robot.limbs[foot].body)
+        poses.append(Pose(body.xmat.reshape(3, 3).copy(), body.xpos.copy()))
+    base = poses[0] @ poses[1].inverse() @ Pose.from_quaternion(robot.home[:3], robot.home[3:7])
+    qpos[:3], qpos[3:7] = base.position, base.quaternion_wxyz
+    return qpos
+
+
+def test_nothing_pushes_in_the_open(robot):
     """At home some links are near others, none so near that its damper asks for a motion."""
-    avoidance = ArmAvoidance(robot, compose_scene(robot, world_of("")))
-    rows, bound = avoidance.rows(robot.home, np.zeros(6), 0.01, set())
-    assert rows.shape == (len(bound), len(robot.joint_names))
-    assert (bound > 0.0).all()
+    found = dampers(Avoidance(robot, compose_scene(robot, world_of(""))), robot.home)
+    assert found.matrix.shape == (len(found.bound), len(robot.joint_names))
+    assert (found.bound > 0.0).all()
 
 
-def test_rows_are_derivatives_of_the_distance(robot, hand):
-    """Moving the joints changes each distance as the row says, by finite differences on MuJoCo's distances."""
-    world = side_wall(hand[1] + 0.08)
-    avoidance, tick, h = ArmAvoidance(robot, compose_scene(robot, world)), 0.01, 1e-5
-    rows, bound = avoidance.rows(robot.home, np.zeros(6), tick, set())
-    assert len(rows) > 0
-    rng = np.random.default_rng(0)
-    direction = rng.normal(size=len(robot.joint_names))
-    moved = robot.home.copy()
-    moved[7:] += h * direction
-    _, bound_after = avoidance.rows(moved, np.zeros(6), tick, set())
+def test_rows_of_arms_are_derivatives_of_the_distance(robot, hand):
+    """Moving the joints changes the least distance as its row says, by finite differences on MuJoCo's distances."""
+    avoidance, h = Avoidance(robot, compose_scene(robot, side_wall(hand[1] + 0.08))), 1e-5
+    found, direction = dampers(avoidance, robot.home), np.random.default_rng(0).normal(size=len(robot.joint_names))
+    after = dampers(avoidance, moved(robot, h * direction, None))
     # bound = (distance - safe) tick / time, and a row is minus the distance's gradient; sorted by distance both times
-    change = (bound_after - bound) * TIME / tick / h
-    nearest = np.argmin(bound)
-    np.testing.assert_allclose(change[nearest], -rows[nearest] @ direction, rtol=0.05, atol=1e-3)
+    nearest = np.flatnonzero(found.weight == ARM.weight)[0]
+    change = (after.bound - found.bound)[nearest] * ARM.time / TICK / h
+    np.testing.assert_allclose(change, -found.matrix[nearest] @ direction, rtol=0.05, atol=1e-3)
+
+
+@pytest.mark.parametrize("standing", FEET)
+def test_rows_of_legs_are_derivatives_of_the_distance_as_the_base_moves_over_the_foot(robot, standing):
+    """The same for a shin before an edge, with the base where the joints of a leg carry it over its foot."""
+    avoidance, h = Avoidance(robot, compose_scene(robot, bar_before_the_shin(robot, 0.03))), 1e-5
+    direction = np.random.default_rng(1).normal(size=len(robot.joint_names))
+    found = dampers(avoidance, robot.home, PALMS, standing)
+    after = dampers(avoidance, moved(robot, h * direction, standing), PALMS, standing)
+    nearest = np.flatnonzero(found.weight == BODY.weight)[0]
+    change = (after.bound - found.bound)[nearest] * BODY.time / TICK / h
+    np.testing.assert_allclose(change, -found.matrix[nearest] @ direction, rtol=0.05, atol=1e-3)
+
+
+def test_a_root_that_moves_carries_its_links_along(robot):
+    """With the whole robot on its way to an edge, what joints may add is less by that way."""
+    avoidance = Avoidance(robot, compose_scene(robot, bar_before_the_shin(robot, 0.03)))
+    drift = np.zeros(len(robot.home) - 1)
+    drift[0] = 1e-3
+    still, moving = (dampers(avoidance, robot.home, PALMS, drift=each).bound for each in (0.0 * drift, drift))
+    assert (still - moving).max() == pytest.approx(1e-3, rel=0.2)  # nearly along the normal
 
 
 def test_a_reaching_hand_may_touch(robot, hand):
-    avoidance = ArmAvoidance(robot, compose_scene(robot, side_wall(hand[1] + 0.03)))
-    free, _ = avoidance.rows(robot.home, np.zeros(6), 0.01, set())
-    reaching, _ = avoidance.rows(robot.home, np.zeros(6), 0.01, set(PALMS))
-    assert len(reaching) < len(free)
+    avoidance = Avoidance(robot, compose_scene(robot, side_wall(hand[1] + 0.03)))
+    assert len(dampers(avoidance, robot.home, PALMS).bound) < len(dampers(avoidance, robot.home).bound)
+
+
+def test_feet_are_left_to_their_paths(robot):
+    """Soles on the floor make no rows with it."""
+    avoidance = Avoidance(robot, compose_scene(robot, world_of("")))
+    avoidance._place(robot.home)
+    feet = {int(body) for limb, body in avoidance.body.items() if limb.is_foot}
+    bodies = [
+        {int(avoidance.model.geom_bodyid[geom]) for geom in pair[:2]}
+        for pair in avoidance._near(set())
+        if avoidance._of_world(pair)
+    ]
+    assert not any(pair & feet for pair in bodies)
+
+
+def test_links_that_are_near_at_home_are_kept_at_half_that_distance(robot):
+    avoidance = Avoidance(robot, compose_scene(robot, world_of("")))
+    avoidance._place(robot.home)
+    for pair in avoidance._near(set()):
+        safe = avoidance._safe(pair, BODY)
+        assert safe is None or pair.distance >= 2.0 * safe - 1e-9 or pair.distance >= BODY.safe_self
 
 
 def test_arms_are_drawn_in_beside_a_wall(robot, flat_walk, hand):
@@ -78,23 +160,38 @@ def test_arms_are_drawn_in_beside_a_wall(robot, flat_walk, hand):
     assert first_collision(robot, scene, times, drawn_in) is None
 
 
+def test_shins_are_kept_off_an_edge(robot):
+    """A bar that the shin touches while the robot rests: the base turns for it, feet and CoM stay as planned."""
+    rest = planned_walk(robot, world_of(""), [])
+    times = np.linspace(0.0, rest.schedule.duration, int(50 * rest.schedule.duration) + 1)
+    paths = limb_paths(robot, rest.world, rest.schedule, rest.motion)
+    grazing = solve_ik(robot, paths, rest.motion, times)
+    scene = compose_scene(robot, bar_before_the_shin(robot, -0.008, grazing[0]))
+    hit = first_collision(robot, scene, times, grazing)
+    assert hit is not None and "world/bar" in hit.reason
+    clear = solve_ik(robot, paths, rest.motion, times, scene)
+    assert first_collision(robot, scene, times[-20:], clear[-20:]) is None
+    assert not check(robot, scene, paths, rest.motion, times[-20:], clear[-20:]).findings
+
+
 def test_boxes_are_seen_edge_to_edge(robot, hand):
     """A box whose edge points at the hand, where MuJoCo's collision of boxes with a margin finds nothing."""
     place = f"{hand[0]} {hand[1] + 0.3} {hand[2]}"
     world = world_of(f'<geom name="post" type="box" size="0.15 0.15 0.02" pos="{place}" euler="30 20 45"/>')
-    avoidance = ArmAvoidance(robot, compose_scene(robot, world))
+    avoidance = Avoidance(robot, compose_scene(robot, world))
     avoidance._place(robot.home)
     model, data, post = avoidance.model, avoidance.data, avoidance.model.geom("world/post").id
-    pairs = avoidance._box_pairs()
-    seen = {first: (distance, normal) for first, second, distance, normal, _ in pairs if second == post}
-    boxes = [g for g in np.flatnonzero(avoidance.arm_of >= 0) if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX]
+    pairs = avoidance._near_boxes(np.zeros(model.ngeom, bool))
+    seen = {sum(pair[:2]) - post: pair for pair in pairs if post in pair[:2]}
+    boxes = [g for g in np.flatnonzero(avoidance.arm) if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX]
     if not boxes:
         pytest.skip("arms without boxes")
     for geom in boxes:
         distance = mujoco.mj_geomDistance(model, data, int(geom), post, 1.0, None)
-        assert (geom in seen) == (distance < NOTICE)
+        assert (geom in seen) == (distance < ARM.notice)
         if geom in seen:
-            assert seen[geom][0] == pytest.approx(distance, abs=1e-6)
-            np.testing.assert_allclose(np.linalg.norm(seen[geom][1]), 1.0, atol=1e-6)
-            assert seen[geom][1] @ (data.geom_xpos[post] - data.geom_xpos[geom]) > 0.0
+            first, second, apart, normal, _ = seen[geom]
+            assert apart == pytest.approx(distance, abs=1e-6)
+            np.testing.assert_allclose(np.linalg.norm(normal), 1.0, atol=1e-6)
+            assert normal @ (data.geom_xpos[second] - data.geom_xpos[first]) > 0.0
     assert seen

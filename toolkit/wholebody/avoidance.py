@@ -1,79 +1,159 @@
-"""Velocity dampers that keep free arms off the world and off the body during inverse kinematics.
+"""Velocity dampers that keep all links clear of the world and of each other during inverse kinematics.
 
 For a pair of geoms at distance d with normal n (from the first to the second) at point p the damper demands, per tick,
 
     n . (J2(p) - J1(p)) dq >= -(d - d_safe) dt / tau
 
-so that a distance shrinks ever more slowly towards d_safe, and grows where it is smaller. The legs are determined by
-the feet and the CoM; only the final collision check covers them.
+so that a distance shrinks ever more slowly towards d_safe, and grows where it is smaller. The displacements dq are
+those of the joints between a geom and its root, whose own motion is taken from the last tick. Arms keep clear of the
+world as seen from the base; all other links do so as seen from a standing foot, so that the base turns and leans for
+them. The last links of the feet, and of palms that reach, are left to the paths of these limbs.
 """
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from toolkit.geometry.limb import PALMS, Limb
+from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.collision import body_pair
 
-NOTICE = 0.12  # m; larger distances are ignored
-SAFE_WORLD, SAFE_SELF = 0.06, 0.012  # m; wanted distance of an arm from the world and from the rest of the robot
-TIME = 0.15  # s; tau above: much longer than a tick, shorter than a swing
-MAX_ROWS = 16  # most dampers at a time, of the nearest pairs: each costs solver time, and few are active
+MAX_ROWS = 24  # most dampers at a time, of the nearest pairs: each costs solver time, and few are active
 
 
-class ArmAvoidance:
-    """Distances of the arms in the composed scene, tick after tick."""
+@dataclass(frozen=True)
+class Damper:
+    """How a kind of pair is kept apart.
+
+    Attributes:
+        notice: m; larger distances are ignored.
+        safe_world, safe_self: m; wanted distance from the world and from the rest of the robot.
+        time: s; tau above: longer than a tick, shorter than a swing.
+        weight: Per squared m by which a pair comes nearer in a tick than it may.
+    """
+
+    notice: float
+    safe_world: float
+    safe_self: float
+    time: float
+    weight: float
+
+
+ARM = Damper(notice=0.12, safe_world=0.06, safe_self=0.012, time=0.15, weight=1e3)
+"""Pairs with a link of an arm, which has much room and moves without need."""
+BODY = Damper(notice=0.06, safe_world=0.01, safe_self=0.01, time=0.05, weight=1e4)
+"""Other pairs: legs have little room to spare, and feet and CoM weigh more."""
+_HOME_SHARE = 0.5  # of a pair's distance in the home posture, where it is safe at no more than that
+
+
+class _Pair(NamedTuple):
+    """Two geoms near each other: their distance in m, the normal from the first to the second, and a point between."""
+
+    first: int
+    second: int
+    distance: float
+    normal: np.ndarray
+    point: np.ndarray
+
+
+class Dampers(NamedTuple):
+    """Dampers `matrix dq <= bound` over the joint displacements of one tick.
+
+    Attributes:
+        matrix: (k, n).
+        bound: (k,) m.
+        weight: (k,) per squared m.
+    """
+
+    matrix: np.ndarray
+    bound: np.ndarray
+    weight: np.ndarray
+
+
+class Avoidance:
+    """Distances between the links, and to the world, in the composed scene, tick after tick."""
 
     def __init__(self, robot: RobotModel, scene: mujoco.MjModel):
-        """Prepare a copy of the scene, robot and world in one model; a robot without palms has no arms here."""
+        """Prepare a copy of the scene, robot and world in one model."""
         self.model = copy.copy(scene)
         self.data = mujoco.MjData(self.model)
-        self.static = self.model.body_weldid[self.model.geom_bodyid] == 0
-        self.arm_of = _arm_of_geoms(robot, self.model)
-        hands = {limb: self.model.body(robot.limbs[limb].body).id for limb in PALMS if limb in robot.limbs}
-        self.hand = {limb: self.model.geom_bodyid == body for limb, body in hands.items()}
-        self.model.geom_margin[:] = 0.0
-        self.model.geom_gap[:] = 0.0
-        self.model.geom_margin[self.arm_of >= 0] = NOTICE
-        self.box = self.model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
-        solid = self.box & ((self.model.geom_contype != 0) | (self.model.geom_conaffinity != 0))
-        self.boxes, self.arm_boxes = np.flatnonzero(solid), np.flatnonzero(solid & (self.arm_of >= 0))
-        self.near = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
-        self.resting = self._pairs_below(robot.home, SAFE_SELF)
+        model = self.model
+        self.static = model.body_weldid[model.geom_bodyid] == 0
+        self.arm = _of_arms(robot, model)
+        self.body = {limb: int(model.body(item.body).id) for limb, item in robot.limbs.items()}
+        self.of = {limb: model.geom_bodyid == body for limb, body in self.body.items()}
+        self.base = int(model.body(robot.base).id)
+        model.geom_gap[:] = 0.0
+        model.geom_margin[:] = np.where(self.static, 0.0, np.where(self.arm, ARM.notice, BODY.notice))
+        model.body_margin[:] = 0.0
+        np.maximum.at(model.body_margin, model.geom_bodyid, model.geom_margin)  # where collisions are looked for at all
+        self.box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
+        self.box_pairs = _box_pairs(model, self.static)
+        self.jacobians = [np.zeros((3, model.nv)) for _ in range(3)]
+        self.at_home, self.height = self._distances(robot.home), np.zeros(model.nbody)
+        self._set_heights()
 
-    def rows(self, qpos: np.ndarray, drift: np.ndarray, tick: float, reaching: set[Limb]) -> tuple:
-        """A (k, n) and b (k,) of the dampers `A dq <= b` over the joint displacements of one tick.
+    def dampers(
+        self, qpos: np.ndarray, drift: np.ndarray, tick: float, reaching: set[Limb], standing: Limb | None
+    ) -> Dampers:
+        """The dampers of one tick.
 
         Args:
             qpos: (7 + n,) present state.
-            drift: (6,) displacement of the base in the last tick, as MuJoCo's qvel times the tick.
+            drift: (6 + n,) displacement in the last tick, as MuJoCo's qvel times the tick.
             tick: s.
             reaching: Palms that approach, hold or leave a contact; their hands may touch the world.
+            standing: A foot that stands; None where there is none.
         """
-        model, data = self.model, self.data
         self._place(qpos)
+        stand = self.base if standing is None else self.body[standing]
         found = []
-        for first, second, distance, normal, point in self._contacts():
-            if self._ignored(first, second, reaching):
-                continue
-            world = self.static[first] or self.static[second]
-            safe = SAFE_WORLD if world else SAFE_SELF
-            found.append((distance - safe, first, second, normal, point))
+        for pair in self._near(reaching):
+            damper = self._damper(pair)
+            safe = self._safe(pair, damper)
+            if safe is not None:
+                found.append((pair.distance - safe, pair, damper))
         found.sort(key=lambda item: item[0])
         found = found[:MAX_ROWS]
-        matrix, bound = np.zeros((len(found), model.nv - 6)), np.zeros(len(found))
-        before, after = self.near
-        for row, (room, first, second, normal, point) in enumerate(found):
-            mujoco.mj_jac(model, data, before, None, point, model.geom_bodyid[first])
-            mujoco.mj_jac(model, data, after, None, point, model.geom_bodyid[second])
-            rate = normal @ (after - before)
-            matrix[row] = -rate[6:]
-            bound[row] = room * tick / TIME + rate[:6] @ drift
-        return matrix, bound
+        matrix, bound = np.zeros((len(found), self.model.nv - 6)), np.zeros(len(found))
+        for row, (room, pair, damper) in enumerate(found):
+            rate, known = self._rate(pair, stand if damper is BODY else self.base, drift)
+            matrix[row], bound[row] = -rate, room * tick / damper.time + known
+        return Dampers(matrix, bound, np.array([damper.weight for _, _, damper in found]))
+
+    def _damper(self, pair: _Pair) -> Damper:
+        return ARM if self.arm[pair.first] or self.arm[pair.second] else BODY
+
+    def _of_world(self, pair: _Pair) -> bool:
+        return bool(self.static[pair.first] or self.static[pair.second])
+
+    def _safe(self, pair: _Pair, damper: Damper) -> float | None:
+        """Wanted distance of a pair in m; None where its links touch at home, as neighbours may."""
+        if self._of_world(pair):
+            link = pair.second if self.static[pair.first] else pair.first
+            return min(damper.safe_world, _HOME_SHARE * float(self.height[self.model.geom_bodyid[link]]))
+        at_home = self.at_home.get(body_pair(self.model, pair.first, pair.second), np.inf)
+        return min(damper.safe_self, _HOME_SHARE * at_home) if at_home > 0.0 else None
+
+    def _rate(self, pair: _Pair, root: int, drift: np.ndarray) -> tuple[np.ndarray, float]:
+        """(n,) derivative of a pair's distance by the joints beyond a root, and what the root's own motion adds."""
+        model, (before, after, rooted) = self.model, self.jacobians
+        rate, known = np.zeros(model.nv), 0.0
+        for geom, jacobian, sign in ((pair.first, before, -1.0), (pair.second, after, 1.0)):
+            if not self.static[geom]:
+                mujoco.mj_jac(model, self.data, jacobian, None, pair.point, int(model.geom_bodyid[geom]))
+                rate += (sign * pair.normal) @ jacobian
+        if self._of_world(pair):  # two links move as one with any root
+            mujoco.mj_jac(model, self.data, rooted, None, pair.point, root)
+            carried = pair.normal @ rooted if self.static[pair.first] else -pair.normal @ rooted
+            rate, known = rate - carried, float(carried @ drift)
+        return rate[6:], known
 
     def _place(self, qpos: np.ndarray) -> None:
         self.data.qpos[:] = qpos
@@ -81,56 +161,84 @@ class ArmAvoidance:
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_collision(self.model, self.data)
 
-    def _contacts(self):
-        """Pairs of geoms within `NOTICE`: both geoms, their distance, the normal from first to second, and a point."""
-        contact = self.data.contact
-        nearest: dict[tuple[int, int], int] = {}
-        for index, (first, second) in enumerate(contact.geom.tolist()):
-            if self.box[first] and self.box[second]:
-                continue
-            kept = nearest.get((first, second))
-            if kept is None or contact.dist[index] < contact.dist[kept]:
-                nearest[first, second] = index
-        for (first, second), index in nearest.items():
-            yield first, second, float(contact.dist[index]), contact.frame[index, :3], contact.pos[index]
-        yield from self._box_pairs()
+    def _near(self, reaching: set[Limb]) -> Iterator[_Pair]:
+        """Pairs of geoms within their notice, without those whose distance is left to the paths of limbs."""
+        contact, free = self.data.contact, self.static.copy()
+        for limb in reaching.union(FEET):
+            free |= self.of[limb]
+        geoms, distances = contact.geom, contact.dist
+        rows = np.flatnonzero(~(self._left(geoms[:, 0], geoms[:, 1], free) | self.box[geoms].all(1)))
+        seen: set[tuple[int, int]] = set()
+        for index in rows[np.argsort(distances[rows])].tolist():
+            first, second = geoms[index].tolist()
+            pair = _Pair(first, second, float(distances[index]), contact.frame[index, :3], contact.pos[index])
+            if (first, second) not in seen and pair.distance < self._damper(pair).notice:
+                seen.add((first, second))
+                yield pair
+        yield from self._near_boxes(free)
 
-    def _box_pairs(self):
+    def _left(self, first: np.ndarray, second: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """(k,) bool; which pairs of geoms are of the world and a link that is free to touch it."""
+        return (self.static[first] | self.static[second]) & free[first] & free[second]
+
+    def _near_boxes(self, free: np.ndarray) -> Iterator[_Pair]:
         """The same for pairs of boxes; MuJoCo's collision function finds those apart only if two faces are opposite."""
-        model, data = self.model, self.data
-        others, ends = self.boxes, np.zeros(6)
-        for arm in self.arm_boxes:
-            apart = np.linalg.norm(data.geom_xpos[others] - data.geom_xpos[arm], axis=1)
-            near = apart < NOTICE + model.geom_rbound[others] + model.geom_rbound[arm]
-            for other in others[near & (self.arm_of[others] != self.arm_of[arm])].tolist():
-                distance = mujoco.mj_geomDistance(model, data, int(arm), other, NOTICE, ends)
-                if distance < NOTICE and abs(distance) > 1e-9:
-                    yield int(arm), other, distance, (ends[3:] - ends[:3]) / distance, 0.5 * (ends[:3] + ends[3:])
+        model, data, ends = self.model, self.data, np.zeros(6)
+        first, second = self.box_pairs.T
+        notice = np.where(self.arm[first] | self.arm[second], ARM.notice, BODY.notice)
+        apart = np.linalg.norm(data.geom_xpos[first] - data.geom_xpos[second], axis=1)
+        near = apart < notice + model.geom_rbound[first] + model.geom_rbound[second]
+        near &= ~self._left(first, second, free)
+        for row in np.flatnonzero(near).tolist():
+            a, b = int(first[row]), int(second[row])
+            distance = mujoco.mj_geomDistance(model, data, a, b, float(notice[row]), ends)
+            if distance < notice[row] and abs(distance) > 1e-9:
+                yield _Pair(a, b, distance, (ends[3:] - ends[:3]) / distance, 0.5 * (ends[:3] + ends[3:]))
 
-    def _ignored(self, first: int, second: int, reaching: set[Limb]) -> bool:
-        if self.arm_of[first] < 0 and self.arm_of[second] < 0:
-            return True
-        if body_pair(self.model, first, second) in self.resting:
-            return True
-        world = self.static[first] or self.static[second]
-        return world and any(self.hand[limb][first] or self.hand[limb][second] for limb in reaching)
-
-    def _pairs_below(self, qpos: np.ndarray, distance: float) -> set[tuple[int, int]]:
-        """Pairs of the robot's bodies, mostly neighbours, that are nearer than a distance (m) in a posture."""
+    def _distances(self, qpos: np.ndarray) -> dict[tuple[int, int], float]:
+        """Least distances in m between bodies of the robot that are near each other in a posture."""
         self._place(qpos)
-        return {
-            body_pair(self.model, first, second)
-            for first, second, apart, _, _ in self._contacts()
-            if apart < distance and not (self.static[first] or self.static[second])
-        }
+        apart: dict[tuple[int, int], float] = {}
+        for pair in self._near(set()):
+            if not self._of_world(pair):
+                bodies = body_pair(self.model, pair.first, pair.second)
+                apart[bodies] = min(apart.get(bodies, np.inf), pair.distance)
+        return apart
+
+    def _set_heights(self) -> None:
+        """Heights of all links above the soles in the posture at which they are placed."""
+        model, data = self.model, self.data
+        self.height[:] = np.inf
+        for geom in np.flatnonzero(~self.static).tolist():
+            turn = data.geom_xmat[geom].reshape(3, 3)
+            middle = data.geom_xpos[geom] + turn @ model.geom_aabb[geom, :3]
+            body = int(model.geom_bodyid[geom])
+            self.height[body] = max(
+                min(self.height[body], middle[2] - np.abs(turn[2]) @ model.geom_aabb[geom, 3:]), 0.0
+            )
 
 
-def _arm_of_geoms(robot: RobotModel, model: mujoco.MjModel) -> np.ndarray:
-    """(ngeom,) int; the palm whose arm a geom belongs to, -1 elsewhere. The trunk belongs to no arm."""
-    arm = np.full(model.nbody, -1)
+def _of_arms(robot: RobotModel, model: mujoco.MjModel) -> np.ndarray:
+    """(ngeom,) bool; whether a geom belongs to the arm of a palm. The trunk belongs to none."""
+    arm = np.zeros(model.nbody, bool)
     for palm in (limb for limb in PALMS if limb in robot.limbs):
         root = int(model.jnt_bodyid[model.joint(robot.joint_names[robot.arm_joints(palm)[0]]).id])
         for body in range(root, model.nbody):
-            if body == root or arm[model.body_parentid[body]] == palm:
-                arm[body] = palm
+            arm[body] |= body == root or arm[model.body_parentid[body]]
     return arm[model.geom_bodyid]
+
+
+def _box_pairs(model: mujoco.MjModel, static: np.ndarray) -> np.ndarray:
+    """(k, 2) int; pairs of colliding boxes whose bodies are neither fixed to each other nor parent and child."""
+    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    boxes = np.flatnonzero(solid & (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX))
+    first, second = (boxes[index] for index in np.triu_indices(len(boxes), 1))
+    weld = model.body_weldid[model.geom_bodyid]
+    above = model.body_weldid[model.body_parentid[weld]]
+    a, b = weld[first], weld[second]
+    joined = (a == b) | (~static[first] & (above[first] == b)) | (~static[second] & (above[second] == a))
+    masks = (model.geom_contype[first] & model.geom_conaffinity[second]) | (
+        model.geom_contype[second] & model.geom_conaffinity[first]
+    )
+    kept = (masks != 0) & ~(joined & ~static[first] & ~static[second]) & ~(static[first] & static[second])
+    return np.column_stack([first, second])[kept]

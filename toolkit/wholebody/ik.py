@@ -15,11 +15,12 @@ from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.arm_map import ArmMap
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import FEET, PALMS, Limb
-from toolkit.geometry.pose import Pose, mean_pose, rotation_vector
+from toolkit.geometry.pose import Pose, mean_pose, rotation_exponential, rotation_vector
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
 from toolkit.wholebody import ik_config as weights
-from toolkit.wholebody.avoidance import ArmAvoidance
+from toolkit.wholebody.avoidance import Avoidance
+from toolkit.wholebody.lean import Lean
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.swing import Window
 
@@ -30,9 +31,9 @@ LEAVING, LANDING = Window(0.0, 0.2), Window(0.75, 1.0)  # the parts of a foot's 
 class WholeBodyIK:
     """The solver with its tasks and its state, solved tick after tick."""
 
-    def __init__(self, robot: RobotModel, tick: float, avoidance: ArmAvoidance | None = None):
-        """Set up the tasks for a tick in s; `avoidance` keeps the arms clear of the world and the body."""
-        self.robot, self.tick, self.avoidance = robot, tick, avoidance
+    def __init__(self, robot: RobotModel, tick: float, avoidance: Avoidance | None = None, lean: Lean | None = None):
+        """Set up the tasks for a tick in s; `avoidance` keeps all links clear, and `lean` turns the base."""
+        self.robot, self.tick, self.avoidance, self.lean = robot, tick, avoidance, lean
         self.wrapper = placo_wrapper(robot)
         self.order = pinocchio_map(robot, self.wrapper.model)
         self.solver = self.wrapper.make_solver()
@@ -129,7 +130,7 @@ class WholeBodyIK:
         angle = self.tick / (self.robot.mass * self.robot.com_height**2)
         self.momentum.configure("momentum", "soft", weights.ANGULAR_MOMENTUM * angle**2)
         self.solver.enable_velocity_limits(True)
-        self.drift, self.last_step = np.zeros(6), np.zeros(len(self.robot.joint_names))
+        self.drift, self.last_step = np.zeros(self.robot.mujoco_model.nv), np.zeros(len(self.robot.joint_names))
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     def advance(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
@@ -148,9 +149,9 @@ class WholeBodyIK:
             for name in names:
                 task.set_joint(name, targets[name])
         before = self.order.qpos_from_q(self.wrapper.state.q)
-        self._set_dampers(before, angles, {palm for palm in self.palms if paths.authority(palm, time) > 0.0})
+        self._set_dampers(before, angles, time, paths)
         self._solve(time)
-        self.drift, self.last_step = self._base_motion(before), self.joints - angles
+        self.drift, self.last_step = self._motion(before), self.joints - angles
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     def _posture(self, time: float, angles: np.ndarray, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
@@ -209,7 +210,8 @@ class WholeBodyIK:
             orientation = weights.FOOT_ORIENTATION * (weights.AIR_ORIENTATION / weights.FOOT_ORIENTATION) ** air
             task.configure(foot.label, "soft", position, orientation)
             feet.append(pose)
-        self.base.R_world_frame = mean_pose(*feet).rotation
+        turn = np.eye(3) if self.lean is None else rotation_exponential(self.lean.at(time))
+        self.base.R_world_frame = mean_pose(*feet).rotation @ turn
         for palm, tasks in self.palms.items():
             self._set_palm(palm, tasks, time, paths)
 
@@ -222,26 +224,29 @@ class WholeBodyIK:
         u = (time - segment.begin) / (segment.end - segment.begin)
         return LEAVING.step(u)[0] - LANDING.step(u)[0]
 
-    def _set_dampers(self, qpos: np.ndarray, angles: np.ndarray, reaching: set[Limb]) -> None:
-        """Keep the arms clear of the world and the body."""
+    def _set_dampers(self, qpos: np.ndarray, angles: np.ndarray, time: float, paths: LimbPaths) -> None:
+        """Keep all links clear of the world and of each other."""
         if self.dampers is not None:
             self.solver.remove_constraint(self.dampers)  # pyright: ignore[reportArgumentType]
             self.dampers = None
         if self.avoidance is None:
             return
-        rows, bound = self.avoidance.rows(qpos, self.drift, self.tick, reaching)
-        if len(rows):
-            matrix = np.zeros((len(rows), len(qpos)))
-            matrix[:, self.order.q_index] = rows
-            self.dampers = self.solver.add_joint_space_half_spaces_constraint(matrix, bound + rows @ angles)
-            self.dampers.configure("dampers", "soft", weights.AVOID)
+        reaching = {palm for palm in self.palms if paths.authority(palm, time) > 0.0}
+        standing = next((foot for foot in FEET if paths.segment(foot, time).path is None), None)
+        found = self.avoidance.dampers(qpos, self.drift, self.tick, reaching, standing)
+        if len(found.bound):
+            matrix, share = np.zeros((len(found.bound), len(qpos))), np.sqrt(found.weight)
+            matrix[:, self.order.q_index] = share[:, None] * found.matrix
+            bound = share * (found.bound + found.matrix @ angles)
+            self.dampers = self.solver.add_joint_space_half_spaces_constraint(matrix, bound)
+            self.dampers.configure("dampers", "soft", 1.0)
 
-    def _base_motion(self, before: np.ndarray) -> np.ndarray:
-        """(6,) displacement of the base since a state (7 + n,), linear in the world and angular in the body."""
+    def _motion(self, before: np.ndarray) -> np.ndarray:
+        """(6 + n,) displacement since a state (7 + n,), as MuJoCo's qvel times the time in between."""
         after = self.order.qpos_from_q(self.wrapper.state.q)
         change = np.zeros(self.robot.mujoco_model.nv)
         mujoco.mj_differentiatePos(self.robot.mujoco_model, change, 1.0, before, after)
-        return change[:6]
+        return change
 
     def _set_ranges(self, angles: np.ndarray, free: list[Limb]) -> None:
         """Set the ranges of this tick, whose ends joints approach ever more slowly.

@@ -8,7 +8,6 @@ COM = 1e5
 PALM_POSITION, PALM_NORMAL, PALM_TWIST = 1e5, 1e4, 0.1  # a palm may turn about its normal as the arm likes
 # In the middle of a swing: where joints are too slow the foot gives way, not the base.
 AIR_POSITION, AIR_ORIENTATION = 1e4, 30.0
-AVOID = 1e3  # per squared m by which an arm comes nearer to something than its damper allows
 BASE = 10.0
 # Per squared rad of a tick's deviation from the planned angular momentum, divided by mass times squared CoM height.
 # A larger weight makes trunk and arms swing wide.

@@ -17,15 +17,17 @@ from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
 from toolkit.mjcf import warnings_refused
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.avoidance import ArmAvoidance
-from toolkit.wholebody.check import check
+from toolkit.wholebody.avoidance import Avoidance
+from toolkit.wholebody.check import CheckReport, check
 from toolkit.wholebody.ik import WholeBodyIK, first_guess
 from toolkit.wholebody.ik_config import SUBSTEPS
+from toolkit.wholebody.lean import Lean, lean_ahead
 from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
 from toolkit.wholebody.swing_task import LIFT
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 RATE = 50.0  # Hz; samples of the trajectory
+PASSES = 3  # most passes of the inverse kinematics, each of which leans ahead of what the base did in the one before
 
 
 @dataclass(frozen=True)
@@ -74,14 +76,17 @@ def solve_ik(
     motion: CentroidalMotion,
     times: np.ndarray,
     scene: mujoco.MjModel | None = None,
+    lean: Lean | None = None,
 ) -> np.ndarray:
-    """(T, 7 + n) qpos on a uniform time grid (T,) in s; the arms keep clear of `scene` unless it is None.
+    """(T, 7 + n) qpos on a uniform time grid (T,) in s; all links keep clear in `scene` unless it is None.
+
+    The base is upright with the heading of the feet where nothing is in the way, or as `lean` wants it.
 
     Raises:
         PlanningError: A quadratic program has no solution.
     """
     tick = float(times[1] - times[0]) / SUBSTEPS
-    solver = WholeBodyIK(robot, tick, None if scene is None else ArmAvoidance(robot, scene))
+    solver = WholeBodyIK(robot, tick, None if scene is None else Avoidance(robot, scene), lean)
     qpos = np.empty((len(times), len(robot.home)))
     qpos[0] = solver.start(first_guess(robot, paths, motion), paths, motion)
     for index in range(1, len(times)):
@@ -116,13 +121,12 @@ def _limb_arrays(paths: LimbPaths, times: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def _trajectory(plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray) -> WholeBodyTrajectory:
     """The postures with the results of their checks."""
-    robot, motion = plan.robot, plan.motion
+    robot = plan.robot
     blocked, trajectory = _blocked(plan.schedule, paths), _without_postures(robot, paths, times)
     try:
-        qpos = solve_ik(robot, paths, motion, times, scene)
+        qpos, report = _checked(plan, scene, paths, times, 1 if blocked else PASSES)
     except PlanningError as error:
         return replace(trajectory, failure=Failure("; ".join([*(each.reason for each in blocked), str(error)])))
-    report = check(robot, scene, paths, motion, times, qpos)
     return replace(
         trajectory,
         qpos=qpos,
@@ -133,6 +137,19 @@ def _trajectory(plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times
         limits_respected=report.limits_respected,
         failure=_joined([*blocked, *report.findings], plan.schedule),
     )
+
+
+def _checked(
+    plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray, passes: int
+) -> tuple[np.ndarray, CheckReport]:
+    """The postures (T, 7 + n) with their checks; of several passes the first that holds, or else the last one."""
+    robot, motion, lean = plan.robot, plan.motion, None
+    while True:
+        qpos = solve_ik(robot, paths, motion, times, scene, lean)
+        report = check(robot, scene, paths, motion, times, qpos)
+        lean, passes = lean_ahead(paths, times, qpos), passes - 1
+        if not report.findings or lean is None or passes == 0:
+            return qpos, report
 
 
 def _blocked(schedule: ContactSchedule, paths: LimbPaths) -> list[Failure]:

@@ -1,0 +1,71 @@
+"""Leaning ahead: the base turns early and smoothly to where it had to turn in a hurry."""
+
+import numpy as np
+import pytest
+
+from toolkit.geometry.pose import Pose, rotation_exponential
+from toolkit.wholebody import plan as wholebody
+from toolkit.wholebody.lean import AROUND, WORTH, lean_ahead
+from toolkit.wholebody.limb_paths import limb_paths
+from toolkit.wholebody.plan import solve_ik, whole_body
+from toolkit.world.scene import compose_scene
+
+
+@pytest.fixture
+def paths(robot, flat_walk):
+    return limb_paths(robot, flat_walk.world, flat_walk.schedule, flat_walk.motion)
+
+
+def postures(robot, paths, times, turn):
+    """The home posture at every time, its base turned by rotation vectors (T, 3) from the heading of the feet."""
+    result = np.tile(robot.home, (len(times), 1))
+    for row, (time, vector) in enumerate(zip(times, turn, strict=True)):
+        rotation = paths.mean_feet(time).rotation @ rotation_exponential(vector)
+        result[row, 3:7] = Pose(rotation, np.zeros(3)).quaternion_wxyz
+    return result
+
+
+def test_a_hurried_turn_is_begun_early_and_reached_in_full(robot, paths):
+    times = np.linspace(0.0, 2.0, 101)
+    turn = np.zeros((101, 3))
+    turn[50:53, 1] = 0.3
+    lean = lean_ahead(paths, times, postures(robot, paths, times, turn))
+    assert lean is not None
+    np.testing.assert_allclose(lean.at(1.02), [0.0, 0.3, 0.0], atol=1e-6)
+    assert lean.at(1.0 - AROUND)[1] > 0.1 and lean.at(1.0 - 2.1 * AROUND)[1] == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(np.diff(lean.turn[:, 1])).max() < 0.3 / 10  # spread over many samples
+
+
+def test_a_base_that_hardly_turns_leans_enough(robot, paths):
+    times = np.linspace(0.0, 1.0, 51)
+    turn = np.zeros((51, 3))
+    turn[20:, 2] = 0.9 * WORTH
+    assert lean_ahead(paths, times, postures(robot, paths, times, turn)) is None
+
+
+def test_the_base_follows_the_wanted_lean(robot, flat_walk, paths):
+    times = np.linspace(0.0, 1.0, 51)
+    turn = np.zeros((51, 3))
+    turn[:, 2] = 0.1
+    lean = lean_ahead(paths, times, postures(robot, paths, times, turn))
+    qpos = solve_ik(robot, paths, flat_walk.motion, times, lean=lean)
+    base = Pose.from_quaternion(qpos[-1, :3], qpos[-1, 3:7]).rotation
+    expected = paths.mean_feet(1.0).rotation @ rotation_exponential(turn[-1])
+    np.testing.assert_allclose(base, expected, atol=0.02)  # a weak task among stronger ones
+
+
+def test_passes_end_with_the_first_that_holds_and_after_the_last_one(robot, flat_walk, monkeypatch):
+    """A failing check is answered by another pass with a lean, as long as there is one; a passing one is not."""
+    scene, leans = compose_scene(robot, flat_walk.world), []
+
+    def solved(robot, paths, motion, times, scene=None, lean=None):
+        leans.append(lean)
+        return solve_ik(robot, paths, motion, times, scene, lean)
+
+    monkeypatch.setattr(wholebody, "solve_ik", solved)
+    assert whole_body(flat_walk, scene).trajectory.feasible and leans == [None]
+    leans.clear()
+    monkeypatch.setattr("toolkit.wholebody.check.COM_ERROR", 0.0)
+    monkeypatch.setattr("toolkit.wholebody.lean.WORTH", 0.0)
+    assert not whole_body(flat_walk, scene).trajectory.feasible
+    assert len(leans) == wholebody.PASSES and leans[0] is None and None not in leans[1:]
