@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.shipped_robots import OWN
 from toolkit.centroidal.build import initial_com
 from toolkit.centroidal.plan import MotionPlan
 from toolkit.centroidal.sequence import optimise
@@ -14,7 +15,7 @@ from toolkit.contacts.stance import Contact, Stance
 from toolkit.execution.run import execute
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import whole_body
 from toolkit.world.loader import load_world
@@ -82,7 +83,7 @@ def flat(tmp_path_factory):
     return make
 
 
-@pytest.fixture(params=find_robots(), scope="session")
+@pytest.fixture(params=OWN, scope="session")
 def robot(request):
     return load_robot(request.param)
 

@@ -178,10 +178,10 @@ from toolkit.centroidal.sequence import optimise_transition
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.world.timing import Timing
 
-robot = load_robot(find_robots()[0])
+robot = load_robot(None)
 start = Stance(tuple(sole(robot, limb) for limb in FEET))
 step = ContactTransition(Limb.LEFT_FOOT, sole(robot, Limb.LEFT_FOOT, 0.1), Timing(0.4, 0.6))
 optimise_transition(robot, start, initial_com(robot, start), np.zeros(3), step)

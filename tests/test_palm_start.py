@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.shipped_robots import OWN
 from toolkit import pipeline
 from toolkit.geometry.limb import Limb
 from toolkit.robot.loader import load_robot
@@ -14,7 +15,6 @@ from toolkit.search.planner import PlannerConfig
 from toolkit.world.loader import load_world
 
 PALM = Limb.LEFT_PALM
-ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
 
 
 def leaning(robot):
@@ -33,7 +33,7 @@ def leaning(robot):
     )
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", OWN)
 def test_a_start_on_a_palm_is_planned_executed_and_replayed(name):
     robot = load_robot(name)
     if PALM not in robot.arms:

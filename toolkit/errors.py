@@ -23,6 +23,10 @@ class RobotError(InputError):
     """A robot folder is missing, broken, or inconsistent."""
 
 
+class PackageError(RobotError):
+    """A robot's model is in a package that is not installed."""
+
+
 class DatasetError(InputError):
     """A training data set is truncated, or belongs to another robot or problem."""
 

@@ -59,7 +59,7 @@ def main(argv: list[str] | None = None) -> int:
 def _list(console: Console, robots_dir: Path | None) -> int:
     from rich.table import Table
 
-    from toolkit.errors import RobotError
+    from toolkit.errors import PackageError, RobotError
     from toolkit.robot.description import FILE_NAME, read_description
     from toolkit.robot.loader import find_robots, load_robot, robots_folder
 
@@ -70,6 +70,7 @@ def _list(console: Console, robots_dir: Path | None) -> int:
     for column in table.columns:
         column.no_wrap = column.header != "limbs"
     broken: dict[str, RobotError] = {}
+    missing: dict[str, PackageError] = {}
     for name in names:
         try:
             robot = load_robot(name, robots_dir)
@@ -77,10 +78,15 @@ def _list(console: Console, robots_dir: Path | None) -> int:
             limbs = ", ".join(limb.label for limb in robot.limbs)
             numbers = (f"{robot.mass:.1f}", f"{robot.com_height:.2f}", str(len(robot.joint_names)))
             table.add_row(name, *numbers, limbs, facts.licence)
+        except PackageError as error:
+            missing[name] = error
+            table.add_row(name, "", "", "", "package missing", "", style="yellow")
         except RobotError as error:
             broken[name] = error
             table.add_row(name, "", "", "", "cannot be loaded", "", style="red")
     console.print(table)
+    for name, error in missing.items():
+        console.print(f"{name}: {error}", style="yellow", soft_wrap=True, markup=False)
     for name, error in broken.items():
         console.print(f"{name}: {error}", style="red", soft_wrap=True, markup=False)
     return next(iter(broken.values())).exit_code if broken else 0
@@ -89,6 +95,7 @@ def _list(console: Console, robots_dir: Path | None) -> int:
 def _describe(console: Console, robot: RobotModel) -> None:
     from rich.table import Table
 
+    from toolkit.report.console import print_warnings
     from toolkit.robot.description import FILE_NAME, read_description
 
     facts = read_description(robot.folder / FILE_NAME)
@@ -109,6 +116,7 @@ def _describe(console: Console, robot: RobotModel) -> None:
         numbers = (robot.torque_limit[i], robot.velocity_limit[i], robot.armature[i], robot.home[7 + i])
         joints.add_row(name, f"{robot.lower[i]:.3f}…{robot.upper[i]:.3f}", *(f"{value:g}" for value in numbers))
     console.print(joints)
+    print_warnings(console, robot)
 
 
 def _picture(robot: RobotModel, path: Path) -> None:

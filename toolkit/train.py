@@ -30,10 +30,11 @@ def run_collect(args: argparse.Namespace, console: Console) -> int:
     from toolkit.learning.collect_config import CollectConfig
     from toolkit.learning.jobs import executor
     from toolkit.prediction.networks import digest
-    from toolkit.report.console import progress_bar
+    from toolkit.report.console import print_warnings, progress_bar
     from toolkit.robot.loader import load_robot
 
     robot = load_robot(args.robot, args.robots)
+    print_warnings(console, robot)
     networks = _searching_networks(args, robot)
     config = CollectConfig(
         robot=robot.name,

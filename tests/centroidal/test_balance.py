@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from tests.centroidal.walks import foot
+from tests.shipped_robots import OWN
 from toolkit.centroidal.balance import statically_balanced
 from toolkit.centroidal.problem import GRAVITY, Margins
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 
 
-@pytest.fixture(scope="module", params=find_robots())
+@pytest.fixture(scope="module", params=OWN)
 def walker(request):
     return load_robot(request.param)
 

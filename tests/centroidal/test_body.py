@@ -9,6 +9,7 @@ import pytest
 
 from tests.centroidal.walks import walk
 from tests.physics.test_leg import random_legs
+from tests.shipped_robots import OWN
 from toolkit.centroidal.body import (
     BodyMargins,
     body_residuals,
@@ -21,11 +22,11 @@ from toolkit.centroidal.problem import GRAVITY, CentroidalMotion
 from toolkit.centroidal.program import leg_limits
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins, leg_clearances, leg_posture, leg_torques
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from validation.reference.pieces import pieces
 
 
-@pytest.fixture(scope="module", params=find_robots())
+@pytest.fixture(scope="module", params=OWN)
 def walker(request):
     return load_robot(request.param)
 

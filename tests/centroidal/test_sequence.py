@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.centroidal.walks import foot, walk
+from tests.shipped_robots import OWN
 from toolkit.centroidal.body import body_residuals
 from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_problem
 from toolkit.centroidal.problem import Margins
@@ -21,12 +22,12 @@ from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import InputError
 from toolkit.geometry.limb import FEET, PALMS
 from toolkit.geometry.pose import Pose
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from validation.reference.pieces import pieces
 from validation.reference.sequence import Reference
 
 
-@pytest.fixture(scope="module", params=find_robots())
+@pytest.fixture(scope="module", params=OWN)
 def walker(request):
     return load_robot(request.param)
 

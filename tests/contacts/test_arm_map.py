@@ -4,12 +4,13 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.shipped_robots import OWN
 from toolkit.contacts.arm_map import MARGIN, ArmMap
 from toolkit.robot.chain import arm_joints
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 
 
-@pytest.fixture(scope="module", params=[name for name in find_robots() if load_robot(name).arms])
+@pytest.fixture(scope="module", params=[name for name in OWN if load_robot(name).arms])
 def robot(request):
     return load_robot(request.param)
 

@@ -4,18 +4,19 @@ import numpy as np
 import pytest
 import shapely
 
+from tests.shipped_robots import OWN
 from toolkit.contacts.room import RoomConfig, landing_room, moved_sequence
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.world.surface import Surface
 from toolkit.world.world import Goal
 
 
-@pytest.fixture(scope="module", params=find_robots())
+@pytest.fixture(scope="module", params=OWN)
 def robot(request):
     return load_robot(request.param)
 

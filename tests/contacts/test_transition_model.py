@@ -1,13 +1,10 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from tests.shipped_robots import OWN
 from toolkit.contacts.transition_model import TransitionModel, palm_rays, running_steps, steps_38, steps_60
 from toolkit.geometry.limb import Limb
 from toolkit.robot.loader import load_robot
-
-ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
 
 
 def rows(array):
@@ -41,7 +38,7 @@ def test_rays_are_unit_and_point_to_the_left():
     assert set(np.round(np.degrees(np.arcsin(rays[:, 2]))).astype(int)) == {-20, 0, 20}
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", OWN)
 def test_right_limbs_mirror_left_ones_and_soles_stay_apart(name):
     robot = load_robot(name)
     model = TransitionModel.of(robot, steps_60())

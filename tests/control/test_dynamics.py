@@ -4,11 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.shipped_robots import OWN
 from toolkit.control.dynamics import RobotDynamics
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 
 
-@pytest.fixture(params=find_robots(), scope="module")
+@pytest.fixture(params=OWN, scope="module")
 def robot(request):
     return load_robot(request.param)
 

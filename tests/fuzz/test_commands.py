@@ -18,10 +18,10 @@ import pytest
 from tests.fuzz.budget import SEED, seconds
 from tests.fuzz.run_commands import hurt, make_inputs, run_command
 from tests.report.conftest import make_run
+from tests.shipped_robots import OWN
 from toolkit.errors import InputError
 from toolkit.exchange.formats import FORMATS
 from toolkit.report.plan_file import read_plan, write_plan
-from toolkit.robot.loader import find_robots
 from toolkit.world.generators import KINDS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -93,7 +93,7 @@ def command_line(rng: np.random.Generator) -> tuple[str, list[str]]:
     elif module == "surfaces":
         words = [world, *out]
     elif module == "robots":
-        name = [] if rng.random() < 0.2 else [find_robots()[0] if rng.random() < 0.7 else odd(rng)]
+        name = [] if rng.random() < 0.2 else [OWN[0] if rng.random() < 0.7 else odd(rng)]
         words = [*name, *odd_options(rng, ["--robots", "--picture"], 2)]
     else:
         names = PLANNING + (VALIDATE if module == "validate" else [])

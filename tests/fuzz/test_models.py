@@ -14,9 +14,10 @@ import pytest
 from tests.fuzz.budget import SEED, seconds
 from tests.fuzz.children import run_in_child
 from tests.fuzz.mutation import ROOT, damaged_toml, damaged_xml
+from tests.shipped_robots import OWN
 from tests.world.probe import random_points, ray_gap
 from toolkit.errors import RobotError, WorldError
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.world.loader import load_world
 
 LIMIT = 60  # s; a case that takes longer hangs
@@ -47,7 +48,7 @@ def check_world(seed: int, folder: Path) -> bool:
 def check_robot(seed: int, folder: Path) -> bool:
     """Load one damaged robot; whether it was accepted."""
     rng = np.random.default_rng([seed, 2])
-    original = ROOT / "robots" / find_robots(ROOT / "robots")[0]
+    original = ROOT / "robots" / OWN[0]
     damaged = folder / "robot"
     shutil.rmtree(damaged, ignore_errors=True)
     damaged.mkdir()

@@ -14,13 +14,14 @@ import pytest
 from tests.fuzz.budget import SEED, seconds
 from tests.fuzz.children import run_in_child
 from tests.fuzz.verdict_oracle import replayed
+from tests.shipped_robots import OWN
 from toolkit import pipeline
 from toolkit.errors import ToolkitError, WorldError
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.execution.recorder import MAX_TILT, MIN_HEIGHT
 from toolkit.execution.verdict import RANGE_TOLERANCE, SCUFF_LIMIT
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.planner import PlannerConfig
 from toolkit.world.generators import KINDS
@@ -70,7 +71,7 @@ def some_disturbance(rng):
 def check_verdict(seed):
     """Plan and execute one case, and hold the verdict against the replay; how it ended."""
     rng = np.random.default_rng([seed, 3])
-    robots = find_robots()
+    robots = OWN
     robot = load_robot(robots[int(rng.integers(len(robots)))])
     try:
         world, what = some_world(rng)

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from tests.oracles.leg import angles_of, chain, torques
+from tests.shipped_robots import OWN
 from toolkit.compiled import compiled
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.physics.leg import ReachMargins, leg_clearances, leg_posture, leg_torques, posture_between
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from validation.reference.pieces import pieces
 
 
-@pytest.fixture(scope="module", params=find_robots())
+@pytest.fixture(scope="module", params=OWN)
 def robot(request):
     return load_robot(request.param)
 

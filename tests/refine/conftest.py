@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from tests.search.worlds import FLOOR, make_world
+from tests.shipped_robots import OWN
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
 from toolkit.pipeline.planner import make_planner
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.planner_config import PlannerConfig
@@ -45,7 +46,7 @@ def steps(start, count, stride):
 @pytest.fixture(scope="session")
 def walk():
     """Eight small steps over 0.7 m."""
-    robot = load_robot(find_robots()[0])
+    robot = load_robot(OWN[0])
     world = make_world(FLOOR, goal=(0.7, 0, 0), radius=0.15, timing="0.4 0.6")
     config = PlannerConfig(search=AnaStarConfig(max_expansions=20))
     planner = make_planner(robot, world, "kinematic", config)

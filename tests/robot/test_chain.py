@@ -4,11 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.shipped_robots import EVERY
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 
 
-@pytest.fixture(scope="module", params=find_robots())
+@pytest.fixture(scope="module", params=EVERY)
 def robot(request):
     return load_robot(request.param)
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from tests.robot.samples import TOML, biped_mjcf, write_robot
+from tests.shipped_robots import OWN
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 
 LEFT = Limb.LEFT_FOOT
@@ -42,7 +43,7 @@ def bent_zero() -> tuple[str, str]:
     return model, TOML.replace('"*_knee" = 0.7', '"*_knee" = 0.3')
 
 
-@pytest.fixture(params=["plain", "reversed knees", "bent zero", *find_robots()])
+@pytest.fixture(params=["plain", "reversed knees", "bent zero", *OWN])
 def robot(request: pytest.FixtureRequest, tmp_path: Path) -> RobotModel:
     variants = {"plain": (biped_mjcf(), TOML), "reversed knees": reversed_knees(), "bent zero": bent_zero()}
     if request.param not in variants:
@@ -114,7 +115,7 @@ def test_knee_that_cannot_straighten_limits_the_length(tmp_path: Path) -> None:
     assert leg.max_length == pytest.approx(np.hypot(0.35 + 0.30 * np.cos(0.5), 0.30 * np.sin(0.5)))
 
 
-@pytest.mark.parametrize("name", find_robots())
+@pytest.mark.parametrize("name", OWN)
 def test_arm_reach(name: str) -> None:
     """No bend of the joints beyond the shoulder reaches farther, and the reach given keeps a margin."""
     robot = load_robot(name)

@@ -250,7 +250,7 @@ BAD_TOML = {
         "patch = [0.20, 0.10]", "patch = [0.20, 0.10]\nquaternion_wxyz = [0.0, 0.0, 0.0, 1.0]",
         "the feet point against the base's x axis",
     ),
-    "no velocity": ('"*" = 10.0', '"*_hip_*" = 10.0', "has no velocity limit; add it to"),
+    "no velocity": ('"*" = 10.0', '"*_hip_*" = 10.0', "have no velocity limit; add them to"),
     "negative velocity": (
         '"*" = 10.0', '"*" = -1.0', "'limits.velocity.*' = -1.0 must be a number of at least 1e-06"
     ),

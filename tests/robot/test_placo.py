@@ -7,12 +7,13 @@ import numpy as np
 import pinocchio
 import pytest
 
-from toolkit.robot.loader import find_robots, load_robot
+from tests.shipped_robots import EVERY
+from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import PinocchioMap, pinocchio_map, pinocchio_model, placo_wrapper
 
 
-@pytest.fixture(scope="module", params=find_robots())
+@pytest.fixture(scope="module", params=EVERY)
 def robot(request: pytest.FixtureRequest) -> RobotModel:
     return load_robot(request.param)
 

@@ -11,15 +11,16 @@ import numpy as np
 import placo
 import pytest
 
+from tests.shipped_robots import EVERY
 from toolkit.geometry.limb import Limb
 from toolkit.robot.description import FILE_NAME, RobotDescription, read_description
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.robot.picture import standing_scene
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
 
 
-@pytest.fixture(scope="module", params=find_robots())
+@pytest.fixture(scope="module", params=EVERY)
 def robot(request: pytest.FixtureRequest) -> RobotModel:
     return load_robot(request.param)
 
@@ -45,7 +46,7 @@ def within(value: float, bounds: list[float]) -> bool:
 
 
 def test_some_robot_is_there() -> None:
-    assert find_robots()
+    assert EVERY
 
 
 def test_declared_numbers(robot: RobotModel, declared: dict) -> None:
@@ -119,14 +120,19 @@ def test_nothing_is_lower_than_the_soles(robot: RobotModel) -> None:
     data = mujoco.MjData(model)
     data.qpos[:] = robot.home
     mujoco.mj_forward(model, data)
-    touching = {model.body(model.geom_bodyid[max(pair)]).name for pair in data.contact.geom}
-    assert touching <= {robot.limbs[foot].body for foot in robot.legs}
+    touching = {int(model.body_weldid[model.geom_bodyid[max(pair)]]) for pair in data.contact.geom}
+    assert touching <= {int(model.body_weldid[model.body(robot.limbs[foot].body).id]) for foot in robot.legs}
     assert (data.contact.dist > -3e-3).all()
 
 
 def test_patches_lie_on_shapes(robot: RobotModel) -> None:
     """The corners of every patch touch a collision shape of its body, and none of them sticks out beyond."""
-    data, model = home_data(robot), robot.mujoco_model
+    model = mujoco.MjModel.from_xml_string(robot.mjcf, robot.assets)
+    model.geom_group[:] = np.where(model.geom_contype | model.geom_conaffinity, 0, 5)  # what is only drawn is left out
+    data = mujoco.MjData(model)
+    data.qpos[:] = robot.home
+    mujoco.mj_forward(model, data)
+    groups = np.array([1, 0, 0, 0, 0, 0], np.uint8)
     for limb, item in robot.limbs.items():
         site, body = data.site(item.site), model.body(item.body).id
         rotation = site.xmat.reshape(3, 3)
@@ -134,8 +140,8 @@ def test_patches_lie_on_shapes(robot: RobotModel) -> None:
             corner = site.xpos + rotation @ np.array([x, y, 0] * np.append(item.half_size, 0))
             outside = corner - 0.05 * rotation[:, 2]  # a ray from the touched surface into the limb
             hit = np.zeros(1, np.int32)
-            distance = mujoco.mj_ray(model, data, outside, rotation[:, 2], None, 1, -1, hit)
-            assert hit[0] >= 0 and model.geom_bodyid[hit[0]] == body, limb.label
+            distance = mujoco.mj_ray(model, data, outside, rotation[:, 2], groups, 1, -1, hit)
+            assert hit[0] >= 0 and model.body_weldid[model.geom_bodyid[hit[0]]] == model.body_weldid[body], limb.label
             assert distance == pytest.approx(0.05, abs=3e-3), limb.label
 
 

@@ -1,14 +1,11 @@
 """A robot from robots/."""
 
-from pathlib import Path
-
 import pytest
 
+from tests.shipped_robots import OWN
 from toolkit.robot.loader import load_robot
-
-ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
 
 
 @pytest.fixture(scope="session")
 def robot():
-    return load_robot(ROBOTS[0])
+    return load_robot(OWN[0])

@@ -1,8 +1,7 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from tests.shipped_robots import OWN
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z, rotation_on_surface
 from toolkit.physics.leg import LIMITS, ReachMargins, leg_clearances, leg_posture
@@ -11,10 +10,8 @@ from toolkit.search.moves.legs import legs_of, reach, stances_violated
 from toolkit.search.moves.reasons import OF_LIMIT, Reason
 from toolkit.search.moves.shanks import shanks_of
 
-ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
 
-
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", OWN)
 def test_same_verdict_as_the_closed_form(name):
     robot = load_robot(name)
     rng = np.random.default_rng(0)
@@ -41,7 +38,7 @@ def test_same_verdict_as_the_closed_form(name):
 
 
 def test_a_lower_com_brings_long_strides_into_reach():
-    robot = load_robot(ROBOTS[0])
+    robot = load_robot(OWN[0])
     legs = legs_of(robot, ReachMargins(ankle=0.0))
     stride = 0.45 * robot.legs[FEET[0]].max_length
     y = robot.legs[FEET[0]].hip_in_com[1]
@@ -56,7 +53,7 @@ def test_a_lower_com_brings_long_strides_into_reach():
 
 
 def test_legs_in_each_others_way_are_no_stance():
-    robot = load_robot(ROBOTS[0])
+    robot = load_robot(OWN[0])
     legs, shanks = legs_of(robot, ReachMargins(ankle=0.0, hip=-0.5)), shanks_of(robot)
     com, drop = np.array([[0.0, 0.0, robot.com_height]]), np.array([0.1])
 

@@ -1,9 +1,8 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tests.search.worlds import FLOOR, box, make_world
+from tests.shipped_robots import OWN
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, rotation_on_surface
@@ -16,10 +15,8 @@ from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.shanks import ball_free, segment_distance, shanks_of
 from toolkit.search.planner import ContactPlanner
 
-ROBOTS = sorted(path.parent.name for path in Path("robots").glob("*/robot.toml"))
 
-
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", OWN)
 def test_points_and_radii_of_the_legs(name):
     robot = load_robot(name)
     radius = shanks_of(robot)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.shipped_robots import OWN
 from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_problem
 from toolkit.centroidal.plan import MotionPlan
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion
@@ -11,13 +12,13 @@ from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
-from toolkit.robot.loader import find_robots, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.wholebody.limb_paths import free_palm
 from toolkit.world.loader import load_world
 from toolkit.world.timing import Timing
 from toolkit.world.world import World
 
-ROBOTS = find_robots()
+ROBOTS = OWN
 RISE = 0.10  # m, of a stair
 TREAD = 0.34  # m, deep enough for the longest sole and a margin on both sides
 FIRST = 0.15  # m, where the stairs begin

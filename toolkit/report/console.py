@@ -31,6 +31,7 @@ from toolkit.pipeline.loop import PipelineResult
 from toolkit.pipeline.observer import Observer
 from toolkit.report.run_report import RunReport
 from toolkit.report.summary import sequence_rows
+from toolkit.robot.model import RobotModel
 
 STYLES = {Result.PASS: "bold green", Result.FAIL: "bold red", Result.NOT_CHECKED: "yellow"}
 PLAIN_WIDTH = 160  # columns assumed where the output is no terminal
@@ -56,6 +57,12 @@ class _Console(Console):
 def make_console() -> Console:
     """A console on standard output; plain, uncoloured and wide where that is no terminal."""
     return _Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH, highlight=False)
+
+
+def print_warnings(console: Console, robot: RobotModel) -> None:
+    """Print what is doubtful about a robot, a line each."""
+    for warning in robot.warnings:
+        console.print(f"warning: {robot.name}: {warning}", style="yellow", soft_wrap=True, markup=False)
 
 
 def progress_bar(console: Console) -> Progress:
@@ -120,6 +127,11 @@ class StageConsole(Observer):
         result = Result.PASS if passed else Result.FAIL
         row = Text(f"{stage:<11}").append(f"{result.value:<8}", style=STYLES[result]).append(f"{seconds:>7.2f} s  ")
         self._line(row.append(" ".join(detail.split())))
+
+    def warn(self, robot: RobotModel) -> None:
+        """Print what is doubtful about a robot."""
+        self._clear()
+        print_warnings(self.console, robot)
 
     def verdict(self, checks: Sequence[Check], passed: bool, reason: str, folder: Path, seconds: float) -> None:
         """Print the checks, then `PASS` or `FAIL: reason` on its own line, then the folder of the run's files.

@@ -14,7 +14,7 @@ from time import perf_counter
 from packaging.requirements import Requirement
 
 from toolkit.compiled import kept_folder
-from toolkit.errors import NetworkError, RobotError, ToolkitError
+from toolkit.errors import NetworkError, PackageError, RobotError, ToolkitError
 from toolkit.pipeline import Observer, PipelineConfig, make_planner, run
 from toolkit.pipeline.warmup import lacking, listed, warm_up
 from toolkit.prediction.networks import load_networks
@@ -98,6 +98,9 @@ def check_robots(folder: Path | None = None) -> Iterator[Finding]:
     for name in names:
         try:
             robot = load_robot(name, folder)
+        except PackageError as error:
+            yield Finding(name, State.NOTE, str(error))
+            continue
         except RobotError as error:
             yield Finding(name, State.BAD, str(error))
             continue

@@ -104,6 +104,7 @@ class RunReport:
         checks: Checks of the verdict.
         options: Further settings of the run.
         versions: Versions of the software.
+        warnings: What is doubtful about the robot, one line each.
     """
 
     world: str
@@ -115,6 +116,7 @@ class RunReport:
     checks: tuple[Check, ...] = ()
     options: dict[str, Any] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=versions)
+    warnings: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -131,7 +133,16 @@ class RunReport:
         }
         verdict, reason = ("PASS", "") if result.passed else ("FAIL", result.reason)
         names = result.world.name, result.robot.name
-        return cls(*names, result.config.seed, verdict, reason, stages, result.checks, settings or {})
+        return cls(
+            *names,
+            result.config.seed,
+            verdict,
+            reason,
+            stages,
+            result.checks,
+            settings or {},
+            warnings=result.robot.warnings,
+        )
 
     @classmethod
     def without_search(cls, world: World, robot: str, seed: int, reason: str, settings: dict[str, Any]) -> RunReport:
@@ -151,6 +162,7 @@ class RunReport:
             "options": self.options,
             "verdict": self.verdict,
             "reason": self.reason,
+            "warnings": list(self.warnings),
             "stages": self.stages,
             "checks": check_entries(self.checks),
         }
@@ -200,6 +212,7 @@ def read_report(path: Path) -> RunReport:
             stages=stages,
             checks=checks,
             options=dict(content["options"]),
+            warnings=tuple(str(warning) for warning in content.get("warnings", [])),
             versions={str(name): str(version) for name, version in dict(content["versions"]).items()},
             **words,
         )

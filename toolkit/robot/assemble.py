@@ -13,8 +13,12 @@ from toolkit.errors import InputError, RobotError
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.mjcf import compile_spec, copy_fields, one_line
-from toolkit.robot.description import LimbDescription, RobotDescription, match_joints, suggestion
+from toolkit.robot.description import LimbDescription, RobotDescription, match_joints
 from toolkit.robot.locking import lock_joints
+from toolkit.robot.mend import mended
+from toolkit.robot.motors import set_motors
+from toolkit.robot.problems import Problems
+from toolkit.robot.reader import suggestion
 from toolkit.robot.source import ModelSource
 
 ROOT_JOINT = "root_joint"
@@ -30,6 +34,8 @@ class Assembly:
         mujoco_model: The compiled `mjcf`.
         velocity: Velocity limit of each actuated joint, rad/s.
         bodies: Name of the body that carries the site of each limb.
+        home: Positions of joints in the home posture, rad; those that are not there are at 0.
+        warnings: What was assumed or changed, one line each.
     """
 
     mjcf: str
@@ -37,6 +43,8 @@ class Assembly:
     mujoco_model: mujoco.MjModel = field(repr=False)
     velocity: dict[str, float]
     bodies: dict[Limb, str]
+    home: dict[str, float]
+    warnings: tuple[str, ...]
 
 
 def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
@@ -47,24 +55,70 @@ def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
     compensation, floor).
 
     Raises:
-        RobotError: Unknown or unsupported names, joints or constraints, or missing limits.
+        RobotError: Unknown or unsupported names, joints or constraints, or missing limits; the message names all of
+            them that can be found at once.
     """
-    spec, where = source.spec, description.path
-    _check_tree(description, source)
+    problems = Problems(description.path)
+    try:
+        source = mended(source, description.mend, description.base, problems)
+    except ValueError as error:
+        raise RobotError(f"{source.path}: MuJoCo cannot compile it: {one_line(error)}") from None
+    problems.check()
+    spec = source.spec
+    _check_tree(description, source, problems)
+    problems.check()
+    keyframe = _keyframe(description, source)
     names = [joint.name for joint in spec.joints if joint.type != mujoco.mjtJoint.mjJNT_FREE]
-    locked = match_joints(where, "model.locked_joints", description.locked_joints, names)
+    locked = match_joints(problems, "model.locked_joints", description.locked_joints, names)
     try:
         lock_joints(spec, locked)
     except RobotError as error:
         raise RobotError(f"{source.path}: {error}") from None
-    _strip(source)
-    _check_names(source)
+    _strip(source, problems)
+    _check_names(source, problems)
+    problems.check()
     bare = _compiled(source, spec)
-    velocity = _set_joints(description, source, bare)
-    bodies = {limb: _add_site(description, item, spec, bare) for limb, item in description.limbs.items()}
+    motors = set_motors(description, source, bare, problems)
+    bodies = {limb: _add_site(item, spec, bare, problems) for limb, item in description.limbs.items()}
+    problems.check()
     _compiled(source, spec)
     mjcf, assets = spec.to_xml(), dict(spec.assets)
-    return Assembly(mjcf, assets, _compiled(source, mjcf), velocity, bodies)
+    model = _compiled(source, mjcf)
+    home = _home(description, model, keyframe, problems)
+    problems.check()
+    return Assembly(mjcf, assets, model, motors.velocity, bodies, home, motors.warnings)
+
+
+def _keyframe(description: RobotDescription, source: ModelSource) -> dict[str, float]:
+    """Positions of hinges and slides in the keyframe that the home posture begins with; nothing where none is named.
+
+    Raises:
+        RobotError: The model has no such keyframe.
+    """
+    if description.keyframe is None:
+        return {}
+    names = [key.name for key in source.spec.keys]
+    if description.keyframe not in names:
+        wanted = f"[home] keyframe '{description.keyframe}' does not exist in {source.path.name}"
+        raise RobotError(f"{description.path}: {wanted}; {suggestion(description.keyframe, names)}")
+    model = _compiled(source, source.spec)
+    qpos = model.key(description.keyframe).qpos
+    single = [j for j in range(model.njnt) if model.jnt_type[j] != mujoco.mjtJoint.mjJNT_FREE]
+    return {model.joint(j).name: float(qpos[model.jnt_qposadr[j]]) for j in single}
+
+
+def _home(
+    description: RobotDescription, model: mujoco.MjModel, keyframe: dict[str, float], problems: Problems
+) -> dict[str, float]:
+    names = [model.joint(j).name for j in range(1, model.njnt)]
+    said = match_joints(problems, "home", description.home, names)
+    home = {name: keyframe[name] for name in names if name in keyframe} | said
+    for name in names:
+        low, high = model.joint(name).range
+        value = home.get(name, 0.0)
+        if not low <= value <= high:
+            problems.add(f"[home] joint '{name}' = {value:g} is outside its range {low:g} to {high:g}")
+    return home
 
 
 def _compiled(source: ModelSource, what: mujoco.MjSpec | str) -> mujoco.MjModel:
@@ -89,7 +143,7 @@ def exclude_pairs(assembly: Assembly, pairs: Sequence[tuple[str, str]]) -> Assem
     return replace(assembly, mjcf=mjcf, mujoco_model=mujoco.MjModel.from_xml_string(mjcf, assembly.assets))
 
 
-def _check_tree(description: RobotDescription, source: ModelSource) -> None:
+def _check_tree(description: RobotDescription, source: ModelSource, problems: Problems) -> None:
     spec = source.spec
     roots = [body.name for body in spec.worldbody.bodies]
     base = spec.body(description.base)
@@ -102,22 +156,21 @@ def _check_tree(description: RobotDescription, source: ModelSource) -> None:
     if roots != [description.base]:
         raise RobotError(
             f"{description.path}: model.base '{description.base}' must be the only body at the root of "
-            f"{source.path.name}; found {', '.join(roots)}"
+            f"{source.path.name}; found {', '.join(roots)}; drop the others in [mend]"
         )
     for joint in spec.joints:
         body = joint.parent.name
         if joint.type == mujoco.mjtJoint.mjJNT_BALL:
-            raise RobotError(f"{source.path}: joint '{joint.name}' on body '{body}' is a ball joint; use three hinges")
+            problems.add(f"joint '{joint.name}' on body '{body}' is a ball joint; use three hinges", source.path)
         if joint.type == mujoco.mjtJoint.mjJNT_FREE:
             if body != description.base:
-                raise RobotError(f"{source.path}: body '{body}' floats freely; only the base may")
-            continue
-        if body == description.base:
-            raise RobotError(
-                f"{source.path}: joint '{joint.name}' moves the base '{body}'; only a free joint may stand there"
+                problems.add(f"body '{body}' floats freely; only the base may", source.path)
+        elif body == description.base:
+            problems.add(
+                f"joint '{joint.name}' moves the base '{body}'; only a free joint may stand there", source.path
             )
-        if not joint.name:
-            raise RobotError(f"{source.path}: a joint on body '{body}' has no name; name it")
+        elif not joint.name:
+            problems.add(f"a joint on body '{body}' has no name; name it", source.path)
     free = [joint for joint in base.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
     root = free[0] if free else base.add_freejoint()
     root.name, root.align = ROOT_JOINT, mujoco.mjtAlignFree.mjALIGNFREE_FALSE
@@ -126,20 +179,22 @@ def _check_tree(description: RobotDescription, source: ModelSource) -> None:
         body.name = f"unnamed_body_{index}"
 
 
-def _strip(source: ModelSource) -> None:
+def _strip(source: ModelSource, problems: Problems) -> None:
     spec = source.spec
     joints = {joint.name for joint in spec.joints}
     for equality in list(spec.equalities):
         # A constraint between locked joints has no effect any more.
         if equality.type != mujoco.mjtEq.mjEQ_JOINT or equality.name1 in joints or equality.name2 in joints:
             what = f"'{equality.name}'" if equality.name else f"on '{equality.name1}'"
-            raise RobotError(
-                f"{source.path}: equality or mimic constraint {what} is not supported; "
-                "remove it, or lock the joints in robot.toml [model.locked_joints]"
+            problems.add(
+                f"equality or mimic constraint {what} is not supported; remove it, or lock the joints in robot.toml "
+                "[model.locked_joints]",
+                source.path,
             )
-        spec.delete(equality)
+        else:
+            spec.delete(equality)
     if spec.tendons:
-        raise RobotError(f"{source.path}: tendons are not supported; remove them")
+        problems.add("tendons are not supported; remove them", source.path)
     world = spec.worldbody
     for group in (spec.keys, spec.sensors, spec.cameras, spec.lights, world.geoms, world.sites):
         for item in list(group):
@@ -151,96 +206,42 @@ def _strip(source: ModelSource) -> None:
     copy_fields(mujoco.MjSpec().option, spec.option)
 
 
-def _check_names(source: ModelSource) -> None:
+def _check_names(source: ModelSource, problems: Problems) -> None:
     bodies = {body.name for body in source.spec.bodies}
     for joint in source.spec.joints:
         if joint.name in bodies:
-            raise RobotError(
-                f"{source.path}: '{joint.name}' names both a joint and a body; rename the body to '{joint.name}_link'"
+            problems.add(
+                f"'{joint.name}' names both a joint and a body; rename the body to '{joint.name}_link', here or in "
+                "[mend.rename_bodies]",
+                source.path,
             )
     # A contact site is named after its limb, and no body may have that name in placo's list of frames.
     for limb in Limb:
         if limb.label in bodies:
             name = f"{limb.label}_link"
             if name in bodies:
-                raise RobotError(f"{source.path}: has bodies '{limb.label}' and '{name}'; rename one of them")
-            source.spec.body(limb.label).name = name
+                problems.add(f"has bodies '{limb.label}' and '{name}'; rename one of them", source.path)
+            else:
+                source.spec.body(limb.label).name = name
 
 
-def _set_joints(description: RobotDescription, source: ModelSource, bare: mujoco.MjModel) -> dict[str, float]:
-    spec, where = source.spec, description.path
-    names = [bare.joint(j).name for j in range(bare.njnt) if bare.jnt_type[j] != mujoco.mjtJoint.mjJNT_FREE]
-    position = match_joints(where, "limits.position", description.position, names)
-    torque = _file_torques(bare) | match_joints(where, "limits.torque", description.torque, names)
-    velocity = source.velocity | match_joints(where, "limits.velocity", description.velocity, names)
-    armature = match_joints(where, "armature", description.armature, names)
-    for actuator in list(spec.actuators):
-        spec.delete(actuator)
-    for name in names:
-        joint, index = spec.joint(name), bare.joint(name).id
-        lower, upper = position.get(name, bare.jnt_range[index])
-        if name not in position and not bare.jnt_limited[index]:
-            raise RobotError(
-                f"{source.path}: joint '{name}' has no position limit; add it to {where} [limits.position]"
-            )
-        if not lower < upper:
-            raise RobotError(f"{where}: joint '{name}' has the empty range {lower:g} to {upper:g}")
-        for table, values in (("torque", torque), ("velocity", velocity)):
-            if not np.isfinite(values.get(name, np.nan)) or values[name] <= 0:
-                raise RobotError(
-                    f"{source.path}: joint '{name}' has no {table} limit; add it to {where} [limits.{table}]"
-                )
-        scale = 1.0 if not spec.compiler.degree or joint.type != mujoco.mjtJoint.mjJNT_HINGE else 180.0 / np.pi
-        joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, [lower * scale, upper * scale]
-        joint.actfrclimited, joint.actgravcomp = mujoco.mjtLimited.mjLIMITED_FALSE, False
-        if name in armature:
-            joint.armature = armature[name]
-        motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        motor.set_to_motor()
-        motor.gear = [1.0, 0, 0, 0, 0, 0]
-        motor.ctrllimited = motor.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
-        motor.ctrlrange = motor.forcerange = [-torque[name], torque[name]]
-    return {name: float(velocity[name]) for name in names}
-
-
-def _file_torques(bare: mujoco.MjModel) -> dict[str, float]:
-    """Torque limits of a compiled model by joint: the smaller of the joint's and its actuators' limits, N m."""
-    torques: dict[str, float] = {}
-
-    def tighten(joint: int, low: float, high: float) -> None:
-        name = bare.joint(joint).name
-        torques[name] = min(torques.get(name, np.inf), abs(float(low)), abs(float(high)))
-
-    for joint in range(bare.njnt):
-        if bare.jnt_actfrclimited[joint]:
-            tighten(joint, *bare.jnt_actfrcrange[joint])
-    for actuator in range(bare.nu):
-        if bare.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_JOINT:
-            continue
-        joint, gear = bare.actuator_trnid[actuator, 0], abs(bare.actuator_gear[actuator, 0])
-        if bare.actuator_forcelimited[actuator]:
-            tighten(joint, *(gear * bare.actuator_forcerange[actuator]))
-        if bare.actuator_ctrllimited[actuator] and not bare.actuator_biastype[actuator]:
-            tighten(joint, *(gear * bare.actuator_gainprm[actuator, 0] * bare.actuator_ctrlrange[actuator]))
-    return torques
-
-
-def _add_site(description: RobotDescription, item: LimbDescription, spec: mujoco.MjSpec, bare: mujoco.MjModel) -> str:
-    label, where = item.limb.label, description.path
+def _add_site(item: LimbDescription, spec: mujoco.MjSpec, bare: mujoco.MjModel, problems: Problems) -> str:
+    """Add the contact site of a limb, and its pad; returns the name of its body, empty where there is a problem."""
+    label = item.limb.label
     bodies = [bare.body(i).name for i in range(1, bare.nbody)]
     sites = [bare.site(i).name for i in range(bare.nsite) if bare.site(i).name]
     if item.site is not None:
         if item.site not in sites:
-            raise RobotError(
-                f"{where}: [limbs.{label}] site '{item.site}' does not exist; {suggestion(item.site, sites)}"
-            )
+            problems.add(f"[limbs.{label}] site '{item.site}' does not exist; {suggestion(item.site, sites)}")
+            return ""
         site = bare.site(item.site)
         body, pose = bare.body(site.bodyid[0]).name, Pose.from_quaternion(site.pos, site.quat) @ item.pose
     else:
         wanted = item.body or ""
         body = f"{wanted}_link" if wanted in {limb.label for limb in Limb} else wanted
         if body not in bodies:
-            raise RobotError(f"{where}: [limbs.{label}] body '{item.body}' does not exist; {suggestion(body, bodies)}")
+            problems.add(f"[limbs.{label}] body '{item.body}' does not exist; {suggestion(body, bodies)}")
+            return ""
         pose = item.pose
     if label in sites:
         spec.delete(spec.site(label))

@@ -11,7 +11,7 @@ from toolkit.geometry.limb import Limb
 
 def joints_to(model: mujoco.MjModel, body: int) -> list[int]:
     """Indices of the hinge and slide joints of a model from the base to a body, in order."""
-    bodies = set(_up_from(model, body))  # joints are numbered from the base down
+    bodies = set(bodies_above(model, body))  # joints are numbered from the base down
     free = mujoco.mjtJoint.mjJNT_FREE
     return [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in bodies and model.jnt_type[j] != free]
 
@@ -25,9 +25,9 @@ def arm_joints(model: mujoco.MjModel, limb: Limb) -> list[int]:
     trunk = {0}
     for other in (item for item in Limb if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, item.label) >= 0):
         if other != limb:
-            trunk.update(_up_from(model, model.site_bodyid[model.site(other.label).id]))
+            trunk.update(bodies_above(model, model.site_bodyid[model.site(other.label).id]))
     # Bodies with a joint at or below them.
-    carrying = {above for body in model.jnt_bodyid for above in _up_from(model, body)}
+    carrying = {above for body in model.jnt_bodyid for above in bodies_above(model, body)}
     joints: list[int] = []
     body = int(model.site_bodyid[model.site(limb.label).id])
     while body not in trunk:
@@ -41,7 +41,7 @@ def arm_joints(model: mujoco.MjModel, limb: Limb) -> list[int]:
     return joints
 
 
-def _up_from(model: mujoco.MjModel, body: int) -> Iterator[int]:
+def bodies_above(model: mujoco.MjModel, body: int) -> Iterator[int]:
     """A body and the bodies above it, without the world."""
     while body:
         yield int(body)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import mujoco
 import numpy as np
+from scipy.optimize import least_squares
 
 from toolkit.errors import RobotError
-from toolkit.geometry.limb import FEET
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, yaw_of
 from toolkit.geometry.triangles import mesh_vertices
 from toolkit.robot.assemble import Assembly
-from toolkit.robot.description import RobotDescription, match_joints
+from toolkit.robot.chain import joints_to
+from toolkit.robot.description import RobotDescription
 
 MAX_SOLE_TILT = 0.02  # rad
 MAX_SOLE_STEP = 0.005  # m
@@ -19,24 +23,25 @@ MAX_GAP = 0.005  # m; largest distance from a contact patch to the shapes of its
 MAX_SINK = 0.003  # m; largest depth below the soles of other parts of the robot
 
 
-def home_posture(description: RobotDescription, model: mujoco.MjModel) -> np.ndarray:
+def home_posture(description: RobotDescription, model: mujoco.MjModel, values: Mapping[str, float]) -> np.ndarray:
     """Home qpos (7 + n,) of a robot alone: soles on z = 0, mean of the feet above the origin, heading +x.
 
+    Args:
+        description: What the robot.toml says.
+        model: The robot alone.
+        values: Positions of joints, rad; those that are not there are at 0.
+
     Raises:
-        RobotError: A pattern matches no joint, a joint is out of its range, the soles are not level with each other, or
-            the CoM is not above the feet.
+        RobotError: The soles are not level with each other, or the CoM is not above the feet.
     """
     where = description.path
-    names = [model.joint(j).name for j in range(1, model.njnt)]
-    values = match_joints(where, "home", description.home, names)
     data = mujoco.MjData(model)
     data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
-    for joint, name in enumerate(names, start=1):
-        low, high = model.jnt_range[joint]
-        value = values.get(name, 0.0)
-        if not low <= value <= high:
-            raise RobotError(f"{where}: [home] joint '{name}' = {value:g} is outside its range {low:g} to {high:g}")
-        data.qpos[model.jnt_qposadr[joint]] = value
+    for joint in range(1, model.njnt):
+        data.qpos[model.jnt_qposadr[joint]] = values.get(model.joint(joint).name, 0.0)
+    if description.flat_soles:
+        for foot in FEET:
+            _flatten(model, data, foot)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
 
@@ -57,6 +62,22 @@ def home_posture(description: RobotDescription, model: mujoco.MjModel) -> np.nda
     _check_balance(description, base @ data.subtree_com[1], [base @ sole for sole in soles])
     _check_lowest(description, model, data)
     return data.qpos.copy()
+
+
+def _flatten(model: mujoco.MjModel, data: mujoco.MjData, foot: Limb) -> None:
+    """Turn the joints below the knee until the sole's normal is the base's z axis, or as near to it as they go."""
+    site = model.site(foot.label).id
+    ankle = np.array(joints_to(model, int(model.site_bodyid[site]))[4:], int)
+    address = model.jnt_qposadr[ankle]
+
+    def tilt(angles: np.ndarray) -> np.ndarray:
+        data.qpos[address] = angles
+        mujoco.mj_kinematics(model, data)
+        return data.site_xmat[site].reshape(3, 3)[:2, 2].copy()  # the base stands upright while this is solved
+
+    low, high = model.jnt_range[ankle].T
+    start = np.clip(data.qpos[address], low + 1e-6, high - 1e-6)
+    data.qpos[address] = least_squares(tilt, start, bounds=(low, high), xtol=1e-14, ftol=1e-14, gtol=1e-14).x
 
 
 def check_patches(description: RobotDescription, assembly: Assembly) -> None:
@@ -135,7 +156,7 @@ def _check_level(description: RobotDescription, soles: list[Pose]) -> None:
         raise RobotError(
             f"{description.path}: [home] leaves the soles {np.degrees(tilt):.1f}° and {1e3 * step:.1f} mm apart from "
             f"one plane (at most {np.degrees(MAX_SOLE_TILT):.1f}° and {1e3 * MAX_SOLE_STEP:.0f} mm); correct [home] or "
-            "the poses in [limbs]"
+            "the poses in [limbs], or let `flat_soles = true` in [home] turn the ankles"
         )
 
 

@@ -15,10 +15,13 @@ from toolkit.geometry.pose import Pose
 from toolkit.mjcf import warnings_refused
 from toolkit.robot.agreement import check_agreement
 from toolkit.robot.assemble import Assembly, assemble, exclude_pairs
-from toolkit.robot.description import FILE_NAME, RobotDescription, match_joints, read_description, suggestion
+from toolkit.robot.description import FILE_NAME, RobotDescription, match_joints, read_description
 from toolkit.robot.geometry import derive_limbs
 from toolkit.robot.home import check_patches, home_posture, touching_neighbours
 from toolkit.robot.model import LimbModel, RobotModel
+from toolkit.robot.problems import Problems
+from toolkit.robot.reader import suggestion
+from toolkit.robot.soundness import bare_trunk, check_palms, straight_legs
 from toolkit.robot.source import find_model_file, read_model
 from toolkit.robot.urdf import urdf_from_model
 from toolkit.shipped import shipped
@@ -84,20 +87,22 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
     folder = _robot_folder(default_robot(robots_dir) if name is None else name, robots_dir)
     with warnings_refused(str(folder), RobotError):
         description = read_description(folder / FILE_NAME)
-        assembly = assemble(description, read_model(find_model_file(description)))
-        where = description.path
-        home = home_posture(description, assembly.mujoco_model)
+        assembly = assemble(description, read_model(find_model_file(description), description.mend))
+        where, problems = description.path, Problems(description.path)
+        home = home_posture(description, assembly.mujoco_model, assembly.home)
         check_patches(description, assembly)
         assembly = exclude_pairs(assembly, touching_neighbours(description, assembly.mujoco_model, home))
         model = assembly.mujoco_model
         joint_names = tuple(model.joint(j).name for j in range(1, model.njnt))
-        gains = match_joints(where, "gains", description.gains, joint_names)
+        gains = match_joints(problems, "gains", description.gains, joint_names)
         kp, kd = np.array([gains.get(joint, DEFAULT_GAINS) for joint in joint_names]).T
         try:
             urdf = urdf_from_model(model, folder.name)
             legs, arms = derive_limbs(model, home, assembly.bodies)
         except RobotError as error:
             raise RobotError(f"{where}: {error}") from None
+        check_palms(model, home, description.limbs, problems)
+        problems.check()
         data = mujoco.MjData(model)
         data.qpos[:] = home
         mujoco.mj_kinematics(model, data)
@@ -128,6 +133,7 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
             legs=legs,
             arms=arms,
             fingerprint=_fingerprint(description, assembly, home),
+            warnings=(*assembly.warnings, *bare_trunk(model), *straight_legs(legs, home, model)),
         )
         check_agreement(robot)
         return robot

@@ -104,6 +104,7 @@ class RobotModel:
         legs: Legs by foot.
         arms: Arms by palm.
         fingerprint: Hash of everything that the dynamics depend on, for data sets and networks.
+        warnings: What was assumed, changed or found doubtful on load, one line each.
     """
 
     name: str
@@ -128,6 +129,7 @@ class RobotModel:
     legs: dict[Limb, LegGeometry]
     arms: dict[Limb, ArmGeometry]
     fingerprint: str
+    warnings: tuple[str, ...] = ()
 
     @property
     def half_sizes(self) -> np.ndarray:

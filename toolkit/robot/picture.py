@@ -30,7 +30,7 @@ def standing_scene(robot: RobotModel, friction: float = 1.0) -> mujoco.MjModel:
     material = spec.add_material(name="tiles", texrepeat=[2, 2], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
     spec.worldbody.add_geom(name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.1], priority=1, condim=3,
-                            friction=[friction, 0.005, 0.0001], material="tiles")  # fmt: skip
+                            contype=1, conaffinity=1, friction=[friction, 0.005, 0.0001], material="tiles")  # fmt: skip
     spec.worldbody.add_light(type=mujoco.mjtLightType.mjLIGHT_SPOT, pos=[3, 2, 5], dir=[-0.5, -0.33, -0.7], cutoff=60,
                              diffuse=[0.7] * 3, castshadow=True)  # fmt: skip
     spec.worldbody.add_light(type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=[0, 0, 4], dir=[0.3, 0.6, -0.6],

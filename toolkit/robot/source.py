@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
 import os
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import mujoco
 
-from toolkit.errors import InputError, RobotError
+from toolkit.errors import InputError, PackageError, RobotError
 from toolkit.mjcf import one_line, read_spec
-from toolkit.robot.description import RobotDescription, suggestion
+from toolkit.robot.description import RobotDescription
+from toolkit.robot.mend_table import Box, Mend
+from toolkit.robot.reader import suggestion
 
 _MESH_ENDINGS = {".stl", ".obj", ".msh"}
 
@@ -36,32 +40,70 @@ def find_model_file(description: RobotDescription) -> Path:
     """The existing model file that a robot.toml names.
 
     Raises:
-        RobotError: The file or the package that contains it is missing, or a package has several such files.
+        PackageError: The package that contains it is not installed.
+        RobotError: The file is missing, or a package has several such files.
     """
     where = description.path
+    if description.module is not None:
+        return _file_of_module(where, description.module)
     if description.package is None:
         path = description.path.parent / description.file
         if not os.path.isfile(path):
             raise RobotError(f"{where}: model.file '{description.file}' does not exist in {path.parent}")
         return path
+    return file_in_package(str(where), description.package, description.file)
+
+
+def file_in_package(where: str, package: str, name: str) -> Path:
+    """The file of an installed distribution whose path ends with a name.
+
+    Args:
+        where: What asks for it, at the beginning of messages.
+        package: Name of the distribution.
+        name: End of the file's path.
+
+    Raises:
+        PackageError: The distribution is not installed.
+        RobotError: It has no such file, or several.
+    """
     try:
-        files = importlib.metadata.files(description.package) or []
+        files = importlib.metadata.files(package) or []
     except importlib.metadata.PackageNotFoundError:
-        package = description.package
-        raise RobotError(f"{where}: package '{package}' is not installed; `pip install {package}`") from None
-    matches = [file for file in files if f"/{file.as_posix()}".endswith("/" + description.file.lstrip("/"))]
+        raise PackageError(f"{where}: package '{package}' is not installed; `pip install {package}`") from None
+    matches = [file for file in files if f"/{file.as_posix()}".endswith("/" + name.lstrip("/"))]
     if len(matches) != 1:
         models = [file.name for file in files if file.suffix in (".urdf", ".xml")]
         found = "several files" if matches else "no file"
-        hint = "give more of its path" if matches else suggestion(Path(description.file).name, models[:200])
-        raise RobotError(f"{where}: package '{description.package}' has {found} '{description.file}'; {hint}")
+        hint = "give more of its path" if matches else suggestion(Path(name).name, models[:200])
+        raise RobotError(f"{where}: package '{package}' has {found} '{name}'; {hint}")
     return Path(str(matches[0].locate())).resolve()
 
 
-def read_model(path: Path) -> ModelSource:
+def _file_of_module(where: Path, name: str) -> Path:
+    """The model file that a module of `robot_descriptions` knows; importing the module may download it."""
+    try:
+        importlib.import_module("robot_descriptions")
+    except ImportError:
+        raise PackageError(
+            f"{where}: package 'robot_descriptions' is not installed; `pip install robot_descriptions`"
+        ) from None
+    try:
+        module = vars(importlib.import_module(f"robot_descriptions.{name}"))
+    except ModuleNotFoundError:
+        raise RobotError(f"{where}: robot_descriptions has no module '{name}'; see `robot_descriptions list`") from None
+    except Exception as error:  # git, network and disk fail in ways of their own
+        raise PackageError(f"{where}: robot_descriptions.{name} cannot be fetched: {one_line(error)}") from None
+    found = module.get("MJCF_PATH") or module.get("URDF_PATH")
+    if not isinstance(found, str) or not os.path.isfile(found):
+        raise RobotError(f"{where}: robot_descriptions.{name} names no model file")
+    return Path(found).resolve()
+
+
+def read_model(path: Path, mend: Mend | None = None) -> ModelSource:
     """Read an MJCF or URDF file.
 
     A URDF keeps its fixed links and loses visual shapes that MuJoCo cannot draw; its `package://` paths are resolved.
+    Collision shapes that `mend` replaces need not be readable; nothing else of it counts here.
 
     Raises:
         RobotError: The file is not valid XML or neither MJCF nor URDF, a mesh is missing, or MuJoCo cannot parse it.
@@ -78,7 +120,7 @@ def read_model(path: Path) -> ModelSource:
             spec = read_spec(path)
         else:
             velocity = _velocity_limits(path, root)
-            _prepare_urdf(path, root)
+            _prepare_urdf(path, root, mend)
             spec = read_spec(path, ElementTree.tostring(root, encoding="unicode"))
             spec.compiler.fusestatic = False
             for geom in spec.geoms:
@@ -107,9 +149,16 @@ def _velocity_limits(path: Path, root: ElementTree.Element) -> dict[str, float]:
     return limits
 
 
-def _prepare_urdf(path: Path, root: ElementTree.Element) -> None:
+def _prepare_urdf(path: Path, root: ElementTree.Element, mend: Mend | None) -> None:
+    names: set[str] = set()
     for link in root.iter("link"):
+        if mend is not None and _is_replaced(mend, link.get("name", "")):
+            for shape in link.findall("collision"):
+                link.remove(shape)
         for shape in [*link.findall("visual"), *link.findall("collision")]:
+            if shape.get("name") in names:  # MuJoCo prints a warning past Python
+                del shape.attrib["name"]
+            names.add(shape.get("name", ""))
             mesh = shape.find("geometry/mesh")
             if mesh is None:
                 continue
@@ -123,7 +172,7 @@ def _prepare_urdf(path: Path, root: ElementTree.Element) -> None:
                 reason = "is missing" if file is None else f"is not one of {', '.join(sorted(_MESH_ENDINGS))}"
                 raise RobotError(
                     f"{path}: collision mesh '{mesh.get('filename')}' of link '{link.get('name')}' {reason}; "
-                    "add the file or remove the <collision>"
+                    "add the file, or replace the shape in [mend.collision]"
                 )
     for extension in root.findall("mujoco"):
         root.remove(extension)
@@ -140,3 +189,10 @@ def _resolve(path: Path, name: str) -> Path | None:
     else:
         candidates = [path.parent / name.removeprefix("file://")]
     return next((file.resolve() for file in candidates if os.path.isfile(file)), None)
+
+
+def _is_replaced(mend: Mend, link: str) -> bool:
+    """Whether the collision shapes of a link make room for others."""
+    name = mend.bodies.get(link, link)
+    shapes = [shape for pattern, shape in mend.collision.items() if fnmatchcase(name, pattern)]
+    return bool(shapes) and (shapes[-1] == "none" or isinstance(shapes[-1], Box))

@@ -101,7 +101,7 @@ class Occupancy(NamedTuple):
     @classmethod
     def of(cls, model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray, cell: float = 0.05) -> Occupancy:
         """Occupancy of the box between two corners (3,) m; every cell that a triangle touches counts."""
-        extent = upper - lower
+        extent = np.maximum(upper - lower, 0.0)
         cell = max(cell, float((extent.prod() / _MAX_CELLS) ** (1 / 3)))
         shape = np.ceil(extent / cell).astype(np.int64) + 1
         triangles = world_triangles(model, lower, upper)
