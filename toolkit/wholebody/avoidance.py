@@ -29,11 +29,11 @@ class ArmAvoidance:
     """Distances of the arms in the composed scene, tick after tick."""
 
     def __init__(self, robot: RobotModel, scene: mujoco.MjModel):
-        """Prepare a copy of the scene, robot and world in one model; a robot without palms has no arms here."""
+        """Prepare a copy of the scene, robot and world in one model."""
         self.model = copy.copy(scene)
         self.data = mujoco.MjData(self.model)
         self.static = self.model.body_weldid[self.model.geom_bodyid] == 0
-        self.arm_of = _arm_of_geoms(robot, self.model)
+        self.arm_of = robot.in_arms(self.model)[self.model.geom_bodyid]
         hands = {limb: self.model.body(robot.limbs[limb].body).id for limb in PALMS if limb in robot.limbs}
         self.hand = {limb: self.model.geom_bodyid == body for limb, body in hands.items()}
         self.model.geom_margin[:] = 0.0
@@ -123,14 +123,3 @@ class ArmAvoidance:
             for first, second, apart, _, _ in self._contacts()
             if apart < distance and not (self.static[first] or self.static[second])
         }
-
-
-def _arm_of_geoms(robot: RobotModel, model: mujoco.MjModel) -> np.ndarray:
-    """(ngeom,) int; the palm whose arm a geom belongs to, -1 elsewhere. The trunk belongs to no arm."""
-    arm = np.full(model.nbody, -1)
-    for palm in (limb for limb in PALMS if limb in robot.limbs):
-        root = int(model.jnt_bodyid[model.joint(robot.joint_names[robot.arm_joints(palm)[0]]).id])
-        for body in range(root, model.nbody):
-            if body == root or arm[model.body_parentid[body]] == palm:
-                arm[body] = palm
-    return arm[model.geom_bodyid]
