@@ -55,10 +55,10 @@ class Planner:
 class Run:
     """A run with made-up costs; infinite ones have no motion, and only sequences in `passing` pass.
 
-    The local search turns a sequence into what `better` has for its name.
+    The local search turns a sequence into what `better` has for its name; those in `hurrying` ask too much of joints.
     """
 
-    def __init__(self, planner, passing, monkeypatch, cost=None, better=None, **settings):
+    def __init__(self, planner, passing, monkeypatch, cost=None, better=None, hurrying=None, **settings):
         self.optimised, self.tested, self.improved = [], [], []
         optimised, tested, asked, cost, better = self.optimised, self.tested, self.improved, cost or {}, better or {}
 
@@ -80,7 +80,8 @@ class Run:
                 if candidate.failure is None:
                     tested.append(candidate.plan.name)
                 passed = candidate.plan.name in passing
-                failure = candidate.failure or (None if passed else Failure("it fell"))
+                hurried = candidate.plan.name in (hurrying or ())
+                failure = candidate.failure or (None if passed else Failure("it fell", too_fast=hurried))
                 return SimpleNamespace(candidate=candidate, passed=passed, merit=(passed,), failure=failure)
 
         def plan_cost(plan, config):
@@ -134,6 +135,22 @@ def test_where_nothing_is_found_the_pace_yields_as_long_as_it_may(monkeypatch):
     planner.paces = 3
     result = Run(planner, set(), monkeypatch).result
     assert planner.calls == [True, True, True] and planner.pace == 2 and not result.passed
+
+
+def test_the_pace_yields_at_once_where_joints_cannot_keep_it(monkeypatch):
+    found = [solution("hurried", FOOT, PALM), solution("other", FOOT)]
+    planner = Planner(found, [])
+    planner.paces = 2
+    run = Run(planner, set(), monkeypatch, {"hurried": 1.0, "other": 2.0}, hurrying={"hurried"})
+    # the other sequence of the same pace is not tested, no transition is excluded, and palms stay
+    assert run.tested == ["hurried"] and planner.pace == 1
+    assert planner.calls[:2] == [True, True] and planner.exclusions[:2] == [0, 0]
+
+
+def test_a_pace_that_may_not_yield_is_kept(monkeypatch):
+    planner = Planner([solution("hurried", FOOT), solution("other", FOOT)], [])
+    run = Run(planner, {"other"}, monkeypatch, {"hurried": 1.0, "other": 2.0}, hurrying={"hurried"})
+    assert run.tested == ["hurried", "other"] and planner.calls == [True] and run.result.passed
 
 
 def test_what_was_only_to_come_soon_is_tested_like_the_rest(monkeypatch):

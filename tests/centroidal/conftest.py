@@ -9,7 +9,7 @@ from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.physics.leg import LIMITS, TORQUE_ROLES
-from toolkit.robot.model import ArmGeometry, LegGeometry, LimbModel
+from toolkit.robot.model import ArmGeometry, LegGeometry, LegMass, LimbModel
 
 
 def _limbs():
@@ -41,6 +41,8 @@ class NumbersOnlyRobot:
     limbs: dict = field(default_factory=_limbs)
     legs: dict = field(default_factory=lambda: {Limb.LEFT_FOOT: _leg(1), Limb.RIGHT_FOOT: _leg(-1)})
     arms: dict = field(default_factory=lambda: {Limb.LEFT_PALM: _arm(1), Limb.RIGHT_PALM: _arm(-1)})
+    leg_mass: LegMass = LegMass(0.06, 0.045, np.array([[0.0, 0.0, -0.75]] * 2))
+    turning_torque: float = 1e4  # enough for all of the legs' momentum
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,7 @@ import pytest
 
 from toolkit.execution.check import Result
 from toolkit.execution.config import ExecutionConfig
-from toolkit.execution.verdict import execution_checks, failure_reason
+from toolkit.execution.verdict import execution_checks, failure_reason, is_too_fast
 
 GOOD = {
     "upright": 0.0,
@@ -71,3 +71,17 @@ def test_a_fall_is_the_reason():
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_undefined_values_never_pass(name, value):
     assert results(GOOD | {name: value})[name] is Result.FAIL
+
+
+@pytest.mark.parametrize(
+    ("broken", "fall", "expected"),
+    [
+        ({}, "", False),
+        ({"torque_ratio": 1.1}, "", True),
+        ({"joint_range": 0.01, "velocity_ratio": 1.2}, "", True),
+        ({"joint_range": 0.01, "slip": 0.5}, "", False),
+        ({"joint_range": 0.01}, "torso touched", False),
+    ],
+)
+def test_joints_alone_are_a_matter_of_pace(broken, fall, expected):
+    assert is_too_fast(checked(GOOD | broken), fall) == expected

@@ -41,6 +41,7 @@ def test_shrunk_limits_fail(robot, flat_walk, good, field, factor, word):
     report, text = reasons(weak, flat_walk, good)
     assert not report.limits_respected
     assert any(f"joint {name} " in text for name in robot.joint_names) and word in text and "limit" in text
+    assert all(finding.too_fast for finding in report.findings)
 
 
 def test_a_narrow_joint_range_fails(robot, flat_walk, good):
@@ -49,6 +50,18 @@ def test_a_narrow_joint_range_fails(robot, flat_walk, good):
     upper[joint] = good[2][:, 7 + joint].max() - 0.01
     report, text = reasons(dataclasses.replace(robot, upper=upper), flat_walk, good)
     assert not report.limits_respected and f"joint {robot.joint_names[joint]} is at" in text
+    assert not any(finding.too_fast for finding in report.findings)
+
+
+def test_a_trunk_that_is_thrown_about_fails(robot, flat_walk, good):
+    """The trunk keeps to its torque; a free arm may ask for a little more for a moment."""
+    trunk, arm = np.flatnonzero(robot.trunk_joints), robot.arm_sides[Limb.LEFT_PALM]
+    torque = np.abs(reasons(robot, flat_walk, good)[0].torque).max(0)
+    for joints, part, passes in ((trunk, 0.9, False), (arm, 0.6, True), (arm, 0.4, False)):
+        limit = robot.torque_limit.copy()
+        limit[joints] = part * torque[joints]
+        report, text = reasons(dataclasses.replace(robot, torque_limit=limit), flat_walk, good)
+        assert report.limits_respected == passes, text
 
 
 @pytest.mark.parametrize(("shift", "expected"), [((0.03, 0, 0), "the CoM"), ((0, 0, 0.006), "left_foot")])

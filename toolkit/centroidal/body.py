@@ -187,6 +187,18 @@ def mean_feet(problem: CentroidalProblem) -> np.ndarray:
     return total / np.maximum(count, 1.0)[:, None]
 
 
+def rough_com(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
+    """(N + 1, 3) m and m/s; a CoM at the knots that follows the mean of the feet, and its velocity after them."""
+    p = problem
+    com = mean_feet(p)
+    com[:, 2] += p.home_heights
+    width = max(p.steps // 20, 3)
+    padded = np.concatenate([np.repeat(p.com[None], width, 0), com, np.repeat(com[-1:], width, 0)])
+    window = np.hanning(2 * width + 3)[1:-1]
+    com = np.stack([np.convolve(padded[:, i], window / window.sum(), "valid") for i in range(3)], 1)
+    return com, np.vstack([np.diff(com, axis=0) / p.dt[:, None], np.zeros(3)])
+
+
 def _enter_torques(motion: CentroidalMotion, robot: RobotModel, limb: Limb, part: float, enter) -> None:
     """Enter how far the torques of a leg in the middle of each step exceed `part` of their limits."""
     p, leg = motion.solved, robot.legs[limb]

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.body import BodyMargins, knot_contacts, lowest_foot, mean_feet, swing_ankles
+from toolkit.centroidal.body import BodyMargins, knot_contacts, lowest_foot, mean_feet, rough_com, swing_ankles
+from toolkit.centroidal.leg_momentum import ground_share, leg_spin
 from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalProblem, ComRoom, Margins
 from toolkit.centroidal.stages.blocks import Block
 from toolkit.centroidal.stages.method import Blocks, Prices
@@ -252,8 +253,17 @@ class Program:
             weights=SCALE * squares,
             height=np.ascontiguousarray(height[1:]),
             source=layout.sources(self._landings),
-            turning=np.zeros((p.steps, 3)),
+            turning=self._turning(),
         )
+
+    def _turning(self) -> np.ndarray:
+        """(N, 3) m^2/s^2; rate of the part of the legs' angular momentum that trunk and arms leave to the ground."""
+        share = ground_share(self.robot)
+        if share == 0.0:
+            return np.zeros((self.problem.steps, 3))
+        com, velocity = rough_com(self.problem)
+        spin = leg_spin(self.problem, self.robot, com, velocity)
+        return share * np.diff(spin, axis=0) / self.problem.dt[:, None]
 
     @property
     def slack_price(self) -> np.ndarray:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from toolkit.centroidal.body import BodyMargins, mean_feet
+from toolkit.centroidal.body import BodyMargins, rough_com
 from toolkit.centroidal.build import ProblemConfig, sequence_problem, transition_problem
 from toolkit.centroidal.problem import (
     STANDARD_GRAVITY,
@@ -174,13 +174,7 @@ def guess(program: Program) -> np.ndarray:
     p, layout = program.problem, program.layout
     n = p.steps
     y = np.zeros((n + 1, int(layout.size.max())))
-    com = mean_feet(p)
-    com[:, 2] += p.home_heights
-    width = max(n // 20, 3)
-    padded = np.concatenate([np.repeat(p.com[None], width, 0), com, np.repeat(com[-1:], width, 0)])
-    window = np.hanning(2 * width + 3)[1:-1]
-    y[:, :3] = np.stack([np.convolve(padded[:, i], window / window.sum(), "valid") for i in range(3)], 1)
-    y[:-1, 3:6] = np.diff(y[:, :3], axis=0) / p.dt[:, None]
+    y[:, :3], y[:, 3:6] = rough_com(p)
     y[0, :3], y[0, 3:6], y[0, 6:9] = p.com, p.com_velocity, p.angular_momentum / p.mass
     # The weight is shared, as far as it is inside the cones: a palm on a wall starts with a light touch.
     up = p.rotation[..., 2, :] / np.maximum(p.active[:, :2].sum(1), 1)[:, None, None]

@@ -17,6 +17,7 @@ class Failure:
         transition: Index of the transition in which it happens; the number of transitions for the final rest.
         limb: The limb that it happens to.
         knot: The knot of the centroidal motion at which a constraint is violated most.
+        too_fast: Whether joints had to turn faster or harder than they can; a calmer pace may help.
     """
 
     reason: str
@@ -24,3 +25,4 @@ class Failure:
     transition: int | None = None
     limb: Limb | None = None
     knot: int | None = None
+    too_fast: bool = False

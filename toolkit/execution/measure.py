@@ -13,7 +13,7 @@ from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.execution.scuff import Scuff, scuffs
 from toolkit.execution.slip import SETTLE_TIME, ContactInterval, contact_intervals
 from toolkit.execution.standard import Move, Standard
-from toolkit.execution.verdict import SCUFF_LIMIT, execution_checks, failure_reason
+from toolkit.execution.verdict import SCUFF_LIMIT, execution_checks, failure_reason, is_too_fast
 from toolkit.replanning.replanner import ReplanCounts
 
 
@@ -127,7 +127,7 @@ def measure(
         real_time_factor=simulated / wall_seconds,
         checks=checks,
         replayable=replayable,
-        failure=Failure(reason, when, transition) if reason else None,
+        failure=Failure(reason, when, transition, too_fast=is_too_fast(checks, recorder.fall)) if reason else None,
         replanning=replanning,
     )
 

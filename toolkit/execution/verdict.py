@@ -12,6 +12,9 @@ SCUFF_LIMIT = 0.05
 mass, 5 ms of its weight. At the height of a humanoid's CoM that moves the capture point by some 15 mm, which a sole
 takes up as it does the 20 mm of the other limits; what is more is a stumble."""
 
+OF_PACE = ("torque_ratio", "joint_range", "velocity_ratio")
+"""Checks of the joints' limits: where one of them decides, a calmer pace may help."""
+
 
 def execution_checks(
     values: dict[str, float], goal_radius: float, config: ExecutionConfig | Standard
@@ -48,3 +51,9 @@ def failure_reason(checks: tuple[Check, ...], fall_reason: str) -> str:
         if check.result is not Result.PASS:
             return f"{check.name} is {check.value:.3g} {check.unit}".rstrip() + f", the limit is {check.limit:.3g}"
     return ""
+
+
+def is_too_fast(checks: tuple[Check, ...], fall_reason: str) -> bool:
+    """Whether the joints' limits alone are why a run does not pass."""
+    failed = [check.name for check in checks if check.result is not Result.PASS]
+    return bool(failed) and not fall_reason and all(name in OF_PACE for name in failed)

@@ -137,7 +137,7 @@ class _Run:
                 break
             if not search.may_yield and (not found or not (self._exclusions or failed_with_palms)):
                 break
-            palms = palms and not failed_with_palms
+            palms = palms and (self._too_fast or not failed_with_palms)
         return self._concluded()
 
     def _spent(self) -> bool:
@@ -230,7 +230,8 @@ class _Run:
     def _tried(self, found: list[Candidate]) -> bool:
         """Whether a candidate passes the stages after the optimiser; the truly cheapest is tried first.
 
-        Before a candidate is tested, it is improved, and again where a transition has been blamed since.
+        Before a candidate is tested, it is improved, and again where a transition has been blamed since. Where one asks
+        too much of the joints and the pace may yield, the others are not tested.
         """
         blamed: list[Exclusion] = []
         for candidate in found:
@@ -253,9 +254,17 @@ class _Run:
             self._trials.append(trial)
             if trial.failure is None:
                 return True
+            if self._too_fast:
+                break  # the next search is calmer, and no transition is to blame
             blamed += _blamed(candidate.solution.sequence, trial.failure)
         self._exclusions += blamed
         return False
+
+    @property
+    def _too_fast(self) -> bool:
+        """Whether the last trial asked too much of the joints at a pace that may yield."""
+        failure = self._trials[-1].failure if self._trials else None
+        return failure is not None and failure.too_fast and self._searches[-1].may_yield
 
     def _improved(self, candidate: Candidate, blamed: list[Exclusion]) -> list[Candidate]:
         """What the local search makes of a candidate without transitions that failed; nothing where none is better."""

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from toolkit.geometry.limb import Limb
-from toolkit.robot.chain import arm_joints, joints_to
+from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.robot.chain import arm_joints, bodies_above, joints_to, side_joints
+
+_LATERAL = 0.5  # least |cosine| between the axis of a joint that turns about the lateral axis and that axis
+_SHOULDER = 3  # joints of a shoulder
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,19 @@ class LegGeometry:
     max_length: float
     ranges: dict[str, tuple[float, float]]
     torques: dict[str, float]
+
+
+class LegMass(NamedTuple):
+    """How mass lies along a leg, from hip centre to ankle centre, in parts of the robot's mass; the mean of both legs.
+
+    Attributes:
+        first, second: Sums of mass times the part of the way from hip to ankle, and times that part's square.
+        line: (2, 3) m; from hip to ankle of each leg in the home posture, axes of the base.
+    """
+
+    first: float
+    second: float
+    line: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -151,3 +169,68 @@ class RobotModel:
     def arm_joints(self, palm: Limb) -> np.ndarray:
         """Indices (k,) int into `joint_names` of the joints from the trunk to a palm, in order."""
         return np.array(arm_joints(self.mujoco_model, palm), int) - 1
+
+    @cached_property
+    def arm_sides(self) -> dict[Limb, np.ndarray]:
+        """Indices (k,) int into `joint_names` of each arm's joints, with a palm or without, by the palm of its side."""
+        found = dict(zip(PALMS, side_joints(self.mujoco_model, self.home), strict=True))
+        sides = {palm: np.array(joints, int) - 1 for palm, joints in found.items() if joints}
+        return sides | {palm: self.arm_joints(palm) for palm in PALMS if palm in self.limbs}
+
+    @property
+    def trunk_joints(self) -> np.ndarray:
+        """(n,) bool; whether a joint is between the base and an arm, and of neither."""
+        model, trunk = self.mujoco_model, np.zeros(len(self.joint_names), bool)
+        for arm in self.arm_sides.values():
+            above = set(bodies_above(model, model.jnt_bodyid[arm[0] + 1]))
+            trunk |= np.isin(model.jnt_bodyid[1:], list(above))
+        for arm in self.arm_sides.values():
+            trunk[arm] = False
+        return trunk
+
+    def in_arms(self, model: mujoco.MjModel) -> np.ndarray:
+        """(nbody,) int; palm of the side to whose arm a body belongs, -1 for none, in a model that holds the robot."""
+        side = np.full(model.nbody, -1)
+        for palm, joints in self.arm_sides.items():
+            root = int(model.jnt_bodyid[model.joint(self.joint_names[joints[0]]).id])
+            for body in range(root, model.nbody):
+                if body == root or side[model.body_parentid[body]] == palm:
+                    side[body] = palm
+        return side
+
+    @cached_property
+    def leg_mass(self) -> LegMass:
+        """How the mass of the legs lies along them."""
+        model, data, moments, lines = self.mujoco_model, self._at_home, np.zeros(2), np.zeros((2, 3))
+        base = data.xmat[1].reshape(3, 3)
+        for foot in FEET:
+            leg, site = self.legs[foot], model.site(self.limbs[foot].site).id
+            hip = data.subtree_com[1] + base @ leg.hip_in_com
+            line = data.site_xpos[site] + data.site_xmat[site].reshape(3, 3) @ leg.ankle_in_sole - hip
+            root = int(model.jnt_bodyid[self.joints_to(foot)[0] + 1])
+            for body in range(root, model.nbody):
+                if root in bodies_above(model, body):
+                    part = float((data.xipos[body] - hip) @ line / (line @ line))
+                    moments += model.body_mass[body] * np.array([part, part * part])
+            lines[foot] = line @ base
+        first, second = moments / (len(FEET) * self.mass)
+        return LegMass(float(first), float(second), lines)
+
+    @cached_property
+    def turning_torque(self) -> float:
+        """N m; what the trunk's motors can turn about the lateral axis, or the shoulders' where the trunk has none."""
+        data, lateral = self._at_home, self._at_home.xmat[1].reshape(3, 3)[:, 1]
+        share = np.abs(data.xaxis[1:] @ lateral)  # joint 0 is the free one
+        trunk = np.flatnonzero(self.trunk_joints & (share > _LATERAL))
+        if len(trunk):
+            return float((self.torque_limit[trunk] / share[trunk]).min())
+        shoulders = [joints[:_SHOULDER] for joints in self.arm_sides.values()]
+        return float(sum((self.torque_limit[joints] * share[joints]).max() for joints in shoulders))
+
+    @cached_property
+    def _at_home(self) -> mujoco.MjData:
+        data = mujoco.MjData(self.mujoco_model)
+        data.qpos[:] = self.home
+        mujoco.mj_kinematics(self.mujoco_model, data)
+        mujoco.mj_comPos(self.mujoco_model, data)
+        return data

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.collision import body_pair
 
@@ -85,7 +85,7 @@ class Avoidance:
         self.data = mujoco.MjData(self.model)
         model = self.model
         self.static = model.body_weldid[model.geom_bodyid] == 0
-        self.arm = _of_arms(robot, model)
+        self.arm = robot.in_arms(model)[model.geom_bodyid] >= 0
         self.body = {limb: int(model.body(item.body).id) for limb, item in robot.limbs.items()}
         self.of = {limb: model.geom_bodyid == body for limb, body in self.body.items()}
         self.base = int(model.body(robot.base).id)
@@ -216,16 +216,6 @@ class Avoidance:
             self.height[body] = max(
                 min(self.height[body], middle[2] - np.abs(turn[2]) @ model.geom_aabb[geom, 3:]), 0.0
             )
-
-
-def _of_arms(robot: RobotModel, model: mujoco.MjModel) -> np.ndarray:
-    """(ngeom,) bool; whether a geom belongs to the arm of a palm. The trunk belongs to none."""
-    arm = np.zeros(model.nbody, bool)
-    for palm in (limb for limb in PALMS if limb in robot.limbs):
-        root = int(model.jnt_bodyid[model.joint(robot.joint_names[robot.arm_joints(palm)[0]]).id])
-        for body in range(root, model.nbody):
-            arm[body] |= body == root or arm[model.body_parentid[body]]
-    return arm[model.geom_bodyid]
 
 
 def _box_pairs(model: mujoco.MjModel, static: np.ndarray) -> np.ndarray:

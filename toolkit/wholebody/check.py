@@ -21,9 +21,9 @@ FOOT_ERROR, PALM_ERROR = 0.005, 0.01  # m; of a patch in contact
 SWING_ERROR = 0.02  # m; of a foot in the air
 ORIENTATION_ERROR = 0.03  # rad; of a sole, or of a palm's normal
 RANGE_TOLERANCE = 1e-3  # rad; beyond a joint's range: rounding of the solver
-# Allowed share of the torque limit for joints that bear no contact. The controller keeps their torque within the limit,
-# and a head or a free arm may follow late.
-FREE_TORQUE_RATIO = 4.0
+# Allowed share of the torque limit for a head or a free arm: the controller keeps their torque within the limit, and
+# they may follow late. Legs, trunk and what bears a contact may not.
+FREE_TORQUE_RATIO = 2.0
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def check(
     """
     position, orientation, tracking = _tracking(robot, paths, motion, times, qpos)
     torque = inverse_dynamics(robot, motion, times, qpos)[:, 6:]
-    bearing = robot.carrying(limb for limb in robot.limbs if motion.problem.active[:, limb].any())
+    bearing = robot.carrying(limb for limb in robot.limbs if motion.problem.active[:, limb].any()) | robot.trunk_joints
     limits = _limits(robot, times, qpos, torque, bearing)
     hit = first_collision(robot, scene, times, qpos)
     findings = tracking + limits + ([hit] if hit else [])
@@ -120,7 +120,7 @@ def _angle(limb: Limb, actual: np.ndarray, planned: np.ndarray) -> float:
 def _limits(
     robot: RobotModel, times: np.ndarray, qpos: np.ndarray, torque: np.ndarray, bearing: np.ndarray
 ) -> list[Failure]:
-    """The violated limits of range, velocity and torque; `bearing` (n,) bool marks joints that bear a contact."""
+    """The violated limits of range, velocity and torque; `bearing` (n,) bool: joints with contacts or arms on them."""
     findings = []
     joints = qpos[:, 7:]
     beyond = np.maximum(robot.lower - joints, joints - robot.upper)
@@ -143,7 +143,7 @@ def _limits(
                 f"joint {robot.joint_names[column]} {what} {values[row, column]:.3g} {unit} at {times[row]:.2f} s "
                 f"(limit {allowed[column] * limit[column]:.3g} {unit})"
             )
-            findings.append(Failure(text, float(times[row])))
+            findings.append(Failure(text, float(times[row]), too_fast=True))
     return findings
 
 

@@ -20,6 +20,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
 from toolkit.wholebody import ik_config as weights
 from toolkit.wholebody.avoidance import Avoidance
+from toolkit.wholebody.effort import Effort
 from toolkit.wholebody.lean import Lean
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.swing import Window
@@ -40,7 +41,8 @@ class WholeBodyIK:
         self.solver.dt = tick
         self.maps: dict[Limb, ArmMap] = {}
         self.reaching: dict[Limb, tuple] = {}
-        self.arm_joints = {palm: robot.arm_joints(palm) for palm in PALMS if palm in robot.limbs}
+        self.arm_joints, self.trunk = robot.arm_sides, np.flatnonzero(robot.trunk_joints)
+        self.effort = Effort(robot, tick)
         self.home = dict(zip(robot.joint_names, robot.home[7:], strict=True))
         self._set_limits()
         self._add_tasks()
@@ -67,7 +69,7 @@ class WholeBodyIK:
             task = solver.add_frame_task(robot.limbs[foot].site, np.eye(4))
             task.configure(foot.label, "soft", weights.FOOT_POSITION, weights.FOOT_ORIENTATION)
             self.feet[foot] = task
-        for palm in self.arm_joints:
+        for palm in (limb for limb in PALMS if limb in robot.limbs):
             site, z = robot.limbs[palm].site, np.array([0.0, 0.0, 1.0])
             position = solver.add_position_task(site, np.zeros(3))
             normal = solver.add_axisalign_task(site, z, z)
@@ -81,16 +83,15 @@ class WholeBodyIK:
             self.postures.append((task, {name: self.home[name] for name in joints}, weight))
         self.momentum = solver.add_centroidal_momentum_task(np.zeros(3))
         solver.add_regularization_task(1e-6)
-        self.dampers = None
+        self.dampers = self.limits = None
 
     def _groups(self) -> list[tuple[list[str], float]]:
         """Joint names with the weight of their posture: arms, trunk, legs."""
         robot = self.robot
-        legs, reaching = robot.carrying(FEET), robot.carrying(self.palms)
-        arms = np.zeros(len(robot.joint_names), bool)
+        legs, arms, trunk = robot.carrying(FEET), *np.zeros((2, len(robot.joint_names)), bool)
+        trunk[self.trunk] = True
         for joints in self.arm_joints.values():
             arms[joints] = True
-        trunk = reaching & ~arms if self.palms else ~reaching
         groups: dict[float, list[str]] = {}
         for joint, name in enumerate(robot.joint_names):
             if legs[joint]:
@@ -141,7 +142,7 @@ class WholeBodyIK:
         """
         angles = self.joints
         self._set_targets(time, paths, motion)
-        self._set_ranges(angles, [palm for palm in self.palms if paths.authority(palm, time) == 0.0])
+        self._set_ranges(angles, [arm for arm in self.arm_joints if paths.authority(arm, time) == 0.0])
         step = self._ease * (self._posture(time, angles, paths, motion) - angles)
         step = (step + weights.INERTIA * self.last_step) / (1.0 + weights.INERTIA)
         targets = dict(zip(self.robot.joint_names, angles + step, strict=True))
@@ -151,6 +152,7 @@ class WholeBodyIK:
         before = self.order.qpos_from_q(self.wrapper.state.q)
         self._set_dampers(before, angles, time, paths)
         self._solve(time)
+        self._spare_motors(time, before, motion)
         self.drift, self.last_step = self._motion(before), self.joints - angles
         return self.order.qpos_from_q(self.wrapper.state.q)
 
@@ -241,8 +243,31 @@ class WholeBodyIK:
             self.dampers = self.solver.add_joint_space_half_spaces_constraint(matrix, bound)
             self.dampers.configure("dampers", "soft", 1.0)
 
+    def _spare_motors(self, time: float, before: np.ndarray, motion: CentroidalMotion) -> None:
+        """Solve a tick from a state (7 + n,) again while motors of trunk and arms would have to give too much."""
+        for _ in range(weights.EASING):
+            step = self._motion(before)
+            torque = self.effort.torques(time, before, self.drift, step, motion)
+            if not self.effort.exceeded(torque):
+                break
+            self._drop_limits()
+            rows, bound = self.effort.rows(torque, step)
+            matrix = np.zeros((len(rows), len(before)))
+            matrix[:, self.order.q_index] = rows
+            self.limits = self.solver.add_joint_space_half_spaces_constraint(matrix, bound + rows @ before[7:])
+            self.limits.configure("limits", "soft", weights.EFFORT)
+            self.wrapper.state.q = self.order.q_from_qpos(before)
+            self.wrapper.update_kinematics()
+            self._solve(time)
+        self._drop_limits()
+
+    def _drop_limits(self) -> None:
+        if self.limits is not None:
+            self.solver.remove_constraint(self.limits)  # pyright: ignore[reportArgumentType]
+            self.limits = None
+
     def _motion(self, before: np.ndarray) -> np.ndarray:
-        """(6 + n,) displacement since a state (7 + n,), as MuJoCo's qvel times the time in between."""
+        """(6 + n,) displacement since a state (7 + n,), as MuJoCo's qvel times the tick."""
         after = self.order.qpos_from_q(self.wrapper.state.q)
         change = np.zeros(self.robot.mujoco_model.nv)
         mujoco.mj_differentiatePos(self.robot.mujoco_model, change, 1.0, before, after)
@@ -251,15 +276,19 @@ class WholeBodyIK:
     def _set_ranges(self, angles: np.ndarray, free: list[Limb]) -> None:
         """Set the ranges of this tick, whose ends joints approach ever more slowly.
 
-        They are narrow for arms that hang free: the momentum task alone would swing them wider than people do.
+        They are narrow for arms that hang free, and for the trunk where both do: the momentum task alone would swing
+        them wider than people do.
         """
         lower, upper = self.lower.copy(), self.upper.copy()
-        for palm in free:
-            arm, swing = self.arm_joints[palm], weights.ARM_SWING
-            home = self.robot.home[7:][arm]
-            lower[arm] = np.maximum(lower[arm], np.minimum(home - swing, angles[arm]))
-            upper[arm] = np.minimum(upper[arm], np.maximum(home + swing, angles[arm]))
-        share = min(weights.RANGE_RATE * self.tick, 1.0)
+        share = np.full(len(angles), min(weights.RANGE_RATE * self.tick, 1.0))
+        narrow = [(self.arm_joints[arm], weights.ARM_SWING) for arm in free]
+        if len(free) == len(self.arm_joints):
+            narrow.append((self.trunk, weights.TRUNK_SWING))
+        for joints, swing in narrow:
+            home = self.robot.home[7:][joints]
+            lower[joints] = np.maximum(lower[joints], np.minimum(home - swing, angles[joints]))
+            upper[joints] = np.minimum(upper[joints], np.maximum(home + swing, angles[joints]))
+            share[joints] = min(weights.SWING_RATE * self.tick, 1.0)
         lower = np.minimum(angles + share * (lower - angles), angles)
         upper = np.maximum(angles + share * (upper - angles), angles)
         for name, low, high in zip(self.robot.joint_names, lower.tolist(), upper.tolist(), strict=True):

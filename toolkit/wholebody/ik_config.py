@@ -8,6 +8,7 @@ COM = 1e5
 PALM_POSITION, PALM_NORMAL, PALM_TWIST = 1e5, 1e4, 0.1  # a palm may turn about its normal as the arm likes
 # In the middle of a swing: where joints are too slow the foot gives way, not the base.
 AIR_POSITION, AIR_ORIENTATION = 1e4, 30.0
+EFFORT = 1e5  # per squared rad by which a joint's displacement asks its motor for more than its share
 BASE = 10.0
 # Per squared rad of a tick's deviation from the planned angular momentum, divided by mass times squared CoM height.
 # A larger weight makes trunk and arms swing wide.
@@ -20,9 +21,12 @@ POSTURE_TIME = 0.1  # s; time constant of that return
 INERTIA = 2.0  # weight of the last tick's displacement in that return; it smooths free joints over as many ticks
 
 SUBSTEPS = 2  # quadratic programs per sample of the trajectory
+EASING = 3  # most solutions of a quadratic program whose motion asks motors for too much
 SETTLE = 200  # most iterations for the first sample
 RANGE_RATE = 25.0  # 1/s; how fast a joint may approach the end of its range, per rad of distance
-ARM_SWING = 0.6  # rad; a free arm's joints stay this close to the home posture, or come no farther away
+# rad; joints of free arms, and of the trunk beside them, stay this close to the home posture, or come no farther away.
+ARM_SWING, TRUNK_SWING = 0.6, 0.4
+SWING_RATE = 10.0  # 1/s; the same as RANGE_RATE for those ranges: whoever runs into their ends has to brake
 VELOCITY_FRACTION = 0.95  # share of the joint velocity limits that may be used
 RANGE_MARGIN = 0.02  # rad; kept from each end of a joint's range
 MIN_KNEE = 0.12  # rad; least knee flexion

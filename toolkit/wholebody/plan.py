@@ -167,7 +167,8 @@ def _joined(findings: Sequence[Failure], schedule: ContactSchedule) -> Failure |
         return None
     time = findings[0].time
     transition = None if time is None else schedule.phase_at(time).transition
-    return replace(findings[0], reason="; ".join(each.reason for each in findings), transition=transition)
+    reason, too_fast = "; ".join(each.reason for each in findings), all(each.too_fast for each in findings)
+    return replace(findings[0], reason=reason, transition=transition, too_fast=too_fast)
 
 
 def _without_postures(robot: RobotModel, paths: LimbPaths, times: np.ndarray) -> WholeBodyTrajectory:

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.compiled import compiled
 from toolkit.errors import RobotError
-from toolkit.geometry.limb import PALMS, Limb
+from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.obstacles import world_triangles
 
@@ -33,7 +33,7 @@ class BodyBox(NamedTuple):
 
     @classmethod
     def of(cls, robot: RobotModel) -> BodyBox:
-        """The box around torso, head, thighs and shoulders in the home posture; arms may fold in.
+        """The box around torso, head, thighs and shoulders in the home posture; arms with palms may fold in.
 
         Raises:
             RobotError: there is no shape to put a box around.
@@ -45,10 +45,10 @@ class BodyBox(NamedTuple):
         leg = robot.legs[Limb.LEFT_FOOT]
         bottom = -leg.ankle_in_sole[2] if leg.ankle_in_sole[2] < 0 else leg.ankle_in_sole[2]
         bottom += leg.shin
-        arms = _arm_bodies(robot)
+        in_arm = np.isin(robot.in_arms(model), list(robot.arms))
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for geom in range(model.ngeom):
-            if model.geom_bodyid[geom] in arms:
+            if in_arm[model.geom_bodyid[geom]]:
                 continue
             centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
             rotation = data.geom_xmat[geom].reshape(3, 3)
@@ -64,26 +64,6 @@ class BodyBox(NamedTuple):
         for limb, arm in robot.arms.items():
             width = max(width, abs(arm.shoulder_in_com[1]) + 1.5 * float(robot.half_sizes[limb].min()))
         return cls(max(-low[0], high[0]) + MARGIN, width + MARGIN, bottom, float(high[2]) + MARGIN)
-
-
-def _arm_bodies(robot: RobotModel) -> set[int]:
-    """Bodies between each palm and the body that it shares with another limb."""
-    model = robot.mujoco_model
-
-    def chain(limb: Limb) -> list[int]:
-        body, bodies = model.body(robot.limbs[limb].body).id, []
-        while body > 0:
-            bodies.append(body)
-            body = int(model.body_parentid[body])
-        return bodies
-
-    chains = {limb: chain(limb) for limb in robot.limbs}
-    arms: set[int] = set()
-    for limb in PALMS:
-        if limb in chains:
-            others = {body for other, bodies in chains.items() if other != limb for body in bodies}
-            arms |= set(chains[limb]) - others
-    return arms
 
 
 class Occupancy(NamedTuple):
