@@ -52,6 +52,7 @@ def test_the_mixed_integer_program_finds_the_best_plan_of_all_choices(robot, wor
     mixed = mixed_program(task, COARSE)
     found = solver_of(solver)(mixed.program, 60.0, 1e-6)
     assert found.x is not None and found.gap <= 1e-6
+    assert found.first_seconds is not None and found.gap_seconds is not None
     assert 0.0 <= found.first_seconds <= found.gap_seconds
     assert visited(world, planned(task, mixed, found.x)) == BEST
     # Whatever else the four steps might choose, as 3^4 linear programs: none is cheaper, most are impossible.
@@ -88,7 +89,8 @@ def test_envelopes_hold_every_product_and_parts_make_them_tighter():
             for at, value in ((arm, a), (force, f)):
                 low[at] = high[at] = value
             fixed = program._replace(low=low, high=high)
-            least, most = (float(solution(fixed._replace(cost=way * fixed.cost))[product[0]]) for way in (1.0, -1.0))
+            ends = [solution(fixed._replace(cost=way * fixed.cost)) for way in (1.0, -1.0)]
+            least, most = (float(x[product[0]]) for x in ends if x is not None)
             assert least - 1e-7 <= a * f <= most + 1e-7
             worst = max(worst, most - least)
         widths.append(worst)

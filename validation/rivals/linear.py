@@ -110,10 +110,10 @@ class Builder:
 
 
 def solution(program: LinearProgram) -> np.ndarray | None:
-    """(n,) a best solution, whole numbers not wanted; None where there is none."""
+    """(n,) a best solution, by SciPy; None where there is none."""
     row_low: Any = program.row_low
     row_high: Any = program.row_high
     low: Any = program.low
     high: Any = program.high
     rows = LinearConstraint(program.matrix, row_low, row_high)
-    return milp(program.cost, constraints=rows, bounds=Bounds(low, high)).x
+    return milp(program.cost, constraints=rows, bounds=Bounds(low, high), integrality=program.integer).x
