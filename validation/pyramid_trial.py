@@ -1,4 +1,4 @@
-"""One sequence of contacts with the paper's friction pyramid and with the exact cone: motions, and what becomes of them.
+"""One sequence of contacts with the paper's friction pyramid and with the exact cone: motions, and their fates.
 
 The pyramid |fx| + |fy| <= sqrt(2) mu fz goes around the cone and is 41 % wider along the axes. Both motions have the
 paper's weights and no margins, so that nothing but the cone differs.

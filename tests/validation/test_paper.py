@@ -1,0 +1,154 @@
+"""The page of the paper: its statistics, its comparisons, its drawings, and a page of made-up records."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toolkit.errors import InputError
+from toolkit.robot.loader import load_robot
+from validation import options, paper
+from validation.page import plans
+from validation.page.drawings import draw_models, draw_networks, draw_sums
+from validation.page.friction import slope_figures, slope_text
+from validation.page.known import category_section, network_section
+from validation.page.rivals import mixed_section, search_section
+from validation.page.spread import Compared, rate, spread, worse_first
+from validation.planning import PAPER
+
+FIGURES = ("linear_momentum", "linear_momentum_rate", "angular_momentum", "angular_momentum_rate", "force", "torque")
+FIGURES += ("lateral_force", "cop_distance", "foot_cop_distance")
+
+
+def test_rates_have_wilsons_interval_and_times_quartiles():
+    assert rate(50, 50) == "50/50 (93 to 100 %)"
+    assert rate(0, 0) == "0/0"
+    assert spread([1.0, 2.0, 3.0, 4.0, 5.0], ".0f", 1e3) == "3000 [2000, 4000]"
+    assert spread([]) == "-"
+
+
+@pytest.mark.parametrize(
+    ("value", "published", "better", "worse"),
+    [(1.0, 2.0, -1, False), (3.0, 2.0, -1, True), (1.0, 2.0, 1, True), (2.0, 2.0, 1, False), (None, 2.0, 1, True)]
+    + [(9.0, 2.0, 0, False), (9.0, None, -1, False)],
+)
+def test_what_is_worse_is_said(value, published, better, worse):
+    row = Compared("figure", "2", "ours", value, published, better, "Because.")
+    assert row.worse is worse
+    assert row.record["worse"] is worse
+    assert len(worse_first("here", [row])) == worse
+
+
+def plan_record(kind, planner, seed, **changes):
+    figures = dict.fromkeys(FIGURES, 0.5) | {"duration": 10.0}
+    record = {"name": f"plan-{planner}-{kind}-{seed}", "kind": kind, "planner": planner, "seed": seed}
+    record |= {"stage": "done", "passed": True, "found": True, "feasible": True, "tested": 1.0, "objective": 3000.0}
+    record |= {"paper_objective": 2000.0 + seed, "figures": figures, "palm_contacts": 0, "transitions": 9}
+    record |= {"first_seconds": 0.05, "search_seconds": 1.0, "heuristic_seconds": 0.01, "optimiser_seconds": 0.1}
+    return record | {"peak_memory": 1.0, "reason": ""} | changes
+
+
+def test_every_column_of_the_papers_table_has_ours_beside_it():
+    groups = {
+        (kind, planner): [plan_record(kind, planner, seed) for seed in range(4)]
+        for kind in PAPER
+        for planner in plans.PLANNERS
+    }
+    section = plans.plan_section(groups)
+    for name, rows in section.content.items():
+        assert len(rows) == 12, name
+        assert [row["name"].split()[0] for row in rows] == [f"({number})" for number in range(1, 13)]
+        assert all(row["value"] is not None and row["why"] for row in rows)
+    kind, line = "rubble_field", PAPER["rubble_field"][1].split()
+    row = section.content[f"{kind} learned"][3]
+    assert row["value"] == pytest.approx(2001.5) and row["published"] == float(line[3])
+    assert any("CoP" not in text and "linear momentum" not in text for text in section.worse)
+    assert all(text.startswith("- rubble") for text in section.worse)
+    groups["rubble_field", "learned"] = [plan_record(kind, "learned", 0, found=False, feasible=False)]
+    assert "planned" in "\n".join(plans.plan_section(groups).worse)
+
+
+def rival_record(rival, seed, seconds, cost, **changes):
+    record = {"rival": rival, "kind": "rubble_field", "seed": seed, "stage": "done", "found": True, "feasible": True}
+    record |= {"seconds": seconds, "true_cost": cost, "transitions": 12, "screened": 12, "expansions": 5, "reason": ""}
+    return record | {"passed": True} | changes
+
+
+def test_rivals_that_beat_us_are_told_first():
+    ours = [rival_record("ANA*", seed, 1.0, 900.0) for seed in range(3)]
+    solution = {"first_seconds": 0.5, "gap_seconds": None}
+    size = {"variables": 10, "integers": 4, "rows": 7, "limit": 20.0}
+    mixed = [rival_record("MIP HiGHS 12", seed, 0.5, 1000.0, solution=solution, **size) for seed in range(3)]
+    section = mixed_section(mixed, ours)
+    assert section.worse == ["- time to the first plan: ours is 2.00 times that of MIP HiGHS 12, median of 3 worlds"]
+    assert section.content[1]["the paper [s]"] == "85.93 ± 56.41"
+    assert section.content[1]["5 % gap proved"].startswith("0/3")
+    other = [rival_record("SL1M", seed, 2.0, 600.0) for seed in range(3)]
+    assert "true cost" in search_section([*ours, *other]).worse[0]
+    refused = [rival_record("A*", 0, 1.0, 1.0, found=False, feasible=False, reason="stopped by expansions")]
+    assert "stopped by expansions" in search_section([*ours, *refused]).text
+
+
+def test_the_slope_is_worked_out():
+    found = slope_figures()
+    assert found["cone_angle"] < 30.0 < found["pyramid_angle"]
+    assert found["acceleration"] == pytest.approx(0.657, abs=1e-3)
+    assert found["seconds"] == pytest.approx(3.02, abs=0.01)
+    assert found["speed"] == pytest.approx(found["acceleration"] * found["seconds"])
+    assert slope_figures(angle=20.0)["seconds"] == math.inf
+    assert "62 s" in slope_text()
+
+
+def test_known_results_fill_the_tables_of_categories_and_networks():
+    assert len(category_section().content) == 10
+    prediction = json.loads((options.RESULTS / "prediction.json").read_text())
+    section = network_section(prediction)
+    assert len(section.content) == 10
+    assert all(len(rows) == 5 for rows in section.content.values())
+    # Worse figures are told: those of networks that predict nothing are all worse.
+    for row in prediction["scores"]["1 s + 1 s, friction 0.5"].values():
+        for figures in [row, *(part for part in row.values() if isinstance(part, dict))]:
+            figures |= {"accuracy": 0.5, "objective_error": 1e6, "com_error": 1.0, "velocity_error": 1.0}
+    assert len(network_section(prediction).worse) == 40
+
+
+def test_drawings_are_of_what_is_loaded(tmp_path):
+    robot = load_robot(None)
+    from toolkit.prediction.networks import load_networks
+
+    draw_models(robot, tmp_path / "models.png")
+    draw_networks(next(iter(load_networks(robot).values())), tmp_path / "networks.png")
+    calibration = json.loads((options.RESULTS / "calibration.json").read_text())
+    relation = draw_sums(calibration, tmp_path / "sums.png")
+    assert len(relation.actual) > 100 and relation.pearson > 0.5
+    assert all((tmp_path / f"{name}.png").stat().st_size > 5000 for name in ("models", "networks", "sums"))
+
+
+def test_sizes_jobs_and_refusals(tmp_path):
+    args = paper.arguments(["--quick", "--trials", "3"])
+    size = paper.size_of(args)
+    assert size.trials == 3 and size.mixed_seconds == paper.QUICK.mixed_seconds
+    args = paper.arguments([])
+    assert paper.size_of(args) == paper.Size()
+    args.expansions = 10
+    settings = options.trial_settings(args)
+    jobs = paper.jobs_of(settings, paper.QUICK, ["HiGHS"], Path("pictures"), 0)
+    names = [job.name for job in jobs]
+    assert len(set(names)) == len(names)
+    assert sum(name.startswith("MIP full") for name in names) == 1
+    assert sum(name.startswith("picture-") for name in names) == len(paper.PICTURES)
+    with pytest.raises(InputError, match="learned"):
+        paper.main(["--planner", "kinematic", "--out", str(tmp_path / "out"), "--results", str(tmp_path / "results")])
+
+
+def test_the_pyramid_goes_around_the_cone():
+    from validation.pyramid_trial import beyond_cone
+
+    rng = np.random.default_rng(0)
+    angle = rng.uniform(0.0, 2 * np.pi, 500)
+    mu = 0.5
+    on_pyramid = np.sqrt(2.0) * mu / (np.abs(np.cos(angle)) + np.abs(np.sin(angle)))
+    assert on_pyramid.min() >= mu - 1e-12 and on_pyramid.max() <= np.sqrt(2.0) * mu + 1e-12
+    assert callable(beyond_cone)
