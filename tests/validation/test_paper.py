@@ -2,12 +2,14 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+from tests.validation.three_surfaces import three_surfaces
 from toolkit.errors import InputError
+from toolkit.pipeline import make_planner
 from toolkit.robot.loader import load_robot
 from validation import options, paper
 from validation.page import plans
@@ -17,6 +19,9 @@ from validation.page.known import category_section, network_section
 from validation.page.rivals import mixed_section, search_section
 from validation.page.spread import Compared, rate, spread, worse_first
 from validation.planning import PAPER
+from validation.rivals.even_steps import even_steps
+from validation.rivals.footsteps import footsteps_of
+from validation.rivals.sl1m import relax
 
 FIGURES = ("linear_momentum", "linear_momentum_rate", "angular_momentum", "angular_momentum_rate", "force", "torque")
 FIGURES += ("lateral_force", "cop_distance", "foot_cop_distance")
@@ -143,12 +148,31 @@ def test_sizes_jobs_and_refusals(tmp_path):
         paper.main(["--planner", "kinematic", "--out", str(tmp_path / "out"), "--results", str(tmp_path / "results")])
 
 
-def test_the_pyramid_goes_around_the_cone():
-    from validation.pyramid_trial import beyond_cone
+def test_a_walk_down_a_steep_slope_is_made_of_friction_that_is_not_there():
+    pytest.importorskip("casadi", reason="CasADi is not installed")
+    from validation.cases import Case
+    from validation.pyramid_trial import PAPERS_TIMING, beyond_cone, motion_under
 
-    rng = np.random.default_rng(0)
-    angle = rng.uniform(0.0, 2 * np.pi, 500)
-    mu = 0.5
-    on_pyramid = np.sqrt(2.0) * mu / (np.abs(np.cos(angle)) + np.abs(np.sin(angle)))
-    assert on_pyramid.min() >= mu - 1e-12 and on_pyramid.max() <= np.sqrt(2.0) * mu + 1e-12
-    assert callable(beyond_cone)
+    robot = load_robot(None)
+    world = Case("steep_slope_1m", 0, (("length", 0.6),)).world()
+    task = footsteps_of(robot, world, make_planner(robot, world, "kinematic"), 7)
+    sequence = even_steps(replace(task, timing=PAPERS_TIMING))
+    steep = [world.surfaces[contact.surface].normal[2] < 0.9 for contact in sequence.contacts]
+    assert any(steep) and not steep[0] and not steep[-1]
+    pyramid, cone = (motion_under(robot, world, sequence, pyramid=pyramid).motion for pyramid in (True, False))
+    assert pyramid.feasible and beyond_cone(pyramid) > 1.05
+    assert not cone.feasible
+
+
+def test_on_level_ground_both_cones_give_the_same_motion():
+    pytest.importorskip("casadi", reason="CasADi is not installed")
+    from validation.pyramid_trial import PAPERS_TIMING, beyond_cone, motion_under
+
+    robot, world = load_robot(None), three_surfaces()
+    task = footsteps_of(robot, world, make_planner(robot, world, "kinematic"), 4)
+    sequence = relax(replace(task, timing=PAPERS_TIMING)).sequence
+    assert sequence is not None
+    pyramid, cone = (motion_under(robot, world, sequence, pyramid=pyramid).motion for pyramid in (True, False))
+    assert pyramid.feasible and cone.feasible
+    assert beyond_cone(pyramid) < 0.9
+    assert pyramid.objective == pytest.approx(cone.objective, rel=1e-3)
