@@ -18,11 +18,11 @@ from validation.rivals.best_first import Limits, a_star
 from validation.rivals.contact_graph import contact_graph
 from validation.rivals.envelopes import products
 from validation.rivals.footsteps import footsteps_of
-from validation.rivals.linear import Builder, solution
+from validation.rivals.linear import Builder, solution, violation
 from validation.rivals.mixed_integer import Model, mixed_program, planned
 from validation.rivals.random_tree import random_tree
 from validation.rivals.regions import regions_of
-from validation.rivals.sl1m import relax
+from validation.rivals.sl1m import choices, relax
 from validation.rivals.solvers import GAP, available, solver_of
 
 SOLVERS = [name for name in available() if name != "Gurobi"]
@@ -54,6 +54,8 @@ def test_the_mixed_integer_program_finds_the_best_plan_of_all_choices(robot, wor
     assert found.x is not None and found.gap <= 1e-6
     assert found.first_seconds is not None and found.gap_seconds is not None
     assert 0.0 <= found.first_seconds <= found.gap_seconds
+    assert violation(mixed.program, found.x) < 1e-5
+    assert violation(mixed.program, found.x + 1e-2) > 1e-3
     assert visited(world, planned(task, mixed, found.x)) == BEST
     # Whatever else the four steps might choose, as 3^4 linear programs: none is cheaper, most are impossible.
     costs = {}
@@ -116,6 +118,14 @@ def test_sl1m_finds_the_best_plan(robot, world, planner):
     assert found.sequence is not None, found.reason
     assert visited(world, found.sequence) == BEST
     assert relax(footsteps_of(robot, world, planner, 3)).sequence is None
+
+
+def test_choices_come_in_the_order_of_their_slacks():
+    slacks = np.array([[0.0, 0.3, np.inf], [0.2, 0.1, 0.4], [0.5, 0.5, 0.0]])
+    found = list(choices(slacks))
+    sums = [slacks[np.arange(3), choice].sum() for choice in found]
+    assert sums == sorted(sums)
+    assert len({tuple(choice) for choice in found}) == len(found) == 2 * 3 * 3
 
 
 def test_a_star_and_the_random_tree_find_the_plan(robot, world):

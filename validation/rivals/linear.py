@@ -109,6 +109,14 @@ class Builder:
         return LinearProgram(cost, matrix, row_low, row_high, low, high, np.concatenate(self._integer))
 
 
+def violation(program: LinearProgram, x: np.ndarray) -> float:
+    """Largest violation of rows, bounds and whole numbers by values (n,): what a solver claims is not believed."""
+    rows = program.matrix @ x
+    parts = [program.row_low - rows, rows - program.row_high, program.low - x, x - program.high]
+    whole = x[program.integer]
+    return float(max(np.max(part, initial=0.0) for part in (*parts, np.abs(whole - np.round(whole)))))
+
+
 def solution(program: LinearProgram) -> np.ndarray | None:
     """(n,) a best solution, by SciPy; None where there is none."""
     row_low: Any = program.row_low

@@ -2,8 +2,9 @@
 
 Every step has a slack for each of its candidate regions, by which its place may lie outside. The sum of the slacks is
 least; where the relaxation is sparse, one slack of every step is zero and its region is chosen. What is written here is
-made from the idea of the paper: candidates are the regions near a straight way to the goal, and where the sum is not
-sparse, slacks are weighed by their last values and the program is solved again.
+made from the idea of the paper: candidates are the regions near a straight way to the goal. Where the sum is not
+sparse, slacks are weighed by their last values and the program is solved again; where it stays so, choices are tried
+one after the other, those with the least slacks first.
 
 Reference:
     Tonneau, Song, Fernbach, Mansard, Taix, Del Prete: SL1M: sparse L1-norm minimization for contact planning on uneven
@@ -12,7 +13,10 @@ Reference:
 
 from __future__ import annotations
 
+import heapq
+import itertools
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +27,8 @@ from validation.rivals.linear import Builder, solution
 from validation.rivals.regions import Region
 
 _NEAR = 0.6  # m; candidates are the regions no farther from the straight way's point at a step
-_ROUNDS = 12
+_ROUNDS = 6
+_CHOICES = 150  # that are tried where no round was sparse
 _ZERO, _SOFT = 1e-5, 1e-2  # m; a slack that counts as none, and what is added to one before it weighs
 _MOST = 100.0  # m; largest slack
 
@@ -55,7 +60,7 @@ def relax(task: Footsteps, rounds: int = _ROUNDS) -> Relaxed:
     places = add_places(builder, task)
     slacks = _slacks(builder, task, places, candidates)
     program = builder.finished()
-    weights = np.ones(slacks.shape)
+    weights, left = np.ones(slacks.shape), np.zeros(slacks.shape)
     for number in range(1, rounds + 1):
         cost = program.cost.copy()
         cost[slacks[candidates]] = weights[candidates]
@@ -68,7 +73,28 @@ def relax(task: Footsteps, rounds: int = _ROUNDS) -> Relaxed:
             if sequence is not None:
                 return Relaxed(sequence, number, time.perf_counter() - began)
         weights = _SOFT / (np.where(candidates, x[slacks], 0.0) + _SOFT)
+    for choice in itertools.islice(choices(left), _CHOICES):
+        sequence = _placed(task, choice)
+        if sequence is not None:
+            return Relaxed(sequence, rounds, time.perf_counter() - began)
     return Relaxed(None, rounds, time.perf_counter() - began, f"not sparse after {rounds} rounds")
+
+
+def choices(slacks: np.ndarray) -> Iterator[np.ndarray]:
+    """Choices (count,) of a region for every step, by the sum of their slacks (count, regions), the least first."""
+    order = np.argsort(slacks, axis=1, kind="stable")
+    ranked = np.take_along_axis(slacks, order, axis=1)
+    steps = np.arange(len(slacks))
+    first: tuple[int, ...] = (0,) * len(slacks)
+    waiting, known = [(float(ranked[:, 0].sum()), first)], {first}
+    while waiting:
+        total, ranks = heapq.heappop(waiting)
+        yield order[steps, list(ranks)]
+        for step, rank in enumerate(ranks):
+            following = (*ranks[:step], rank + 1, *ranks[step + 1 :])
+            if rank + 1 < slacks.shape[1] and np.isfinite(ranked[step, rank + 1]) and following not in known:
+                known.add(following)
+                heapq.heappush(waiting, (total + float(ranked[step, rank + 1] - ranked[step, rank]), following))
 
 
 def _candidates(task: Footsteps) -> np.ndarray:

@@ -26,6 +26,7 @@ from validation.options import TrialSettings
 from validation.rivals.best_first import Limits, a_star
 from validation.rivals.contact_graph import ContactGraph, contact_graph
 from validation.rivals.footsteps import footsteps_of
+from validation.rivals.linear import violation
 from validation.rivals.mixed_integer import Model, mixed_program, planned
 from validation.rivals.random_tree import random_tree
 from validation.rivals.sl1m import relax
@@ -218,6 +219,7 @@ def _mixed(robot: RobotModel, world: World, planner: ContactPlanner, rival: Mixe
     figures = {"limit": rival.seconds, "solution": solved.record(), **mixed.program.size}
     if solved.x is None:
         return Plan(None, solved.seconds, figures, f"{rival.solver}: {solved.status}")
+    figures["violation"] = violation(mixed.program, solved.x)
     return Plan(planned(task, mixed, solved.x), solved.first_seconds or solved.seconds, figures)
 
 
