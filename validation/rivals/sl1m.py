@@ -85,8 +85,9 @@ def choices(slacks: np.ndarray) -> Iterator[np.ndarray]:
     order = np.argsort(slacks, axis=1, kind="stable")
     ranked = np.take_along_axis(slacks, order, axis=1)
     steps = np.arange(len(slacks))
-    first: tuple[int, ...] = (0,) * len(slacks)
-    waiting, known = [(float(ranked[:, 0].sum()), first)], {first}
+    first = tuple(itertools.repeat(0, len(slacks)))
+    waiting: list[tuple[float, tuple[int, ...]]] = [(float(ranked[:, 0].sum()), first)]
+    known: set[tuple[int, ...]] = {first}
     while waiting:
         total, ranks = heapq.heappop(waiting)
         yield order[steps, list(ranks)]
