@@ -26,6 +26,7 @@ from validation.options import TrialSettings
 from validation.page.drawings import draw_models, draw_networks, draw_sums
 from validation.page.friction import friction_section
 from validation.page.known import category_section, network_section, transition_row
+from validation.page.others import other_section
 from validation.page.pictures import PICTURES, picture_trial
 from validation.page.plans import PLANNERS, Section, plan_section, ratio_text, time_section
 from validation.page.rivals import mixed_section, search_section
@@ -46,6 +47,7 @@ that it goes on where it was stopped.
 FIELD, CORRIDOR, GAP, SLOPE = "rubble_field", "rubble_corridor", "wide_gap", "steep_slope_3m"
 SLOPES = ("steep_slope_1m", "steep_slope_2m", "steep_slope_3m")
 COUNTS = (12, 18, 24)
+KNOWN, ABLATION = ("prediction", "centroidal", "calibration", "execution", "budgets"), "ablation"
 QUICK_COMMAND, FULL_COMMAND = "python -m validation.paper --quick", "python -m validation.paper"
 
 
@@ -116,7 +118,7 @@ def sections_of(records: dict[str, Record], known: dict[str, dict[str, Any]]) ->
 
     Args:
         records: By name of the trial.
-        known: Results of other programs by their name: prediction, centroidal.
+        known: Results of other programs by their name: `KNOWN`, and `ABLATION` where it is committed.
     """
 
     def of(prefix: str) -> list[Record]:
@@ -138,6 +140,7 @@ def sections_of(records: dict[str, Record], known: dict[str, dict[str, Any]]) ->
         friction_section(of("cone-")),
         category_section(),
         networks,
+        other_section(known),
     ]
     return found
 
@@ -246,7 +249,9 @@ def main(argv: list[str] | None = None) -> int:
     settings, solvers = options.trial_settings(args), available()
     if settings.planner != "learned":
         raise InputError(f"--planner {settings.planner}: the page is of the learned planner; leave the option out")
-    known = {name: _results(name) for name in ("prediction", "centroidal", "calibration")}
+    known = {name: _results(name) for name in KNOWN}
+    if (options.RESULTS / f"{ABLATION}.json").is_file():
+        known[ABLATION] = _results(ABLATION)
     pictures, folder = args.out / "pictures", args.results / "paper"
     jobs = jobs_of(settings, size, solvers, pictures.resolve(), args.seed_offset)
     store = TrialFile(args.out / "trials.jsonl", settings.deciding())

@@ -16,6 +16,7 @@ from validation.page import plans
 from validation.page.drawings import draw_models, draw_networks, draw_sums
 from validation.page.friction import slope_figures, slope_text
 from validation.page.known import category_section, network_section
+from validation.page.others import other_section
 from validation.page.rivals import mixed_section, search_section
 from validation.page.spread import Compared, rate, spread, worse_first
 from validation.planning import PAPER
@@ -117,6 +118,15 @@ def test_known_results_fill_the_tables_of_categories_and_networks():
         for figures in [row, *(part for part in row.values() if isinstance(part, dict))]:
             figures |= {"accuracy": 0.5, "objective_error": 1e6, "com_error": 1.0, "velocity_error": 1.0}
     assert len(network_section(prediction).worse) == 40
+
+
+def test_rows_of_other_results_are_read(tmp_path):
+    known = {name: json.loads((options.RESULTS / f"{name}.json").read_text()) for name in ("execution", "budgets")}
+    assert "execution.json" in other_section(known).text and "ablation" not in other_section(known).text
+    row = {"kind": "any_gap", "planner": "learned", "variant": "raw", "feasible": 9, "trials": 10}
+    row |= {"true cost": 500.0, "J, paper's weights": None}
+    known["ablation"] = {"date": "today", "code": "0", "table": [row]}
+    assert "| any_gap | learned | raw | 9/10 (60 to 98 %) | 500 | - |" in other_section(known).text
 
 
 def test_drawings_are_of_what_is_loaded(tmp_path):
