@@ -12,6 +12,7 @@ from toolkit.errors import InputError
 from toolkit.pipeline import make_planner
 from toolkit.robot.loader import load_robot
 from validation import options, paper
+from validation.machine import ROOT
 from validation.page import plans
 from validation.page.drawings import draw_models, draw_networks, draw_sums
 from validation.page.friction import slope_figures, slope_text
@@ -23,6 +24,8 @@ from validation.planning import PAPER
 from validation.rivals.even_steps import even_steps
 from validation.rivals.footsteps import footsteps_of
 from validation.rivals.sl1m import relax
+from validation.rivals.solvers import available
+from validation.trial_file import TrialFile
 
 FIGURES = ("linear_momentum", "linear_momentum_rate", "angular_momentum", "angular_momentum_rate", "force", "torque")
 FIGURES += ("lateral_force", "cop_distance", "foot_cop_distance")
@@ -186,3 +189,50 @@ def test_on_level_ground_both_cones_give_the_same_motion():
     assert pyramid.feasible and cone.feasible
     assert beyond_cone(pyramid) < 0.9
     assert pyramid.objective == pytest.approx(cone.objective, rel=1e-3)
+
+
+def made_up(job):
+    """A record of a job, as its trial might leave it."""
+    name, arguments = job.name, job.arguments
+    if name.startswith("plan-"):
+        return plan_record(arguments[1].kind, arguments[2], arguments[1].seed) | {"name": name}
+    if name.startswith("cone-"):
+        motion = {"feasible": True, "objective": 1.0, "beyond_cone": 1.3, "executed": False, "execution_reason": "fell"}
+        motions = {"pyramid": motion | {"figures": dict.fromkeys(FIGURES, 1.0)}, "cone": {"feasible": False}}
+        record = {"kind": arguments[1].kind, "motions": motions, "stage": "done", "passed": True, "reason": ""}
+        return record | {"name": name}
+    if name.startswith("picture-"):
+        return {"name": name, "stage": "planning", "passed": False, "reason": f"{ROOT}/worlds/x.xml: no way"}
+    case, rival = arguments[1], arguments[2]
+    record = rival_record(rival if isinstance(rival, str) else rival.name, case.seed, 1.0, 900.0, kind=case.kind)
+    solution = {"first_seconds": 0.5, "gap_seconds": 0.7}
+    size = {"variables": 10, "integers": 4, "rows": 7, "limit": 20.0, "solution": solution}
+    return record | {"name": name} | ({} if isinstance(rival, str) else size)
+
+
+def test_the_page_is_written_from_trials_that_are_there_and_nothing_runs_twice(tmp_path, capsys):
+    folders = ["--out", str(tmp_path / "out"), "--results", str(tmp_path / "results"), "--workers", "0"]
+    argv = ["--quick", "--trials", "1", *folders]
+    args = paper.arguments(argv)
+    args.expansions = 300
+    settings = options.trial_settings(args)
+    store = TrialFile(args.out / "trials.jsonl", settings.deciding())
+    for job in paper.jobs_of(settings, paper.size_of(args), available(), args.out / "pictures", 0):
+        store.add(made_up(job))
+    assert paper.main(argv) == 0
+    count = len(store.records)
+    assert f"{count} of {count} trials known from before" in capsys.readouterr().out
+    page = (tmp_path / "results" / "paper.md").read_text()
+    headings = [line for line in page.splitlines() if line.startswith("## ")]
+    assert headings[:3] == ["## Goals", "## Where ours is worse", "## How this page was made"]
+    assert "This is the quick run" in page and str(ROOT) not in page
+    written = json.loads((tmp_path / "results" / "paper.json").read_text())
+    assert len(written["trials"]) == count
+    worse = written["worse"]
+    assert any("rubble field, learned" in line for line in worse)
+    assert written["goals"][0]["result"] == "not met"
+    assert {path.name for path in (tmp_path / "results" / "paper").iterdir()} == {
+        "transition_models.png",
+        "networks.png",
+        "sums.png",
+    }
