@@ -18,7 +18,7 @@ from toolkit.report.colors import LIMB_COLORS, PALM_SURFACE, unit
 from toolkit.robot.model import RobotModel
 from validation.sequence_objective import Relation, draw_relation
 
-_OUTPUTS = ("feasible or not\n(softmax)", "objective (ReLU)\nCoM, velocity (linear)")
+_OUTPUTS = ("feasible or not\n(softmax)", "log of objective (ReLU)\nchange of CoM, velocity (linear)")
 
 
 def draw_models(robot: RobotModel, path: Path) -> None:

@@ -66,7 +66,7 @@ def network_rows(row: dict[str, float], figures: tuple[float, ...]) -> list[Comp
     named = (
         ("accuracy [%]", 100 * row["accuracy"], accuracy, 1, "Labels are of a solver that converges."),
         ("mean objective", row["mean_objective"], objective, 0, "Another robot, other transitions."),
-        ("mean error of the objective", row["objective_error"], error, -1, "In the unit of the line above."),
+        ("mean error of the objective", row["objective_error"], error, -1, "As small as the objectives."),
         ("final CoM [mm]", 1e3 * row["com_error"], com, -1, "More data, and labels of converged motions."),
         ("final velocity [mm/s]", 1e3 * row["velocity_error"], velocity, -1, "As the CoM."),
     )  # fmt: skip

@@ -98,13 +98,15 @@ def rival_trial(settings: TrialSettings, case: Case, rival: str | Mixed, seconds
     truth = Truth(robot, world)
     try:
         planner = make_planner(settings, world)
+        began, worked = time.perf_counter(), time.process_time()
         if isinstance(rival, str):
             plan = _SEARCHERS[rival](_Arena(settings, robot, world, planner, truth, case.seed, seconds))
         else:
             plan = _mixed(robot, world, planner, rival)
     except PlanningError as error:
         return record | {"reason": str(error)}
-    record |= {"seconds": plan.seconds, **plan.figures}
+    share = min((time.process_time() - worked) / (time.perf_counter() - began), 1.0)
+    record |= {"seconds": plan.seconds, "processor_seconds": share * plan.seconds, **plan.figures}
     if plan.sequence is None:
         return record | {"reason": plan.reason}
     return record | checked(settings, robot, world, planner, plan.sequence, truth, simulate)
