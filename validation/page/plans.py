@@ -163,7 +163,7 @@ def time_section(groups: dict[tuple[str, str], list[Record]]) -> Section:
     )
 
 
-CLOCKS = "Medians with quartiles; processor time leaves out what other programs took. The paper's machine: i7-6700 at 3.4 GHz."
+CLOCKS = "Medians with quartiles; processor time leaves out what other programs took. The paper's: i7-6700 at 3.4 GHz."
 FIELD = "Ours includes the optimisation of the sequence, theirs is the search alone."
 GAP = "As the line above; longer steps are drawn from the surfaces in place of a table for this test."
 SOLVER = "A stage-structured interior-point solver in place of Ipopt."
