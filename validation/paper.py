@@ -30,12 +30,12 @@ from validation.page.others import other_section
 from validation.page.pictures import PICTURES, picture_trial
 from validation.page.plans import PLANNERS, Section, plan_section, ratio_text, time_section
 from validation.page.rivals import mixed_section, search_section
-from validation.page.spread import HEADER
+from validation.page.spread import HEADER, spread
 from validation.plan_trial import plan_trial
 from validation.pyramid_trial import PAPERS_TIMING, pyramid_trial
-from validation.rivals.solvers import available
+from validation.rivals.solvers import available, version
 from validation.rivals.trial import OURS, SEARCHES, Mixed, rival_trial
-from validation.tables import failure_section, markdown_table, show_results, write_results
+from validation.tables import failure_section, markdown_table, show_results, values, write_results
 from validation.trial_file import TrialFile
 
 DESCRIPTION = """\
@@ -202,8 +202,9 @@ def draw(robot_name: str, robots: Path, calibration: dict[str, Any], folder: Pat
     ]
 
 
-def run_text(size: Size, quick: bool, solvers: Sequence[str]) -> str:
-    """How the page was made."""
+def run_text(size: Size, quick: bool, solvers: Sequence[str], loads: Sequence[float]) -> str:
+    """How the page was made; `loads` are those of the machine at the beginning of the trials."""
+    named = ", ".join(f"{name} (package {version(name)})" for name in solvers)
     kind = (
         f"**This is the quick run** (`{QUICK_COMMAND}`): few worlds and short limits, so intervals are wide. "
         f"`{FULL_COMMAND} --workers N` makes the full one and goes on where it was stopped."
@@ -213,10 +214,12 @@ def run_text(size: Size, quick: bool, solvers: Sequence[str]) -> str:
     return (
         f"{kind} {size.trials} worlds of each kind for the paper's table, {size.rival_trials} for the rivals; limits: "
         f"{size.mixed_seconds:g} s a mixed-integer program, {size.full_seconds:g} s with full dynamics, "
-        f"{size.search_seconds:g} s the other searches. Solvers: {', '.join(solvers) or 'none installed'}; Gurobi "
+        f"{size.search_seconds:g} s the other searches. Solvers: {named or 'none installed'}; Gurobi "
         "takes part where a licence is found. Figures of the networks and of their sums are those of prediction.json "
         "and calibration.json, with their dates. Every plan, whoever made it, is optimised and judged by the same "
-        "independent residual check, and carried out in MuJoCo where the table says so."
+        "independent residual check, and carried out in MuJoCo where the table says so. "
+        f"Load of the machine during the trials: {spread(loads, '.0f')}; above the number of its cores, "
+        "wall-clock times and limits tell more of other programs than of these."
     )
 
 
@@ -291,7 +294,7 @@ def _write(
         title="The paper on one page",
         sections=[
             ("Where ours is worse", "\n".join(worse) or "Nowhere."),
-            ("How this page was made", run_text(size, args.quick, solvers)),
+            ("How this page was made", run_text(size, args.quick, solvers, values(records.values(), "load"))),
             *((section.title, section.text) for section in sections),
             ("Figures", picture_text(records, args.out / "pictures", folder, drawn)),
             ("Trials that failed", failure_section(list(records.values()))),

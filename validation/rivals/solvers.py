@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import importlib.util
 import time
 from collections.abc import Callable
@@ -216,6 +217,11 @@ def solver_of(name: str) -> Solver:
     if importlib.util.find_spec(package) is None:
         raise InputError(f"solver {name}: needs {package}; pip install -e '.[validation]' brings HiGHS and SCIP")
     return solver
+
+
+def version(name: str) -> str:
+    """Version of an installed solver's package."""
+    return importlib.metadata.version(_SOLVERS[name][0])
 
 
 def available(time_limit: float = 5.0) -> list[str]:
