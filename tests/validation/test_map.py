@@ -299,7 +299,7 @@ def test_a_gap_as_wide_as_a_road_is_impossible(tmp_path):
     cell = Cell("gap", (3.0,), 0)
     (found,) = completed([{"name": cell.name, **map_trial(settings_of(tmp_path), cell)}], [cell])
     assert (found["outcome"], found["passed"]) == (IMPOSSIBLE, False)
-    assert "gap" in found["short"]
+    assert "ground" in found["short"]
 
 
 def test_an_error_of_the_program_is_an_outcome():

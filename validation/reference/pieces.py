@@ -28,11 +28,14 @@ from validation.reference.assembly import Parameters, Piece
 from validation.reference.leg_pieces import displacement, leg, stretched, torque
 
 
-@lru_cache(maxsize=2)
-def pieces(moving: bool = False) -> dict[str, Piece]:
-    """All pieces by their names; contacts are displaced by variables where `moving`. Building takes tens of ms once."""
+@lru_cache(maxsize=4)
+def pieces(moving: bool = False, pyramid: bool = False) -> dict[str, Piece]:
+    """All pieces by their names; contacts are displaced by variables where `moving`. Building takes tens of ms once.
+
+    With `pyramid`, friction is |fx| + |fy| <= sqrt(2) mu fz in place of the cone, which lies inside it.
+    """
     made = [_stage(contacts, moving) for contacts in range(1, 5)]
-    made += [_contact(), leg(moving), torque(moving), _distance(moving), _height(moving), _final(moving)]
+    made += [_contact(pyramid), leg(moving), torque(moving), _distance(moving), _height(moving), _final(moving)]
     made += [_bound(1), _bound(3), _price(), _fixed(STATE + 6 * moving), _fixed(3)]
     made += [_carry()] * moving
     return {piece.name: piece for piece in made}
@@ -74,7 +77,7 @@ def _stage(contacts: int, moving: bool) -> Piece:
     return Piece(f"stage{contacts}", ca.vertcat(x, wrenches, after, offsets), p.vector, rho=rho, rows=after - following)
 
 
-def _contact() -> Piece:
+def _contact(pyramid: bool) -> Piece:
     """Friction cone, patch and yaw moment (Caron et al., ICRA 2015) of a contact, and its objective.
 
     Variables: wrench, slacks of friction and CoP, excess. Slacks in weights: at the normal force the least
@@ -92,7 +95,8 @@ def _contact() -> Piece:
     cone = held - (fx**2 + fy**2) / held  # smooth at rest, unlike the square root
     loaded = ca.vertsplit((half - cop_margin) * fz + (cop_margin - least_cop) * slack[1] + half * excess)
     inside = [-ca.dot(ca.vertcat(*row), ca.vertcat(fx, fy, 1, tx, ty, tz)) for row in pressure_rows(*loaded)]
-    rows = [cone, *inside, fz - slack[0], fz - slack[1]]
+    sides = [ca.sqrt(2.0) * held - a * fx - b * fy for a in (1, -1) for b in (1, -1)]
+    rows = [*(sides if pyramid else [cone]), *inside, fz - slack[0], fz - slack[1]]
     # Yaw: what the wanted margins leave, and the least ones, which no slack takes back.
     most = 2 * mu * (half[0] + half[1])
     ranges = [
@@ -128,7 +132,9 @@ def _contact() -> Piece:
     bend = ca.SX(v.numel(), v.numel())
     bend[2, 2] = 4 * (ca.sumsqr(off_centre) + ca.fmax(spin * weights[2] * leverage, 0)) / pressed**2
     rows = 10 * ca.vertcat(*rows)
-    return Piece("contact", v, p.vector, rho=rho, linear=linear, rows=rows, bend=bend, curvature=curvature)
+    return Piece(
+        "contact", v, p.vector, rho=rho, linear=linear, rows=rows, bend=bend, curvature=None if pyramid else curvature
+    )
 
 
 def _distance(moving: bool) -> Piece:

@@ -26,6 +26,7 @@ class Reference:
 
     Args:
         program: The program, as the toolkit makes it.
+        pyramid: Whether friction is the pyramid of `pieces`.
 
     Attributes:
         assembly: The blocks.
@@ -33,10 +34,10 @@ class Reference:
         offset: (N + 1,) first variable of each stage.
     """
 
-    def __init__(self, program: Program):
+    def __init__(self, program: Program, pyramid: bool = False):
         self.program, layout = program, program.layout
         self.offset = np.concatenate([[0], np.cumsum(layout.size)[:-1]])
-        self._pieces = pieces(layout.moving)
+        self._pieces = pieces(layout.moving, pyramid)
         self._blocks: list[Block] = []
         self._rows = 0
         self._equal: list[np.ndarray] = []
@@ -104,14 +105,14 @@ class Reference:
         return y
 
 
-def solve(program: Program, guess: np.ndarray):
-    """Solve a program with Ipopt from a guess (N + 1, m).
+def solve(program: Program, guess: np.ndarray, pyramid: bool = False):
+    """Solve a program with Ipopt from a guess (N + 1, m), with the cone or the pyramid of friction.
 
     Returns:
         The motion with its verdict, as `toolkit.centroidal.sequence.optimise` gives it.
     """
     began = time.perf_counter()
-    reference = Reference(program)
+    reference = Reference(program, pyramid)
     functions = reference.assembly.functions()
     nlp = functions.pop("nlp")
     unused = dict.fromkeys(("print_time", "calc_lam_x", "calc_lam_p", "calc_f", "calc_g"), False)

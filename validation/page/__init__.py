@@ -1,0 +1,1 @@
+"""The page that sets our figures beside the paper's: its tables, its figures and its sentences."""
