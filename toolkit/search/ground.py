@@ -141,7 +141,7 @@ class Ground:
     def _obstacle(self, feet: Pose, strides: list[float]) -> str | None:
         """See `obstacle`, for these lengths of steps."""
         surfaces = resting_surfaces(self._world.surfaces, self._config.rest_friction)
-        longest = strides[-1] + self._projector.config.shift
+        longest = max(strides[0] + self._projector.config.shift, *strides)
         return self._terrain.obstacle(feet, longest, strides[0], surfaces)
 
     def _distance(self, feet: Pose, strides: list[float]) -> tuple[Distance, float]:

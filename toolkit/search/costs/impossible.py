@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from scipy.ndimage import binary_dilation
 
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.plane import plane_height
@@ -95,6 +94,8 @@ class Proof:
         beyond: tuple[bool, bool, bool, bool],
         longest: float,
     ):
+        from scipy.ndimage import binary_dilation  # here, since it takes long to import
+
         self._world, self._beyond = world, np.array(beyond)
         low, high = np.array(bounds[:2]), np.array(bounds[2:])
         self._cell = max(_CELL, float(np.sqrt((high - low).prod() / _MAX_CELLS)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from scipy.ndimage import distance_transform_edt
 
 from toolkit.compiled import compiled
 from toolkit.search.costs.grid_kernels import add_level
@@ -67,6 +66,8 @@ def mark_between(ground: np.ndarray, stride: float, border: np.ndarray) -> np.nd
     sector = np.floor((np.arctan2(cells[:, 1], cells[:, 0]) / np.pi + 1.0) * (_SECTORS / 2)).astype(np.int64) % _SECTORS
     between, asked = ground.copy(), np.ones(ground.shape, np.bool_)
     if ground.any() and not border.any():  # feet stand around the cells between them, and one of them near by
+        from scipy.ndimage import distance_transform_edt  # here, since it takes long to import
+
         hull = shapely.convex_hull(shapely.multipoints(np.argwhere(ground).astype(float))).buffer(2.0)
         shapely.prepare(hull)
         asked = shapely.contains_xy(hull, *np.indices(ground.shape))

@@ -20,7 +20,10 @@ from toolkit.world.world import World
 _CELL = 0.025  # m; edge of the cells
 _AROUND = 1.0  # m around the feet that are looked at
 _AHEAD, _ASIDE = 0.12, 0.05  # m; the CoM may be so far from the middle of the feet when it meets a ceiling
-_FAR, _STEP, _LEAST = 0.12, 0.01, 0.015  # m; walls farther away do not matter; spacing of tries; room that is left
+_FAR, _STEP = 0.12, 0.01  # m; walls farther away do not matter; spacing of tries
+_LEAST, _SWAY = 0.015, 0.05  # m; room that is left along the heading and across it, where walking needs more
+_ARM = 0.08  # m by which arms give way
+_SIDES = 4  # ahead, left, back, right
 
 
 class _Walker(NamedTuple):
@@ -42,8 +45,9 @@ class _Walker(NamedTuple):
 class BodyRoom:
     """The room of one robot's body in one world; see `toolkit.centroidal.surroundings.Surroundings`.
 
-    The body is an upright box over the middle of the feet. Its top sinks with the CoM. Where walls before and behind it
-    are near, as for a robot that passes a slot sideways, knees and thighs count as well.
+    The body is an upright box over the middle of the feet. Its top sinks with the CoM. Where walls before or behind it
+    are near, as for a robot that passes a slot sideways, knees and thighs count as well. To the sides the body is
+    narrower, since arms give way.
     """
 
     def __init__(self, robot: RobotModel, world: World):
@@ -71,7 +75,7 @@ class BodyRoom:
         occupancy = self._around(places)
         if occupancy is None:
             return None
-        sink, reach = np.zeros(len(places)), np.full((len(places), 2), np.inf)
+        sink, reach = np.zeros(len(places)), np.full((len(places), _SIDES), np.inf)
         _fill_sinks(occupancy, self._walker, places, yaw, sink)
         on = np.pad(problem.active[:, : len(FEET)], ((1, 1), (0, 0)))
         standing = on[:-1] | on[1:]
@@ -84,9 +88,10 @@ class BodyRoom:
         up = np.tile([0.0, 0.0, 1.0], (len(low), 1))
         knots, normals = [low], [up]
         bounds = [places[low, 2] + self._walker.com_height - sink[low]]
-        for side, sign in enumerate((1.0, -1.0)):
+        for side in range(_SIDES):
             at = np.flatnonzero(near[:, side])
-            normal = sign * np.column_stack([np.cos(yaw[at]), np.sin(yaw[at]), np.zeros(len(at))])
+            bearing = yaw[at] + side * np.pi / 2
+            normal = np.column_stack([np.cos(bearing), np.sin(bearing), np.zeros(len(at))])
             knots.append(at)
             normals.append(normal)
             bounds.append((normal * places[at]).sum(1) + reach[at, side])
@@ -175,51 +180,61 @@ class _Posture(NamedTuple):
 
 @compiled(kept=True)
 def _fill_reach(occupancy, walker, places, yaw, sink, feet, turns, standing, reached):
-    """Fill reached (n, 2) m: how far the body can move forwards and backwards where walls are near; else inf stays.
+    """Fill reached (n, 4) m: how far the body can move ahead, left, back and right where walls are near.
 
-    The arrays are those of `_Posture`, for n postures.
+    Where none is, inf stays. The arrays are those of `_Posture`, for n postures.
     """
+    box = walker.box
+    slim = BodyBox(box.half_depth, box.half_width - _ARM, box.bottom, box.top)
     for row in range(len(yaw)):
         posture = _Posture(places[row], yaw[row], sink[row], feet[row], turns[row], standing[row])
-        if _body_free(occupancy, walker, posture, 0.0):
-            for side in range(2):
-                reached[row, side] = _reach_of(occupancy, walker, posture, 1.0 - 2.0 * side)
+        for side in range(_SIDES):
+            body = box if side % 2 == 0 else slim
+            if _body_free(occupancy, body, posture, side, 0.0):
+                reached[row, side] = _reach_of(occupancy, walker, body, posture, side)
 
 
 @compiled
-def _reach_of(occupancy, walker, posture, sign):
-    """How far the body can move forwards (sign 1) or backwards (-1) in m; inf where it is far."""
+def _reach_of(occupancy, walker, body, posture, side):
+    """How far a body can move to a side (see `_fill_reach`) in m; inf where it is far."""
     tries = int(_FAR / _STEP)
     free = tries
     for k in range(tries, 0, -1):
-        if not _body_free(occupancy, walker, posture, sign * k * _STEP):
+        if not _body_free(occupancy, body, posture, side, k * _STEP):
             free = k - 1
     if free == tries:
         return np.inf
-    if _legs_free(occupancy, walker, posture, 0.0):
+    if side % 2 == 1:
+        return max(free * _STEP, _SWAY)
+    if _legs_free(occupancy, walker, posture, side, 0.0):
         for k in range(free, 0, -1):
-            if not _legs_free(occupancy, walker, posture, sign * k * _STEP):
+            if not _legs_free(occupancy, walker, posture, side, k * _STEP):
                 free = k - 1
     return max(free * _STEP, _LEAST)
 
 
 @compiled
-def _body_free(occupancy, walker, posture, away):
-    """Whether the body is free where it has moved so many m forwards."""
-    x, y, z = posture.place
-    x, y = x + away * np.cos(posture.yaw), y + away * np.sin(posture.yaw)
-    return body_free(occupancy, walker.box, x, y, z, posture.yaw, posture.sink)
+def _moved(posture, side, away):
+    """The middle of the body that has moved so many m to a side."""
+    bearing = posture.yaw + side * np.pi / 2
+    return posture.place[0] + away * np.cos(bearing), posture.place[1] + away * np.sin(bearing), posture.place[2]
 
 
 @compiled
-def _legs_free(occupancy, walker, posture, away):
-    """Whether the legs that stand are free where the body has moved so many m forwards; those that do not reach are."""
-    x, y, z = posture.place
-    x, y = x + away * np.cos(posture.yaw), y + away * np.sin(posture.yaw)
+def _body_free(occupancy, body, posture, side, away):
+    """Whether a body is free where it has moved so many m to a side."""
+    x, y, z = _moved(posture, side, away)
+    return body_free(occupancy, body, x, y, z, posture.yaw, posture.sink)
+
+
+@compiled
+def _legs_free(occupancy, walker, posture, side, away):
+    """Whether the legs that stand are free where the body has moved to a side; those that do not reach are."""
+    x, y, z = _moved(posture, side, away)
     com = (x, y, z + walker.com_height - posture.sink)
-    for side in range(2):
-        if posture.standing[side]:
-            code, points = reach(walker.legs, side, com, posture.yaw, posture.feet[side], posture.turns[side])
+    for foot in range(2):
+        if posture.standing[foot]:
+            code, points = reach(walker.legs, foot, com, posture.yaw, posture.feet[foot], posture.turns[foot])
             if code == 0 and not leg_free(occupancy, walker.shanks, points):
                 return False
     return True
