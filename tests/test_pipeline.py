@@ -7,9 +7,11 @@ import pytest
 
 from toolkit import pipeline
 from toolkit.contacts.failure import Failure
+from toolkit.execution.check import Check
 from toolkit.geometry.limb import Limb
-from toolkit.pipeline import Source, loop
+from toolkit.pipeline import Source, loop, trial
 from toolkit.refine import RefineConfig
+from toolkit.wholebody.plan import WIDE, Clearance
 
 
 def solution(name, *limbs, start=(), seconds=0.0):
@@ -56,9 +58,21 @@ class Run:
     """A run with made-up costs; infinite ones have no motion, and only sequences in `passing` pass.
 
     The local search turns a sequence into what `better` has for its name; those in `hurrying` ask too much of joints.
+    What has no motion lacks it from `since` s on, and what does not pass fails in the transition `failed_at`.
     """
 
-    def __init__(self, planner, passing, monkeypatch, cost=None, better=None, hurrying=None, **settings):
+    def __init__(
+        self,
+        planner,
+        passing,
+        monkeypatch,
+        cost=None,
+        better=None,
+        hurrying=None,
+        since=None,
+        failed_at=None,
+        **settings,
+    ):
         self.optimised, self.tested, self.improved = [], [], []
         optimised, tested, asked, cost, better = self.optimised, self.tested, self.improved, cost or {}, better or {}
 
@@ -70,7 +84,7 @@ class Run:
 
             def optimise(self, sequence):
                 optimised.append(sequence.name)
-                failure = Failure("no motion", transition=0) if cost.get(sequence.name, 0.0) == np.inf else None
+                failure = Failure("no motion", since, 0) if cost.get(sequence.name, 0.0) == np.inf else None
                 return SimpleNamespace(name=sequence.name, sequence=sequence), failure
 
             def settled(self, plan):
@@ -81,7 +95,8 @@ class Run:
                     tested.append(candidate.plan.name)
                 passed = candidate.plan.name in passing
                 hurried = candidate.plan.name in (hurrying or ())
-                failure = candidate.failure or (None if passed else Failure("it fell", too_fast=hurried))
+                failed = Failure("it fell", transition=failed_at, too_fast=hurried)
+                failure = candidate.failure or (None if passed else failed)
                 return SimpleNamespace(candidate=candidate, passed=passed, merit=(passed,), failure=failure)
 
         def plan_cost(plan, config):
@@ -188,8 +203,7 @@ def test_equal_sequences_are_optimised_once(monkeypatch):
 
 def test_infeasible_sequences_are_excluded_from_the_next_search(monkeypatch):
     planner = Planner([solution("a", FOOT), solution("b", FOOT), solution("palms", PALM)], [solution("feet", FOOT)])
-    monkeypatch.setattr(loop.Exclusion, "of", lambda stance, transition: SimpleNamespace())
-    monkeypatch.setattr(loop, "_meets", lambda sequence, exclusions: False)
+    monkeypatch.setattr(loop.Blame, "first_in", lambda self, sequence, since=0: None)
     run = Run(planner, {"feet"}, monkeypatch, {"a": np.inf, "b": np.inf, "palms": np.inf})
     assert planner.exclusions == [0, 3] and run.result.passed
 
@@ -246,3 +260,46 @@ def test_where_an_improved_sequence_fails_the_next_ones_are_improved_and_tested(
 def test_without_a_local_search_nothing_is_improved(monkeypatch):
     run = Run(Planner([solution("a", FOOT)], []), {"a"}, monkeypatch, better={"a": "a+"}, refine=None)
     assert not run.improved and run.tested == ["a"]
+
+
+def test_equal_failures_before_anything_has_moved_end_the_run(monkeypatch):
+    """Sequences have no part in them, so a third one is not optimised."""
+    names = [f"{number}" for number in range(5)]
+    planner = Planner([solution(name, FOOT) for name in names], [])
+    run = Run(planner, set(), monkeypatch, dict.fromkeys(names, np.inf), since=0.0)
+    assert run.optimised == ["4", "3"] and planner.calls == [True] and run.result.reason == "no motion"
+    later = Run(planner, set(), monkeypatch, dict.fromkeys(names, np.inf), since=0.1)
+    assert later.optimised == ["4", "3", "2", "1", "0"]
+
+
+def test_a_transition_that_failed_is_not_tested_again(monkeypatch):
+    """Of two sequences with the same first transition, the second is left out once the first failed there."""
+    planner = Planner([solution("other", Limb.RIGHT_FOOT), solution("same", FOOT), solution("new", FOOT)], [])
+    run = Run(planner, {"other"}, monkeypatch, {"new": 1.0, "same": 2.0, "other": 3.0}, failed_at=0)
+    assert run.tested == ["new", "other"] and run.result.passed
+
+
+@pytest.mark.parametrize(
+    "check, fell, expected",
+    [("unplanned_contacts", False, 2), ("scuff", False, 2), ("slip", False, 1), ("unplanned_contacts", True, 1)],
+)
+def test_what_touches_in_execution_is_tried_once_more_with_wide_clearances(monkeypatch, check, fell, expected):
+    clearances = []
+
+    def whole_body(plan, scene, clearance):
+        clearances.append(clearance)
+        return SimpleNamespace(trajectory=SimpleNamespace(feasible=True, seconds=0.0, reason=""))
+
+    def execute(plan, **settings):
+        value = float(len(clearances) == 1)  # the first run fails
+        failure = Failure(check) if value else None
+        return SimpleNamespace(
+            checks=(Check(check, 0.0, "", value),), fell=fell, failure=failure, goal_reached=True, scuffs=()
+        )
+
+    monkeypatch.setattr(trial, "whole_body", whole_body)
+    monkeypatch.setattr(trial, "execute", execute)
+    monkeypatch.setattr(trial.Tester, "_scene", None)
+    tester = trial.Tester(None, None, pipeline.PipelineConfig(), pipeline.Observer())  # pyright: ignore
+    tested = tester.test(SimpleNamespace(plan=None, failure=None))  # pyright: ignore
+    assert clearances == [Clearance(), WIDE][:expected] and tested.passed == (expected == 2)

@@ -5,6 +5,7 @@ import pytest
 
 from toolkit.geometry.pose import Pose, rotation_exponential
 from toolkit.wholebody import plan as wholebody
+from toolkit.wholebody.avoidance import BODY, CLOSE
 from toolkit.wholebody.lean import AROUND, WORTH, lean_ahead
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import solve_ik, whole_body
@@ -54,18 +55,22 @@ def test_the_base_follows_the_wanted_lean(robot, flat_walk, paths):
     np.testing.assert_allclose(base, expected, atol=0.02)  # a weak task among stronger ones
 
 
-def test_passes_end_with_the_first_that_holds_and_after_the_last_one(robot, flat_walk, monkeypatch):
-    """A failing check is answered by another pass with a lean, as long as there is one; a passing one is not."""
-    scene, leans = compose_scene(robot, flat_walk.world), []
+def test_passes_end_with_the_first_that_holds(robot, flat_walk, monkeypatch):
+    """A failing check is answered by passes with a lean, and by one that keeps less distance; a passing one is not."""
+    scene, passes = compose_scene(robot, flat_walk.world), []
 
-    def solved(robot, paths, motion, times, scene=None, lean=None):
-        leans.append(lean)
-        return solve_ik(robot, paths, motion, times, scene, lean)
+    def solved(robot, paths, motion, times, scene=None, lean=None, links=BODY):
+        passes.append((lean is not None, links))
+        return solve_ik(robot, paths, motion, times, scene, lean, links)
 
     monkeypatch.setattr(wholebody, "solve_ik", solved)
-    assert whole_body(flat_walk, scene).trajectory.feasible and leans == [None]
-    leans.clear()
+    assert whole_body(flat_walk, scene).trajectory.feasible and passes == [(False, BODY)]
+    passes.clear()
     monkeypatch.setattr("toolkit.wholebody.check.COM_ERROR", 0.0)
     monkeypatch.setattr("toolkit.wholebody.lean.WORTH", 0.0)
     assert not whole_body(flat_walk, scene).trajectory.feasible
-    assert len(leans) == wholebody.PASSES and leans[0] is None and None not in leans[1:]
+    assert passes == [(False, BODY), (True, BODY), (True, BODY), (False, CLOSE)]
+    passes.clear()
+    monkeypatch.setattr("toolkit.wholebody.lean.WORTH", np.inf)  # no lean is worth it
+    whole_body(flat_walk, scene)
+    assert passes == [(False, BODY), (False, CLOSE)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,9 +23,11 @@ from toolkit.refine.local_search import LocalSearch
 from toolkit.robot.model import RobotModel
 from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.plan_cost import PlanCost, plan_cost
-from toolkit.search.moves.exclusion import Exclusion, excluded
+from toolkit.search.moves.exclusion import Blame
 from toolkit.search.result import SearchResult, Solution
 from toolkit.world.world import World
+
+_SAME = 2  # equal failures where nothing has moved yet, after which no other sequence is tried
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,8 @@ class _Run:
         self._searches: list[SearchResult] = []
         self._candidates: list[Candidate] = []
         self._trials: list[Trial] = []
-        self._exclusions: list[Exclusion] = []
+        self._blame = Blame()
+        self._at_start: Counter[str] = Counter()  # reasons of failures where nothing has moved yet
         self._known: set[bytes] = set()
         self._local: LocalSearch | None = None
 
@@ -135,15 +139,29 @@ class _Run:
             failed_with_palms = any(candidate.uses_palms for candidate in found)
             if passed or self._spent():
                 break
-            if not search.may_yield and (not found or not (self._exclusions or failed_with_palms)):
+            if not search.may_yield and (not found or not (self._blame.exclusions or failed_with_palms)):
                 break
             palms = palms and (self._too_fast or not failed_with_palms)
         return self._concluded()
 
     def _spent(self) -> bool:
-        """Whether nothing more may be optimised or tested."""
-        config = self._config
-        return self._optimisations >= config.optimisations or len(self._trials) >= config.candidates
+        """Whether nothing more may be optimised or tested, or other sequences would make no difference."""
+        spent = self._optimisations >= self._config.optimisations or len(self._trials) >= self._config.candidates
+        return spent or self._hopeless
+
+    @property
+    def _hopeless(self) -> bool:
+        """Whether sequences fail in the same way where nothing has moved yet: they have no part in that."""
+        return max(self._at_start.values(), default=0) >= _SAME
+
+    def _note(self, sequence: ContactSequence, failure: Failure) -> None:
+        """Enter why a sequence failed.
+
+        The sequence has the contacts as the search proposed them, not where the optimiser moved landing points.
+        """
+        self._blame.add(sequence, failure.transition)
+        if failure.time is not None and failure.time <= 0.0:
+            self._at_start[failure.reason] += 1
 
     @property
     def _optimisations(self) -> int:
@@ -163,7 +181,7 @@ class _Run:
 
     def _search(self, palms: bool) -> SearchResult:
         """One contact search; the first one uses the seed itself."""
-        config, observer, exclusions = self._config, self._observer, self._exclusions
+        config, observer, exclusions = self._config, self._observer, self._blame.exclusions
         observer.started("planning")
         search = self._planner.search(
             np.random.default_rng([config.seed, len(self._searches)]),
@@ -197,6 +215,8 @@ class _Run:
         began, found = time.perf_counter(), []
         self._observer.started("dynamics")
         for solution, source in order:
+            if self._hopeless:
+                break
             found.append(self._candidate(solution, source))
             self._observer.progress("dynamics", len(found) / len(order), f"{len(found)} of {len(order)} sequences")
         self._observer.finished("dynamics", any(c.feasible for c in found), time.perf_counter() - began, _told(found))
@@ -211,6 +231,8 @@ class _Run:
     def _candidate(self, solution: Solution, source: Source) -> Candidate:
         """A sequence of the last search, optimised."""
         plan, failure = self._tester.optimise(solution.sequence)
+        if failure is not None:
+            self._note(solution.sequence, failure)
         return self._entered(source, solution, plan, plan_cost(plan, self._weights), failure)
 
     def _entered(
@@ -233,22 +255,20 @@ class _Run:
         Before a candidate is tested, it is improved, and again where a transition has been blamed since. Where one asks
         too much of the joints and the pace may yield, the others are not tested.
         """
-        blamed: list[Exclusion] = []
-        for candidate in found:
-            if candidate.failure is not None:
-                self._exclusions += _blamed(candidate.solution.sequence, candidate.failure)
+        blame = self._blame
+        since = len(blame.exclusions)  # what the optimiser rejected concerns only searches to come
         ranked = sorted((candidate for candidate in found if candidate.feasible), key=_rank)
         starts = 0 if self._config.refine is None else self._config.refine.starts
-        tried = {candidate.number: 0 for candidate in ranked[:starts]}
-        ranked += [better for candidate in ranked[:starts] for better in self._improved(candidate, blamed)]
+        tried = {candidate.number: since for candidate in ranked[:starts]}
+        ranked += [better for candidate in ranked[:starts] for better in self._improved(candidate)]
         while ranked:
             candidate = min(ranked, key=_rank)
             ranked.remove(candidate)
-            if not self._allowed(candidate) or _meets(candidate.solution.sequence, blamed):
+            if not self._allowed(candidate) or blame.first_in(candidate.solution.sequence, since) is not None:
                 continue
-            if starts and candidate.source != Source.LOCAL and tried.get(candidate.number) != len(blamed):
-                tried[candidate.number] = len(blamed)
-                ranked += [candidate, *self._improved(candidate, blamed)]
+            if starts and candidate.source != Source.LOCAL and tried.get(candidate.number) != len(blame.exclusions):
+                tried[candidate.number] = len(blame.exclusions)
+                ranked += [candidate, *self._improved(candidate)]
                 continue
             trial = self._tester.test(candidate)
             self._trials.append(trial)
@@ -256,8 +276,7 @@ class _Run:
                 return True
             if self._too_fast:
                 break  # the next search is calmer, and no transition is to blame
-            blamed += _blamed(candidate.solution.sequence, trial.failure)
-        self._exclusions += blamed
+            self._note(candidate.solution.sequence, trial.failure)
         return False
 
     @property
@@ -266,7 +285,7 @@ class _Run:
         failure = self._trials[-1].failure if self._trials else None
         return failure is not None and failure.too_fast and self._searches[-1].may_yield
 
-    def _improved(self, candidate: Candidate, blamed: list[Exclusion]) -> list[Candidate]:
+    def _improved(self, candidate: Candidate) -> list[Candidate]:
         """What the local search makes of a candidate without transitions that failed; nothing where none is better."""
         config, screen = self._config.refine, self._searches[candidate.search].screen
         if config is None or screen is None:
@@ -274,10 +293,9 @@ class _Run:
         if self._local is None:
             self._local = LocalSearch(config, self._weights, self._optimise, self._tester.slide)
         began, before = time.perf_counter(), self._local.spent
-        exclusions = [*self._exclusions, *blamed]
         self._observer.started("refinement")
         origin = candidate.solution.sequence
-        plan = self._local.improved(candidate.plan, origin, screen, lambda each: not _meets(each, exclusions))
+        plan = self._local.improved(candidate.plan, origin, screen, lambda each: self._blame.first_in(each) is None)
         changed = plan is not candidate.plan
         plan = self._tester.settled(plan) if changed else plan
         cost = plan_cost(plan, self._weights)
@@ -295,7 +313,7 @@ class _Run:
 
     def _allowed(self, candidate: Candidate) -> bool:
         """Whether one more trial may be made; half of them are for the feet alone."""
-        most = self._config.candidates
+        most = 0 if self._hopeless else self._config.candidates
         return len(self._trials) < (max(1, most // 2) if candidate.uses_palms else most)
 
 
@@ -312,23 +330,3 @@ def _told(found: list[Candidate]) -> str:
         assert found[0].failure is not None
         return f"{count}; {found[0].failure.reason}"
     return f"{count}, true cost {min(feasible):.0f}" + (f" to {max(feasible):.0f}" if len(feasible) > 1 else "")
-
-
-def _blamed(sequence: ContactSequence, failure: Failure) -> list[Exclusion]:
-    """The transition at which a trial failed, for the next search to avoid; empty where it is unknown.
-
-    The sequence has the contacts as the search proposed them, not where the optimiser moved landing points.
-    """
-    if failure.transition is None or not sequence.transitions:
-        return []
-    index = min(failure.transition, len(sequence.transitions) - 1)
-    return [Exclusion.of(sequence.stances[index], sequence.transitions[index])]
-
-
-def _meets(sequence: ContactSequence, exclusions: list[Exclusion]) -> bool:
-    """Whether a sequence contains an excluded transition."""
-    for stance, transition in zip(sequence.stances, sequence.transitions, strict=False):
-        own = Exclusion.of(stance, transition)
-        if excluded(exclusions, own.before, np.array([own.limb]), own.target[None])[0]:
-            return True
-    return False

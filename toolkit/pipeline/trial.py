@@ -22,7 +22,7 @@ from toolkit.pipeline.observer import Observer
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.body_room import BodyRoom
 from toolkit.search.result import Solution
-from toolkit.wholebody.plan import WholeBodyPlan, whole_body
+from toolkit.wholebody.plan import WIDE, Clearance, WholeBodyPlan, whole_body
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.scene import compose_scene
 from toolkit.world.world import World
@@ -74,7 +74,11 @@ class Tester:
     def __init__(self, robot: RobotModel, world: World, config: PipelineConfig, observer: Observer):
         """Prepare for a robot in a world; the observer is told of every stage after the optimiser."""
         self._robot, self._world, self._config, self._observer = robot, world, config, observer
-        self._surroundings = BodyRoom(robot, world)
+
+    @cached_property
+    def _surroundings(self) -> BodyRoom:
+        """The room that the world leaves to the body."""
+        return BodyRoom(self._robot, self._world)
 
     @cached_property
     def _scene(self) -> mujoco.MjModel:
@@ -116,13 +120,25 @@ class Tester:
         return slid(plan, landing, self._config.sequence, share, self._surroundings)
 
     def test(self, candidate: Candidate) -> Trial:
-        """Put a candidate through the stages after the optimiser; stop at the first that fails."""
-        config, observer, plan = self._config, self._observer, candidate.plan
+        """Put a candidate through the stages after the optimiser; stop at the first that fails.
+
+        Where it touches something in execution that it should not, it is tried once more with wide clearances.
+        """
+        config, plan = self._config, candidate.plan
         if candidate.failure is not None or config.until == "dynamics":
             return Trial(candidate, plan, failure=candidate.failure)
 
+        trial = self._executed(candidate, plan, Clearance())
+        if trial.execution is not None and _touches(trial.execution):
+            wider = self._executed(candidate, plan, WIDE)
+            trial = max(trial, wider, key=lambda each: each.merit)
+        return trial
+
+    def _executed(self, candidate: Candidate, plan: MotionPlan, clearance: Clearance) -> Trial:
+        """The whole-body motion of a plan with a clearance, and its execution."""
+        config, observer = self._config, self._observer
         observer.started("wholebody")
-        plan = whole_body(plan, self._scene)
+        plan = whole_body(plan, self._scene, clearance)
         trajectory = plan.trajectory
         observer.finished("wholebody", trajectory.feasible, trajectory.seconds, trajectory.reason)
         if not trajectory.feasible:
@@ -143,6 +159,12 @@ class Tester:
         reason = _grazes(execution) if trial.failure is None else trial.failure.reason
         observer.finished("execution", trial.passed, time.perf_counter() - began, reason)
         return trial
+
+
+def _touches(execution: Execution) -> bool:
+    """Whether a run failed because something touched the world that should not, and not in a fall."""
+    failed = {check.name for check in execution.checks if check.result is Result.FAIL}
+    return not execution.fell and bool(failed & {"unplanned_contacts", "scuff"})
 
 
 def _grazes(execution: Execution) -> str:

@@ -5,26 +5,21 @@ So the cost of a solution is the true one, and a search goes on until it finds w
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-
 from toolkit.contacts.failure import Failure
-from toolkit.contacts.sequence import ContactSequence, ContactTransition
-from toolkit.contacts.stance import Stance
+from toolkit.contacts.sequence import ContactSequence
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.search.anytime.graph import Edge, Fault
 from toolkit.search.costs.edge_cost import EdgeCost
 from toolkit.search.judging import Tally
-from toolkit.search.moves.exclusion import Exclusion
+from toolkit.search.moves.exclusion import Blame
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import is_pending
 
 _WINDOWS = (1, 3, 6)  # transitions that are optimised together, in the order in which they are tried
-_STRIKES = 2  # failures of the same transition after which the search avoids it
 _REST = 0.6  # s on the final stance that are optimised with them
 
 Finish = Callable[[ContactSequence], float | Failure]
@@ -41,7 +36,7 @@ class Arrival:
         reader: Reads states.
         cost: Costs of the search.
         tally: Counts rejections.
-        exclusions: Transitions that the search avoids; those to which failures lead again and again are added.
+        blame: Transitions that the search avoids; those to which failures lead again and again are added.
     """
 
     def __init__(
@@ -51,10 +46,10 @@ class Arrival:
         reader: StateReader,
         cost: EdgeCost,
         tally: Tally,
-        exclusions: list[Exclusion],
+        blame: Blame,
     ):
         self._finish, self._screen, self._reader, self._cost, self._tally = finish, screen, reader, cost, tally
-        self._exclusions, self._strikes = exclusions, Counter[bytes]()
+        self._blame = blame
 
     def __call__(
         self, states: Sequence[bytes], payloads: Sequence[Any], edge: Edge[bytes]
@@ -68,33 +63,17 @@ class Arrival:
             self._tally.rejected[Reason.DYNAMICS] += 1
             return None
         sequence = ContactSequence(self._reader.origin(passed[0])[0], tuple(transitions))
-        at = self._avoided(sequence)
+        at = self._blame.first_in(sequence)
         objective = self._finish(sequence) if at is None else Failure("avoided", transition=at)
         if isinstance(objective, Failure):
             self._tally.rejected[Reason.DYNAMICS] += 1
-            at = objective.transition
             if at is None:
-                return None
-            self._blame(sequence, at)
-            return None if at + 1 >= len(passed) else Fault(list(states).index(passed[at + 1]))
+                self._blame.add(sequence, objective.transition)
+            at = objective.transition
+            return None if at is None or at + 1 >= len(passed) else Fault(list(states).index(passed[at + 1]))
         predicted = sum(payload[0] for payload in judged) + edge.payload[0]
         missing = self._cost.dynamics * (objective - predicted)
         return edge._replace(cost=edge.cost + missing, payload=(*edge.payload, missing))
-
-    def _avoided(self, sequence: ContactSequence) -> int | None:
-        """Number of the first transition of a sequence that the search avoids by now; None where there is none."""
-        for index, (stance, transition) in enumerate(zip(sequence.stances, sequence.transitions, strict=False)):
-            if self._strikes[_key(stance, transition)] >= _STRIKES:
-                return index
-        return None
-
-    def _blame(self, sequence: ContactSequence, index: int) -> None:
-        """Count a failure of a transition; with the last strike the search avoids it."""
-        stance, transition = sequence.stances[index], sequence.transitions[index]
-        key = _key(stance, transition)
-        self._strikes[key] += 1
-        if self._strikes[key] == _STRIKES:
-            self._exclusions.append(Exclusion.of(stance, transition))
 
     def _comes_to_rest(self, passed: list[bytes], transitions: list) -> bool:
         """Whether the last transition, or the last few of them together, end at rest."""
@@ -108,9 +87,3 @@ class Arrival:
             self._screen.halt(*start, transitions[-count:], _REST) is not None
             for count, start in zip(windows, starts, strict=True)
         )
-
-
-def _key(stance: Stance, transition: ContactTransition) -> bytes:
-    """Contacts before a transition and its target, to 1 mm."""
-    own = Exclusion.of(stance, transition)
-    return bytes([own.limb]) + np.round([*own.before, own.target], 3).tobytes()

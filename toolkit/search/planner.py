@@ -25,7 +25,7 @@ from toolkit.search.ground import Ground, Way
 from toolkit.search.judging import Judging, Tally
 from toolkit.search.moves.candidates import CandidateGenerator, mean_feet
 from toolkit.search.moves.drift import Drift
-from toolkit.search.moves.exclusion import Exclusion
+from toolkit.search.moves.exclusion import Blame, Exclusion
 from toolkit.search.moves.reach_check import ReachCheck
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.problem import ContactProblem, Parts
@@ -38,6 +38,7 @@ from toolkit.search.strategies import Strategy, strategy_of
 from toolkit.world.timing import Timing, timings_of
 from toolkit.world.world import World
 
+_STRIKES = 2  # failures of the whole sequence in like transitions after which the search avoids them
 _UNTRAINED = (
     "timing or friction outside what the networks were trained for; the optimiser judged there instead, which is slower"
 )
@@ -115,8 +116,8 @@ class ContactPlanner:
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
         tally, timings = Tally(), self.timings(calmer, slides=way.slides)
         strategy = strategy_of(self.config, self._suited(start, com, timings, tally), way.length, slides=way.slides)
-        avoided = list(exclusions)
-        parts = self._parts(way, strategy, timings, tally, avoided, palms, time.perf_counter() + time_limit)
+        blame = Blame(exclusions, _STRIKES)
+        parts = self._parts(way, strategy, timings, tally, blame.exclusions, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
         unit = parts.cost.per_metre
         searches = [(ContactProblem(parts, state), replace(strategy.patient, unit=unit))]
@@ -126,7 +127,7 @@ class ContactPlanner:
         judge = None
         if self._finish is not None:
             at_rest = self._at_rest if way.slides else None
-            judge = Arrival(self._finish, at_rest, parts.reader, parts.cost, tally, avoided)
+            judge = Arrival(self._finish, at_rest, parts.reader, parts.cost, tally, blame)
         result, early = search_in_turn(searches, rng, judge, time_limit, observer)
         return SearchResult(
             solutions=tuple(Solution.of(parts.reader, path) for path in result.paths),

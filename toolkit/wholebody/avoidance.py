@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import mujoco
@@ -32,23 +32,32 @@ class Damper:
     """How a kind of pair is kept apart.
 
     Attributes:
-        notice: m; larger distances are ignored.
         safe_world, safe_self: m; wanted distance from the world and from the rest of the robot.
+        room: m; what a pair has beyond the wanted distance when it is noticed.
         time: s; tau above: longer than a tick, shorter than a swing.
         weight: Per squared m by which a pair comes nearer in a tick than it may.
     """
 
-    notice: float
     safe_world: float
     safe_self: float
+    room: float
     time: float
     weight: float
 
+    @property
+    def notice(self) -> float:
+        """The largest distance in m at which any pair is noticed."""
+        return max(self.safe_world, self.safe_self) + self.room
 
-ARM = Damper(notice=0.12, safe_world=0.06, safe_self=0.012, time=0.15, weight=1e3)
+
+ARM = Damper(safe_world=0.06, safe_self=0.012, room=0.06, time=0.15, weight=1e3)
 """Pairs with a link of an arm, which has much room and moves without need."""
-BODY = Damper(notice=0.06, safe_world=0.01, safe_self=0.01, time=0.05, weight=1e4)
-"""Other pairs: legs have little room to spare, and feet and CoM weigh more."""
+BODY = Damper(safe_world=0.02, safe_self=0.01, room=0.04, time=0.05, weight=1e4)
+"""Other pairs: legs have little room to spare; a foot strays by 1 cm from its path as it lifts off, its leg with it."""
+FAR = replace(BODY, safe_world=0.035)
+"""The same for motions that touched the world in execution."""
+CLOSE = replace(BODY, safe_world=0.003, safe_self=0.003, room=0.015)
+"""The same for motions that are too fast to keep more than clear."""
 _HOME_SHARE = 0.5  # of a pair's distance in the home posture, where it is safe at no more than that
 
 
@@ -79,8 +88,9 @@ class Dampers(NamedTuple):
 class Avoidance:
     """Distances between the links, and to the world, in the composed scene, tick after tick."""
 
-    def __init__(self, robot: RobotModel, scene: mujoco.MjModel):
-        """Prepare a copy of the scene, robot and world in one model."""
+    def __init__(self, robot: RobotModel, scene: mujoco.MjModel, others: Damper = BODY):
+        """Prepare a copy of the scene, robot and world in one model; `others` is for pairs without a link of an arm."""
+        self.others = others
         self.model = copy.copy(scene)
         self.data = mujoco.MjData(self.model)
         model = self.model
@@ -90,7 +100,7 @@ class Avoidance:
         self.of = {limb: model.geom_bodyid == body for limb, body in self.body.items()}
         self.base = int(model.body(robot.base).id)
         model.geom_gap[:] = 0.0
-        model.geom_margin[:] = np.where(self.static, 0.0, np.where(self.arm, ARM.notice, BODY.notice))
+        model.geom_margin[:] = np.where(self.static, 0.0, np.where(self.arm, ARM.notice, self.others.notice))
         model.body_margin[:] = 0.0
         np.maximum.at(model.body_margin, model.geom_bodyid, model.geom_margin)  # where collisions are looked for at all
         self.box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
@@ -117,18 +127,18 @@ class Avoidance:
         for pair in self._near(reaching):
             damper = self._damper(pair)
             safe = self._safe(pair, damper)
-            if safe is not None:
+            if safe is not None and pair.distance < safe + damper.room:
                 found.append((pair.distance - safe, pair, damper))
         found.sort(key=lambda item: item[0])
         found = found[:MAX_ROWS]
         matrix, bound = np.zeros((len(found), self.model.nv - 6)), np.zeros(len(found))
         for row, (room, pair, damper) in enumerate(found):
-            rate, known = self._rate(pair, stand if damper is BODY else self.base, drift)
+            rate, known = self._rate(pair, self.base if damper is ARM else stand, drift)
             matrix[row], bound[row] = -rate, room * tick / damper.time + known
         return Dampers(matrix, bound, np.array([damper.weight for _, _, damper in found]))
 
     def _damper(self, pair: _Pair) -> Damper:
-        return ARM if self.arm[pair.first] or self.arm[pair.second] else BODY
+        return ARM if self.arm[pair.first] or self.arm[pair.second] else self.others
 
     def _of_world(self, pair: _Pair) -> bool:
         return bool(self.static[pair.first] or self.static[pair.second])
@@ -185,7 +195,7 @@ class Avoidance:
         """The same for pairs of boxes; MuJoCo's collision function finds those apart only if two faces are opposite."""
         model, data, ends = self.model, self.data, np.zeros(6)
         first, second = self.box_pairs.T
-        notice = np.where(self.arm[first] | self.arm[second], ARM.notice, BODY.notice)
+        notice = np.where(self.arm[first] | self.arm[second], ARM.notice, self.others.notice)
         apart = np.linalg.norm(data.geom_xpos[first] - data.geom_xpos[second], axis=1)
         near = apart < notice + model.geom_rbound[first] + model.geom_rbound[second]
         near &= ~self._left(first, second, free)

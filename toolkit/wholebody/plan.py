@@ -17,7 +17,7 @@ from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
 from toolkit.mjcf import warnings_refused
 from toolkit.robot.model import RobotModel
-from toolkit.wholebody.avoidance import Avoidance
+from toolkit.wholebody.avoidance import BODY, CLOSE, FAR, Avoidance, Damper
 from toolkit.wholebody.check import CheckReport, check
 from toolkit.wholebody.ik import WholeBodyIK, first_guess
 from toolkit.wholebody.ik_config import SUBSTEPS
@@ -27,7 +27,6 @@ from toolkit.wholebody.swing_task import LIFT
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 RATE = 50.0  # Hz; samples of the trajectory
-PASSES = 3  # most passes of the inverse kinematics, each of which leans ahead of what the base did in the one before
 
 
 @dataclass(frozen=True)
@@ -45,24 +44,41 @@ class WholeBodyPlan(MotionPlan):
     trajectory: WholeBodyTrajectory
 
 
+@dataclass(frozen=True)
+class Clearance:
+    """How far limbs stay away from the world.
+
+    Attributes:
+        foot_lift: m; guarded motion of feet along the surface normal.
+        links: Of all links but those of arms and the last ones of feet.
+    """
+
+    foot_lift: float = LIFT
+    links: Damper = BODY
+
+
+WIDE = Clearance(foot_lift=0.08, links=FAR)
+"""For motions that touched something in execution: it strays from what was planned."""
+
+
 @warnings_refused("the whole-body motion", PlanningError)
-def whole_body(plan: MotionPlan, scene: mujoco.MjModel, foot_lift: float = LIFT) -> WholeBodyPlan:
+def whole_body(plan: MotionPlan, scene: mujoco.MjModel, clearance: Clearance | None = None) -> WholeBodyPlan:
     """Find swing paths and a whole-body trajectory for a motion plan.
 
     Args:
         plan: Contacts and motion, with a final rest.
         scene: The plan's robot and world in one model (`toolkit.world.scene.compose_scene`).
-        foot_lift: m; guarded motion of feet along the surface normal.
+        clearance: How far limbs stay away from the world; None for the usual distances.
 
     Returns:
         The plan with paths and trajectory; `trajectory.feasible` says whether every check passed.
     """
-    begin = perf_counter()
+    begin, clearance = perf_counter(), clearance or Clearance()
     duration = plan.schedule.duration
     times = np.linspace(0.0, duration, max(int(round(duration * RATE)), 2) + 1)
-    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, foot_lift)
+    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, clearance.foot_lift)
     if plan.motion.feasible:
-        trajectory = _trajectory(plan, scene, paths, times)
+        trajectory = _trajectory(plan, scene, paths, times, clearance.links)
     else:
         failure = Failure(f"the centroidal motion is not feasible: {plan.motion.outcome}")
         trajectory = replace(_without_postures(plan.robot, paths, times), failure=failure)
@@ -77,16 +93,18 @@ def solve_ik(
     times: np.ndarray,
     scene: mujoco.MjModel | None = None,
     lean: Lean | None = None,
+    links: Damper = BODY,
 ) -> np.ndarray:
     """(T, 7 + n) qpos on a uniform time grid (T,) in s; all links keep clear in `scene` unless it is None.
 
-    The base is upright with the heading of the feet where nothing is in the way, or as `lean` wants it.
+    The base is upright with the heading of the feet where nothing is in the way, or as `lean` wants it. Links other
+    than those of arms are kept apart as `links` says.
 
     Raises:
         PlanningError: A quadratic program has no solution.
     """
     tick = float(times[1] - times[0]) / SUBSTEPS
-    solver = WholeBodyIK(robot, tick, None if scene is None else Avoidance(robot, scene), lean)
+    solver = WholeBodyIK(robot, tick, None if scene is None else Avoidance(robot, scene, links), lean)
     qpos = np.empty((len(times), len(robot.home)))
     qpos[0] = solver.start(first_guess(robot, paths, motion), paths, motion)
     for index in range(1, len(times)):
@@ -119,12 +137,14 @@ def _limb_arrays(paths: LimbPaths, times: np.ndarray) -> tuple[np.ndarray, np.nd
     return pose, velocity, contact
 
 
-def _trajectory(plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray) -> WholeBodyTrajectory:
+def _trajectory(
+    plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray, links: Damper
+) -> WholeBodyTrajectory:
     """The postures with the results of their checks."""
     robot = plan.robot
     blocked, trajectory = _blocked(plan.schedule, paths), _without_postures(robot, paths, times)
     try:
-        qpos, report = _checked(plan, scene, paths, times, 1 if blocked else PASSES)
+        qpos, report = _checked(plan, scene, paths, times, [links] if blocked else [links, links, links, CLOSE])
     except PlanningError as error:
         return replace(trajectory, failure=Failure("; ".join([*(each.reason for each in blocked), str(error)])))
     return replace(
@@ -140,16 +160,24 @@ def _trajectory(plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times
 
 
 def _checked(
-    plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray, passes: int
+    plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray, passes: Sequence[Damper]
 ) -> tuple[np.ndarray, CheckReport]:
-    """The postures (T, 7 + n) with their checks; of several passes the first that holds, or else the last one."""
-    robot, motion, lean = plan.robot, plan.motion, None
-    while True:
-        qpos = solve_ik(robot, paths, motion, times, scene, lean)
-        report = check(robot, scene, paths, motion, times, qpos)
-        lean, passes = lean_ahead(paths, times, qpos), passes - 1
-        if not report.findings or lean is None or passes == 0:
-            return qpos, report
+    """The postures (T, 7 + n) with their checks: of the first pass that holds, or else of the first one.
+
+    Each pass leans ahead of what the base did in the one before, unless links are kept apart in another way.
+    """
+    robot, motion = plan.robot, plan.motion
+    found: list[tuple[np.ndarray, CheckReport]] = []
+    lean, before = None, None
+    for links in passes:
+        if links is before and lean is None:
+            continue
+        qpos = solve_ik(robot, paths, motion, times, scene, lean if links is before else None, links)
+        found.append((qpos, check(robot, scene, paths, motion, times, qpos)))
+        if not found[-1][1].findings:
+            return found[-1]
+        lean, before = lean_ahead(paths, times, qpos), links
+    return found[0]
 
 
 def _blocked(schedule: ContactSchedule, paths: LimbPaths) -> list[Failure]:
