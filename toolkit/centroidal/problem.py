@@ -25,6 +25,7 @@ import numpy as np
 from toolkit.contacts.failure import Failure
 from toolkit.physics.momentum import ballistic
 
+SWING_LIFT = 0.06  # m for a body of the usual size (`toolkit.robot.scale`); see `CentroidalProblem.swing_lift`
 STANDARD_GRAVITY = 9.81  # m/s^2
 GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 
@@ -112,6 +113,7 @@ class CentroidalProblem:
         landing_position, landing_rotation: (3,) m and (3, 3); that contact, as in `position` and `rotation`. None
             without one.
         room: Where the world lets the CoM be; None where it does not limit it.
+        swing_lift: m; height of the assumed path of a foot in the air above the line between its contacts.
     """
 
     mass: float
@@ -139,6 +141,7 @@ class CentroidalProblem:
     landing_position: np.ndarray | None = None
     landing_rotation: np.ndarray | None = None
     room: ComRoom | None = None
+    swing_lift: float = SWING_LIFT
 
     @property
     def home_heights(self) -> np.ndarray:

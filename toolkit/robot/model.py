@@ -11,6 +11,7 @@ import numpy as np
 
 from toolkit.geometry.limb import Limb
 from toolkit.robot.chain import arm_joints, joints_to
+from toolkit.robot.scale import Scale
 
 
 @dataclass(frozen=True)
@@ -135,6 +136,11 @@ class RobotModel:
     def half_sizes(self) -> np.ndarray:
         """Half extents (4, 2) float of the patches by limb, m; zeros for a limb that the robot does not have."""
         return half_sizes_of(self.limbs)
+
+    @property
+    def scale(self) -> Scale:
+        """Factors on lengths, times and forces that are written for a body of the usual size."""
+        return Scale.of(float(np.mean([leg.thigh + leg.shin for leg in self.legs.values()])), self.mass)
 
     def joints_to(self, limb: Limb) -> np.ndarray:
         """Indices (k,) int into `joint_names` of the joints from the base to a limb, in order."""

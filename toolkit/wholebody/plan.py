@@ -52,7 +52,7 @@ def whole_body(plan: MotionPlan, scene: mujoco.MjModel, foot_lift: float = LIFT)
     Args:
         plan: Contacts and motion, with a final rest.
         scene: The plan's robot and world in one model (`toolkit.world.scene.compose_scene`).
-        foot_lift: m; guarded motion of feet along the surface normal.
+        foot_lift: m, for a body of the usual size; guarded motion of feet along the surface normal.
 
     Returns:
         The plan with paths and trajectory; `trajectory.feasible` says whether every check passed.
