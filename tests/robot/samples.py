@@ -200,9 +200,12 @@ def write_scaled(folder: Path, name: str, length: float, mass: float) -> Path:
         key, equals, value = line.partition(" = ")
         table = line if line.startswith("[") else table
         by = kinds.get(key, kinds.get(table, ())) if equals else ()
-        found = re.findall(r"[0-9.]+", value)
-        for number, factor in zip(found, by, strict=False):
-            line = line.replace(number, f"{factor * float(number):.9g}", 1)
-        lines.append(line)
+        lines.append(f"{key}{equals}{_multiplied(value, by)}")
     (folder / "robot.toml").write_text("\n".join(lines) + "\n")
     return folder
+
+
+def _multiplied(text: str, factors: tuple[float, ...]) -> str:
+    """A text whose numbers are multiplied by factors in turn; as it is where there are none."""
+    left = iter(factors)
+    return re.sub(r"[0-9.]+", lambda found: f"{next(left) * float(found[0]):.9g}", text) if factors else text
