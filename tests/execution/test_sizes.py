@@ -28,7 +28,7 @@ def size(request):
 def sized(size, robot, flat, tmp_path_factory):
     """The short walk of the usual robot, by one of another size: lengths to scale, times to their root."""
     length, mass = size
-    other = load_robot(write_scaled(tmp_path_factory.mktemp("sized") / "robot", OWN[0], length, mass))
+    other = load_robot(str(write_scaled(tmp_path_factory.mktemp("sized") / "robot", OWN[0], length, mass)))
     step, pace = 0.2 * other.com_height, np.sqrt(length)
     planned = walk(other, 2, step)
     timing = Timing(0.4 * pace, 0.6 * pace)

@@ -32,7 +32,7 @@ def test_a_robots_scale_is_near_one_where_it_is_a_humanoid_of_a_persons_size(nam
 
 @pytest.mark.parametrize("name", OWN)
 def test_a_robot_made_smaller_is_smaller_by_that(name, tmp_path):
-    usual, small = load_robot(name), load_robot(write_scaled(tmp_path / "small", name, 0.5, 0.1))
+    usual, small = load_robot(name), load_robot(str(write_scaled(tmp_path / "small", name, 0.5, 0.1)))
     assert small.scale == (round(0.5 * usual.scale.length, 2), pytest.approx(0.1 * usual.scale.force))
     assert small.mass == pytest.approx(0.1 * usual.mass)
     assert small.com_height == pytest.approx(0.5 * usual.com_height)

@@ -38,6 +38,7 @@ from toolkit.search.states.contact_table import ContactTable
 
 _KEPT = 20_000  # entries of each memory
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
+_WALL = (0.4, 0.6)  # m above the soles; see `StepLimits`
 _APART = 0.02  # m; least distance between two soles
 _PALM_SIDE = 0.15  # m; least distance of a palm to the side of the body's middle
 _PALM_ANGLE = np.radians(65.0)  # largest angle between the arm and the surface's normal
@@ -99,6 +100,8 @@ class MoveGenerator:
             climb=self._climb,
             com_height=robot.com_height,
             drops=drops(robot),
+            wall_bottom=self._scale * _WALL[0],
+            wall_top=self._scale * _WALL[1],
         )
         self._steps: dict[tuple, Moves] = {}
         self._palms: dict[tuple, Moves] = {}
