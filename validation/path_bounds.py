@@ -76,7 +76,7 @@ class BoundCheck:
             way.distance,
             way.longest,
             planner.robot.mass,
-            planner.robot.scale.length,
+            planner.robot.scale,
         )
 
     def __call__(self, tested: Tested) -> PathBounds:

@@ -4,6 +4,7 @@ import pytest
 
 from tests.robot.samples import write_scaled
 from tests.shipped_robots import EVERY, OWN, loaded
+from toolkit.centroidal.problem import Weights
 from toolkit.robot.loader import load_robot
 from toolkit.robot.scale import USUAL, Scale
 
@@ -22,6 +23,19 @@ def test_bodies_of_nearly_the_same_size_are_alike():
 def test_times_are_those_of_a_pendulum_and_moments_are_forces_times_lengths():
     scale = Scale(0.25, 0.1)
     assert scale.time == scale.speed == 0.5 and scale.moment == pytest.approx(0.025)
+
+
+def test_the_same_motion_to_scale_has_the_same_price():
+    scale, usual = Scale(0.5, 0.1), Weights()
+    small = usual.scaled(scale)
+    speed, turning = scale.speed, scale.length * scale.speed  # of the CoM, and angular momentum per mass
+    assert small.linear_momentum * (scale.force * speed) ** 2 == pytest.approx(usual.linear_momentum)
+    assert small.linear_momentum_rate * scale.force**2 == pytest.approx(usual.linear_momentum_rate)
+    assert small.angular_momentum * (scale.force * turning) ** 2 == pytest.approx(usual.angular_momentum)
+    assert small.angular_momentum_rate * scale.moment**2 == pytest.approx(usual.angular_momentum_rate)
+    assert small.torque * scale.moment**2 == pytest.approx(usual.torque)
+    assert (small.force, small.lateral_force, small.cop) == (usual.force, usual.lateral_force, usual.cop)
+    assert usual.scaled(USUAL) is usual
 
 
 @pytest.mark.parametrize("name", EVERY)

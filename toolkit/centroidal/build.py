@@ -25,7 +25,7 @@ MAX_SPEED = 20.0  # m/s; of the initial CoM, as a guard against wrong units
 
 @dataclass(frozen=True)
 class ProblemConfig:
-    """What a problem assumes beyond robot, contacts and timing; lengths are those of a body of the usual size.
+    """What a problem assumes beyond robot, contacts and timing, for a body of the usual size.
 
     Attributes:
         steps: Number of steps per phase (the paper: 1 s in steps of 0.2 s).
@@ -233,7 +233,7 @@ def _problem(
         final_center=np.array([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2 + robot.com_height]),
         final_half_size=scale * np.array(box, float),
         final_at_rest=final_at_rest,
-        weights=config.weights,
+        weights=config.weights.scaled(robot.scale),
         margins=config.margins,
         landing_limb=-1 if landing is None else int(landing.limb),
         landing_position=None if landing is None else landing.pose.position,

@@ -24,6 +24,7 @@ import numpy as np
 
 from toolkit.contacts.failure import Failure
 from toolkit.physics.momentum import ballistic
+from toolkit.robot.scale import USUAL, Scale
 
 SWING_LIFT = 0.06  # m for a body of the usual size (`toolkit.robot.scale`); see `CentroidalProblem.swing_lift`
 STANDARD_GRAVITY = 9.81  # m/s^2
@@ -42,6 +43,20 @@ class Weights:
     torque: float = 1.0
     lateral_force: float = 10.0
     cop: float = 1.0
+
+    def scaled(self, scale: Scale) -> Weights:
+        """The weights with which a body of another size moves alike; forces and the CoP are relative already."""
+        if scale == USUAL:
+            return self
+        momentum, force, moment = scale.force * scale.speed, scale.force, scale.moment
+        return replace(
+            self,
+            linear_momentum=self.linear_momentum / momentum**2,
+            linear_momentum_rate=self.linear_momentum_rate / force**2,
+            angular_momentum=self.angular_momentum / (momentum * scale.length) ** 2,
+            angular_momentum_rate=self.angular_momentum_rate / moment**2,
+            torque=self.torque / moment**2,
+        )
 
 
 @dataclass(frozen=True)

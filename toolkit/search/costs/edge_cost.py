@@ -14,6 +14,7 @@ import numpy as np
 
 from toolkit.centroidal.sequence import CALM
 from toolkit.geometry.limb import Limb
+from toolkit.robot.scale import USUAL, Scale
 from toolkit.search.costs.heuristic import Distance
 from toolkit.search.moves.candidates import Candidates
 from toolkit.search.states.contact_table import ContactTable
@@ -136,7 +137,7 @@ class EdgeCost(TransitionCost):
         distance: Distance to the goal.
         longest: The farthest, in m, that the mean of the feet moves in one transition.
         mass: kg; of the robot whose motions the objectives are of. 0 where they are not those of motions.
-        scale: Factor on lengths for that robot.
+        scale: The size of that robot.
     """
 
     def __init__(
@@ -148,11 +149,11 @@ class EdgeCost(TransitionCost):
         distance: Distance,
         longest: float,
         mass: float = 0.0,
-        scale: float = 1.0,
+        scale: Scale = USUAL,
     ):
         super().__init__(config, table, timings, goal)
-        self._distance, self._longest, self._lean = distance, longest, scale * _LEAN
-        self._momentum = _SURE * self.dynamics * CALM.linear_momentum / 0.2 * mass**2
+        self._distance, self._longest, self._lean = distance, longest, scale.length * _LEAN
+        self._momentum = _SURE * self.dynamics * CALM.scaled(scale).linear_momentum / 0.2 * mass**2
         self._slowest = float(self._durations.max())
         # Of one transition, as long as the slowest and as cheap as the shortest one.
         self._step = config.step + self.time * float(self._durations.min())
