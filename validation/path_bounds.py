@@ -68,7 +68,16 @@ class BoundCheck:
         self._weights = strategy_of(config, KinematicEvaluator(planner.robot), way.length, slides=way.slides).cost
         table, timings = ground.moves(way).table, planner.timings(slides=way.slides)
         self._goal = planner.world.goal
-        self._cost = EdgeCost(self._weights, table, timings, self._goal, way.distance, way.longest, planner.robot.mass)
+        self._cost = EdgeCost(
+            self._weights,
+            table,
+            timings,
+            self._goal,
+            way.distance,
+            way.longest,
+            planner.robot.mass,
+            planner.robot.scale,
+        )
 
     def __call__(self, tested: Tested) -> PathBounds:
         """The h and the cost to go along a sequence of the planner."""

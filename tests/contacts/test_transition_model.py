@@ -44,5 +44,5 @@ def test_right_limbs_mirror_left_ones_and_soles_stay_apart(name):
     model = TransitionModel.of(robot, steps_60())
     np.testing.assert_array_equal(model.steps_of(Limb.RIGHT_FOOT), model.steps_of(Limb.LEFT_FOOT) * [1, -1, -1])
     np.testing.assert_array_equal(model.rays_of(Limb.RIGHT_PALM), model.rays_of(Limb.LEFT_PALM) * [1, -1, 1])
-    assert model.steps[:, 1].min() >= 2 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04 - 1e-12
+    assert model.steps[:, 1].min() >= 2 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04 * robot.scale.length - 1e-12
     assert len(model.rays) == (18 if robot.arms else 0)

@@ -12,7 +12,7 @@ COUNT, HALF = 400, np.array([0.11, 0.065])
 
 def measured(force, position, rotation=None):
     rotation = np.tile(np.eye(3), (COUNT, 1, 1)) if rotation is None else rotation
-    return contact_intervals(Limb.LEFT_FOOT, force, position, rotation, HALF, 0.002)
+    return contact_intervals(Limb.LEFT_FOOT, force, position, rotation, HALF, 0.002, 20.0)
 
 
 def pulse(first, last):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+
+from toolkit.robot.loader import robots_folder
 
 LEG = (  # joint, axis, lower, upper, N m, offset of its body
     ("hip_pitch", "0 1 0", -2.0, 1.0, 200, "0 {y} -0.05"),
@@ -166,3 +170,42 @@ def write_robot(folder: Path, model: str | None = None, toml: str | None = None,
     (folder / file).write_text(biped_mjcf() if model is None else model)
     (folder / "robot.toml").write_text((TOML if toml is None else toml).replace("{file}", file))
     return folder
+
+
+def write_scaled(folder: Path, name: str, length: float, mass: float) -> Path:
+    """Write a robot of `robots/` with lengths and masses multiplied by factors, and all else so that it moves alike.
+
+    Under the same gravity times go with the root of the lengths, torques with mass times length, armature with mass
+    times length squared.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    root = ElementTree.parse(robots_folder() / name / "robot.xml").getroot()
+    torque, pace = mass * length, length**0.5
+    factors = {"pos": length, "size": length, "fromto": length, "mass": mass, "armature": torque * length}
+    for element in root.iter():
+        motor = {"ctrlrange": torque, "forcerange": torque}
+        for key, factor in (factors | motor).items():
+            if key in element.attrib:
+                element.set(key, " ".join(f"{factor * float(each):.9g}" for each in element.get(key, "").split()))
+    (folder / "robot.xml").write_text(ElementTree.tostring(root, encoding="unicode"))
+    toml = (robots_folder() / name / "robot.toml").read_text().partition("[declared]")[0]
+    kinds = {
+        "patch": (length, length),
+        "max_force": (mass,),
+        "[gains]": (torque, torque * pace),
+        "[limits.velocity]": (1 / pace,),
+    }
+    lines, table = [], ""
+    for line in toml.splitlines():
+        key, equals, value = line.partition(" = ")
+        table = line if line.startswith("[") else table
+        by = kinds.get(key, kinds.get(table, ())) if equals else ()
+        lines.append(f"{key}{equals}{_multiplied(value, by)}")
+    (folder / "robot.toml").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def _multiplied(text: str, factors: tuple[float, ...]) -> str:
+    """A text whose numbers are multiplied by factors in turn; as it is where there are none."""
+    left = iter(factors)
+    return re.sub(r"[0-9.]+", lambda found: f"{next(left) * float(found[0]):.9g}", text) if factors else text

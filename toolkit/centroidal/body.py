@@ -17,7 +17,6 @@ from toolkit.geometry.pose import rotation_about_z
 from toolkit.physics.leg import PLANNED, ReachMargins, leg_clearances, leg_posture, leg_torques
 from toolkit.robot.model import RobotModel
 
-SWING_LIFT = 0.06  # m; height of the assumed path of a foot in the air above the line between its contacts
 CROSSING = (0.02, 0.95)  # part of a swing in which the foot moves horizontally from contact to contact
 
 
@@ -117,7 +116,7 @@ def swing_ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np
             crossed = np.clip((s - CROSSING[0]) / (CROSSING[1] - CROSSING[0]), 0.0, 1.0)
             along = crossed * crossed * (3 - 2 * crossed)
             path = tip[lift - 1] + along * (end - tip[lift - 1])
-            path[:, 2] += SWING_LIFT * (4 * s * (1 - s))[:, 0]
+            path[:, 2] += problem.swing_lift * (4 * s * (1 - s))[:, 0]
             share, left = along[..., None], problem.rotation[lift - 1, limb]
             tangent = np.concatenate([share * turn[:, :2], (1 - share) * left[:, :2]], 2)
             parts.append((inside, delay, np.full(len(inside), int(limb)), path, tangent))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalProblem, Margins, Weights
+from toolkit.centroidal.problem import STANDARD_GRAVITY, SWING_LIFT, CentroidalProblem, Margins, Weights
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
@@ -25,7 +25,7 @@ MAX_SPEED = 20.0  # m/s; of the initial CoM, as a guard against wrong units
 
 @dataclass(frozen=True)
 class ProblemConfig:
-    """What a problem assumes beyond robot, contacts and timing.
+    """What a problem assumes beyond robot, contacts and timing, for a body of the usual size.
 
     Attributes:
         steps: Number of steps per phase (the paper: 1 s in steps of 0.2 s).
@@ -210,6 +210,8 @@ def _problem(
     for limb in range(4):
         if used[limb] and not reach[limb] > 0.0:
             raise InputError(f"the robot has no {Limb(limb).label} with a reach; it cannot make this contact")
+    scale = robot.scale.length
+    box = config.final_half_size if final_at_rest else config.moving_half_size
     a, b = last[0].pose.position.tolist(), last[1].pose.position.tolist()
     return CentroidalProblem(
         mass=robot.mass,
@@ -229,13 +231,14 @@ def _problem(
         max_reach=reach,
         min_height=config.min_height * robot.com_height,
         final_center=np.array([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2 + robot.com_height]),
-        final_half_size=np.array(config.final_half_size if final_at_rest else config.moving_half_size, float),
+        final_half_size=scale * np.array(box, float),
         final_at_rest=final_at_rest,
-        weights=config.weights,
+        weights=config.weights.scaled(robot.scale),
         margins=config.margins,
         landing_limb=-1 if landing is None else int(landing.limb),
         landing_position=None if landing is None else landing.pose.position,
         landing_rotation=None if landing is None else landing.pose.rotation,
+        swing_lift=scale * SWING_LIFT,
     )
 
 

@@ -24,7 +24,9 @@ import numpy as np
 
 from toolkit.contacts.failure import Failure
 from toolkit.physics.momentum import ballistic
+from toolkit.robot.scale import USUAL, Scale
 
+SWING_LIFT = 0.06  # m for a body of the usual size (`toolkit.robot.scale`); see `CentroidalProblem.swing_lift`
 STANDARD_GRAVITY = 9.81  # m/s^2
 GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 
@@ -41,6 +43,20 @@ class Weights:
     torque: float = 1.0
     lateral_force: float = 10.0
     cop: float = 1.0
+
+    def scaled(self, scale: Scale) -> Weights:
+        """The weights with which a body of another size moves alike; forces and the CoP are relative already."""
+        if scale == USUAL:
+            return self
+        momentum, force, moment = scale.force * scale.speed, scale.force, scale.moment
+        return replace(
+            self,
+            linear_momentum=self.linear_momentum / momentum**2,
+            linear_momentum_rate=self.linear_momentum_rate / force**2,
+            angular_momentum=self.angular_momentum / (momentum * scale.length) ** 2,
+            angular_momentum_rate=self.angular_momentum_rate / moment**2,
+            torque=self.torque / moment**2,
+        )
 
 
 @dataclass(frozen=True)
@@ -112,6 +128,7 @@ class CentroidalProblem:
         landing_position, landing_rotation: (3,) m and (3, 3); that contact, as in `position` and `rotation`. None
             without one.
         room: Where the world lets the CoM be; None where it does not limit it.
+        swing_lift: m; height of the assumed path of a foot in the air above the line between its contacts.
     """
 
     mass: float
@@ -139,6 +156,7 @@ class CentroidalProblem:
     landing_position: np.ndarray | None = None
     landing_rotation: np.ndarray | None = None
     room: ComRoom | None = None
+    swing_lift: float = SWING_LIFT
 
     @property
     def home_heights(self) -> np.ndarray:

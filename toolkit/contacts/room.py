@@ -20,7 +20,7 @@ from toolkit.world.world import Goal
 
 @dataclass(frozen=True)
 class RoomConfig:
-    """How far landing points may move.
+    """How far landing points may move, for a body of the usual size (`toolkit.robot.scale`).
 
     Attributes:
         reach: (2,) Largest displacement along and across the foot, each way, in m.
@@ -36,6 +36,12 @@ class RoomConfig:
     step: float = 0.01
     arrival: float = 0.02
 
+    def scaled(self, factor: float) -> RoomConfig:
+        """The same with all lengths multiplied by a factor."""
+        reach = factor * self.reach[0], factor * self.reach[1]
+        rest = (factor * each for each in (self.margin, self.gap, self.step, self.arrival))
+        return RoomConfig(reach, *rest)
+
 
 def landing_room(
     robot: RobotModel,
@@ -47,7 +53,7 @@ def landing_room(
     """Box of displacements along each new contact's own axes that keep a sole on its surface and off the other sole.
 
     Args:
-        robot: The robot, for the sizes of its soles.
+        robot: The robot, for its size and those of its soles.
         surfaces: Surfaces of the world; contacts without a surface do not move.
         sequence: The planned contacts.
         config: Settings.
@@ -56,6 +62,7 @@ def landing_room(
     Returns:
         (transitions, 2, 2) m; the lowest and the highest displacement along x and y, zeros for palms.
     """
+    config = config.scaled(robot.scale.length)
     room = np.zeros((len(sequence.transitions), 2, 2))
     stances = sequence.stances
     final = {item.limb: index for index, item in enumerate(sequence.transitions)}

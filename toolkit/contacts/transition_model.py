@@ -13,7 +13,6 @@ import numpy as np
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 
-_REFERENCE_LEG = 0.80  # m; thigh and shin of the robot that the paper's numbers fit
 _MIRROR_STEP = np.array([1.0, -1.0, -1.0])
 _MIRROR_RAY = np.array([1.0, -1.0, 1.0])
 
@@ -57,16 +56,9 @@ def palm_rays() -> np.ndarray:
     return rays.reshape(-1, 3)
 
 
-def leg_scale(robot: RobotModel) -> float:
-    """Length of a robot's legs over that of the legs that the paper's numbers fit; 1 where it is within 10 %."""
-    leg = robot.legs[Limb.LEFT_FOOT]
-    scale = (leg.thigh + leg.shin) / _REFERENCE_LEG
-    return 1.0 if abs(scale - 1.0) < 0.1 else scale
-
-
 def soles_apart(robot: RobotModel) -> float:
     """Distance in m across between the centres of two soles side by side, with some room between them."""
-    return float(2.0 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04)
+    return float(2.0 * robot.half_sizes[Limb.LEFT_FOOT, 1] + robot.scale.length * 0.04)
 
 
 @dataclass(frozen=True)
@@ -85,9 +77,9 @@ class TransitionModel:
     def of(cls, robot: RobotModel, steps: np.ndarray) -> TransitionModel:
         """Moves of a robot: steps that are scaled with its legs and wide enough for its soles, and rays if it has arms.
 
-        Steps are not scaled where the legs are within 10 % of those that the paper's numbers fit.
+        The paper's numbers fit a body of the usual size (`toolkit.robot.scale`).
         """
-        scale = leg_scale(robot)
+        scale = robot.scale.length
         scaled = steps * [scale, scale, 1.0]
         scaled[:, 1] += max(0.0, soles_apart(robot) - scaled[:, 1].min())
         return cls(scaled, palm_rays() if robot.arms else np.zeros((0, 3)))

@@ -16,6 +16,7 @@ from toolkit.control.sampled_plan import Reference
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
+from toolkit.robot.scale import Scale
 
 
 class TaskGains(NamedTuple):
@@ -25,7 +26,16 @@ class TaskGains(NamedTuple):
     kp: float
     kd: float
 
+    def linear(self, scale: Scale) -> TaskGains:
+        """The gains of a linear task for a body of another size, in time with it."""
+        return TaskGains(self.weight, self.kp / scale.length, self.kd / scale.time)
 
+    def angular(self, scale: Scale) -> TaskGains:
+        """The same of an angular one: the angular accelerations of a small body are large, and its weight small."""
+        return TaskGains(self.weight * scale.length**2, self.kp / scale.length, self.kd / scale.time)
+
+
+# Weights, gains, lengths and forces are those of a body of the usual size (`toolkit.robot.scale`); see `_Gains`.
 # These gains walked on flat ground, on stones, on stairs and with a palm on a wall.
 SWING, SWING_ROTATION = TaskGains(200.0, 400.0, 40.0), TaskGains(20.0, 400.0, 40.0)  # a foot in the air
 HAND = TaskGains(50.0, 200.0, 28.0)  # a palm that approaches or leaves its contact
@@ -37,7 +47,7 @@ SPIN = TaskGains(40.0, 5.0, 0.0)  # of the angular momentum in units of MOMENTUM
 STANCE, STANCE_PALM_ROTATION = TaskGains(1e4, 0.0, 30.0), TaskGains(20.0, 0.0, 20.0)
 LEG_POSTURE = 0.005  # factor on the posture's weight for joints that carry a foot: feet and CoM place them
 ARM_POSTURE = 0.01  # the same for an arm whose palm is in contact, and not quite where it was planned to be
-MOMENTUM_SCALE = 10.0  # kg m^2/s per unit of the task of angular momentum
+MOMENTUM_SCALE = 10.0  # kg m^2/s per unit of the task of angular momentum, for a body of the usual size
 FORCE, MOMENT = 1e-5, 2e-4  # weights on squared N and N m of deviation from the planned wrenches: they break ties
 ACCELERATION = 1e-4  # weight on squared joint accelerations: keeps the Hessian definite
 NESTING = 0.5  # where the controller's margins lie between the plan's (1) and the simulation's (0)
@@ -45,6 +55,39 @@ DIVERGENCE = 0.01  # m; divergence of the CoM that halves the weights of angular
 URGENT_NESTING = 0.05  # ... and beyond which this replaces NESTING for the CoP, which may then come nearer to the edge
 MAX_FRICTION, MAX_YAW = 1.0, 0.9  # bounds on the factors on friction and yaw moment, also where the plan has no margin
 TORQUE_FRACTION = 0.98  # usable part of the joint torque limits: the solver's tolerance stays within the limit
+
+
+class _Gains(NamedTuple):
+    """The gains for a body of some size."""
+
+    swing: TaskGains
+    swing_rotation: TaskGains
+    hand: TaskGains
+    hand_rotation: TaskGains
+    com: TaskGains
+    base: TaskGains
+    posture: TaskGains
+    spin: TaskGains
+    stance: TaskGains
+    stance_rotation: TaskGains
+    stance_palm_rotation: TaskGains
+
+    @classmethod
+    def of(cls, scale: Scale) -> _Gains:
+        """The gains of the constants above, scaled."""
+        return cls(
+            swing=SWING.linear(scale),
+            swing_rotation=SWING_ROTATION.angular(scale),
+            hand=HAND.linear(scale),
+            hand_rotation=HAND.angular(scale),
+            com=COM.linear(scale),
+            base=BASE.angular(scale),
+            posture=POSTURE.angular(scale),
+            spin=SPIN._replace(kp=SPIN.kp / scale.time),
+            stance=STANCE.linear(scale),
+            stance_rotation=STANCE.angular(scale),
+            stance_palm_rotation=STANCE_PALM_ROTATION.angular(scale),
+        )
 
 
 class Controller:
@@ -86,7 +129,14 @@ class Controller:
         limit = np.zeros(4)
         for limb, model in robot.limbs.items():
             limit[limb] = model.max_normal_force
-        self.tracker = ContactTracker(reference, self.limbs, weight, limit)
+        scale = robot.scale
+        self._gains = _Gains.of(scale)
+        self._momentum_scale, self._divergence = scale.moment * MOMENTUM_SCALE, scale.length * DIVERGENCE
+        self._force_unit, self._rate = scale.force * FORCE_UNIT, PENDULUM_RATE / scale.time
+        # Weights of contact forces and moments in the solver's unit.
+        self._force_weight = FORCE * FORCE_UNIT**2
+        self._moment_weight = MOMENT * FORCE_UNIT**2 / scale.length**2
+        self.tracker = ContactTracker(reference, self.limbs, weight, limit, scale)
         self.targets = LimbTargets(reference, self.tracker)
         self._box = JointBox(robot)
         self._torque_limit = TORQUE_FRACTION * robot.torque_limit
@@ -101,13 +151,13 @@ class Controller:
         self._urgent, self._calm = False, 1.0
         legs = robot.carrying(limb for limb in self.limbs if limb.is_foot)
         nv = self.dynamics.nv
-        self._posture_weight = np.where(legs, LEG_POSTURE, 1.0) * POSTURE.weight
+        self._posture_weight = np.where(legs, LEG_POSTURE, 1.0) * self._gains.posture.weight
         self._arms = {limb: robot.arm_joints(limb) for limb in self.limbs if not limb.is_foot}
         self._posture = self._posture_weight.copy()
         self._diagonal = np.full(nv + 18, ACCELERATION)
-        self._diagonal[3:6] += BASE.weight
+        self._diagonal[3:6] += self._gains.base.weight
         self._diagonal[6:nv] += self._posture_weight
-        self._diagonal[nv:] = FORCE * FORCE_UNIT**2
+        self._diagonal[nv:] = self._force_weight
         self._target = np.zeros(nv + 18)
         self._tasks, self._wanted = np.zeros((6 + 24, nv)), np.zeros(6 + 24)
         self._qps: dict[tuple[Limb, ...], ContactQP] = {}
@@ -130,7 +180,7 @@ class Controller:
         limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
         qp = self._qps.get(limbs)
         if qp is None:
-            qp = self._qps[limbs] = ContactQP(limbs, self.dynamics.nv)
+            qp = self._qps[limbs] = ContactQP(limbs, self.dynamics.nv, self._force_unit)
         self._sense_urgency()
         self._constrain(qp, index, qpos, qvel)
         self._pursue(qp, index, qpos, qvel)
@@ -157,31 +207,31 @@ class Controller:
 
     def _pursue(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in the objective."""
-        reference, dynamics, nv = self._reference, self.dynamics, self.dynamics.nv
+        reference, dynamics, nv, gains = self._reference, self.dynamics, self.dynamics.nv, self._gains
         tasks, wanted, target, aim = self._tasks, self._wanted, self._target, self.aim
-        root = COM.weight**0.5
+        root = gains.com.weight**0.5
         np.multiply(dynamics.com_jacobian, root, out=tasks[:3])
-        error = COM.kp * (aim.com - dynamics.com)
-        error += COM.kd * (aim.com_velocity - dynamics.com_velocity)
+        error = gains.com.kp * (aim.com - dynamics.com)
+        error += gains.com.kd * (aim.com_velocity - dynamics.com_velocity)
         wanted[:3] = root * (error + aim.com_acceleration - dynamics.com_drift)
-        root = (SPIN.weight * self._calm) ** 0.5 / MOMENTUM_SCALE
+        root = (gains.spin.weight * self._calm) ** 0.5 / self._momentum_scale
         np.multiply(dynamics.momentum_jacobian, root, out=tasks[3:6])
-        error = SPIN.kp * (aim.angular_momentum - dynamics.angular_momentum)
+        error = gains.spin.kp * (aim.angular_momentum - dynamics.angular_momentum)
         wanted[3:6] = root * (error + aim.angular_momentum_rate - dynamics.momentum_drift)
         rows = 6
         for limb in self.limbs:
             rows = self._pursue_limb(limb, rows)
         self._orient_base(index, qvel, target)
         target[6:nv] = reference.joint_acceleration[index]
-        target[6:nv] += POSTURE.kp * (reference.joints[index] - qpos[7:])
-        target[6:nv] += POSTURE.kd * (reference.joint_velocity[index] - qvel[6:])
+        target[6:nv] += gains.posture.kp * (reference.joints[index] - qpos[7:])
+        target[6:nv] += gains.posture.kd * (reference.joint_velocity[index] - qvel[6:])
         target[6:nv] *= self._posture / self._diagonal[6:nv]
         diagonal = self._diagonal[: qp.size]
         for limb, slot in qp.slots.items():
             moments = slice(slot.start + 3, slot.stop)
-            diagonal[slot] = FORCE * FORCE_UNIT**2
-            diagonal[moments] = MOMENT * FORCE_UNIT**2
-            target[slot] = aim.wrench[limb, : slot.stop - slot.start] / FORCE_UNIT
+            diagonal[slot] = self._force_weight
+            diagonal[moments] = self._moment_weight
+            target[slot] = aim.wrench[limb, : slot.stop - slot.start] / self._force_unit
         qp.set_objective(tasks[:rows], wanted[:rows], diagonal, target[: qp.size])
 
     def _sense_urgency(self) -> None:
@@ -191,11 +241,11 @@ class Controller:
         the weights of angular momentum, of the base's orientation and of the posture. Friction keeps its margin.
         """
         dynamics = self.dynamics
-        x, y = (dynamics.com - self._com + (dynamics.com_velocity - self._com_velocity) / PENDULUM_RATE)[:2]
-        squared = (x * x + y * y) / DIVERGENCE**2
+        x, y = (dynamics.com - self._com + (dynamics.com_velocity - self._com_velocity) / self._rate)[:2]
+        squared = (x * x + y * y) / self._divergence**2
         self._calm = 1.0 / (1.0 + squared)
         self._urgent = squared > (0.25 if self._urgent else 1.0)
-        self._diagonal[3:6] = ACCELERATION + BASE.weight * self._calm
+        self._diagonal[3:6] = ACCELERATION + self._gains.base.weight * self._calm
         np.multiply(self._posture_weight, self._calm, out=self._posture)
         for limb, joints in self._arms.items():
             if self.tracker.in_contact[limb] and self.tracker.current[limb] is not None:
@@ -204,13 +254,15 @@ class Controller:
 
     def _pursue_limb(self, limb: Limb, rows: int) -> int:
         """Append a limb's task rows after the first `rows` and return their new number."""
-        dynamics, targets = self.dynamics, self.targets
+        dynamics, targets, gains = self.dynamics, self.targets, self._gains
         if self.tracker.in_contact[limb]:
-            linear, angular = STANCE, STANCE if limb.is_foot else STANCE_PALM_ROTATION
+            linear = gains.stance
+            angular = gains.stance_rotation if limb.is_foot else gains.stance_palm_rotation
         elif self.tracker.state[limb] is LimbState.FREE or targets.authority[limb] <= 0.0:
             return rows
         else:
-            linear, angular = (SWING, SWING_ROTATION) if limb.is_foot else (HAND, HAND)
+            feet, hands = (gains.swing, gains.swing_rotation), (gains.hand, gains.hand_rotation)
+            linear, angular = feet if limb.is_foot else hands
         share = 1.0 if self.tracker.in_contact[limb] else targets.authority[limb]
         rows = self._append(limb, slice(0, 3), linear, share, rows)
         rows = self._append(limb, slice(3, 6), angular, share, rows)
@@ -234,11 +286,11 @@ class Controller:
 
     def _orient_base(self, index: int, qvel: np.ndarray, target: np.ndarray) -> None:
         """Fill in the wanted angular acceleration of the base, in the base."""
-        reference = self._reference
+        reference, gains = self._reference, self._gains.base
         error = rotation_sine(self.dynamics.base_rotation.T @ reference.base_rotation[index])
-        acceleration = reference.base_acceleration[index] + BASE.kp * error
-        acceleration += BASE.kd * (reference.base_velocity[index] - qvel[3:6])
-        target[3:6] = acceleration * (self._calm * BASE.weight / self._diagonal[3:6])
+        acceleration = reference.base_acceleration[index] + gains.kp * error
+        acceleration += gains.kd * (reference.base_velocity[index] - qvel[3:6])
+        target[3:6] = acceleration * (self._calm * gains.weight / self._diagonal[3:6])
 
     def _hold(self, index: int, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
         """Compensate gravity and Coriolis forces and drive the joints to the planned posture, as a last resort."""

@@ -12,7 +12,10 @@ from toolkit.control.limb_target import LimbTargets
 from toolkit.control.sampled_plan import Reference
 
 PENDULUM_RATE = 3.4
-"""Rate in 1/s of an inverted pendulum like a humanoid: the CoM diverges by `(c - c_plan) + (v - v_plan) / rate`."""
+"""Rate in 1/s of an inverted pendulum like a humanoid of the usual size (`toolkit.robot.scale`).
+
+The CoM diverges by `(c - c_plan) + (v - v_plan) / rate`.
+"""
 
 
 @dataclass(frozen=True)

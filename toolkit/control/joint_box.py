@@ -6,6 +6,7 @@ import numpy as np
 
 from toolkit.robot.model import RobotModel
 
+# Rates, times and accelerations are those of a body of the usual size (`toolkit.robot.scale`).
 RANGE_MARGIN = 0.01  # rad; kept from each end of a joint's range
 RANGE_RATE = 25.0  # 1/s; speed at which a joint may approach the end of its range, per rad of distance
 VELOCITY_FRACTION = 0.95  # usable part of the joint velocity limits: a tick's error stays within the limit
@@ -28,27 +29,30 @@ class JointBox:
         margin = np.minimum(RANGE_MARGIN, 0.1 * (robot.upper - robot.lower))
         self._low, self._high = robot.lower + margin, robot.upper - margin
         self._speed = VELOCITY_FRACTION * robot.velocity_limit
+        scale = robot.scale
+        self._time, self._rate = scale.time * VELOCITY_TIME, RANGE_RATE / scale.time
+        self._most = MAX_ACCELERATION / scale.length
         count = len(robot.joint_names)
         self.lower, self.upper = np.zeros(count), np.zeros(count)
         self._work = np.zeros(count)
 
     def update(self, joints: np.ndarray, velocity: np.ndarray) -> None:
         """Evaluate at (n,) joint positions and velocities."""
-        work, rate = self._work, RANGE_RATE
+        work, rate = self._work, self._rate
         np.subtract(self._high, joints, out=self.upper)
         self.upper *= rate**2
         self.upper -= 2.0 * rate * velocity
         np.subtract(self._speed, velocity, out=work)
-        work /= VELOCITY_TIME
+        work /= self._time
         np.minimum(self.upper, work, out=self.upper)
         np.subtract(self._low, joints, out=self.lower)
         self.lower *= rate**2
         self.lower -= 2.0 * rate * velocity
         np.add(self._speed, velocity, out=work)
-        work /= -VELOCITY_TIME
+        work /= -self._time
         np.maximum(self.lower, work, out=self.lower)
-        np.clip(self.upper, -MAX_ACCELERATION, MAX_ACCELERATION, out=self.upper)
-        np.clip(self.lower, -MAX_ACCELERATION, MAX_ACCELERATION, out=self.lower)
+        np.clip(self.upper, -self._most, self._most, out=self.upper)
+        np.clip(self.lower, -self._most, self._most, out=self.lower)
         # Where the two bounds contradict each other, both become the middle.
         np.add(self.lower, self.upper, out=work)
         work *= 0.5

@@ -10,7 +10,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.physics.wrench import foot_rows, friction_rows
 
 UNBOUNDED = 1e30
-FORCE_UNIT = 100.0  # N or N m per unit of the solver's variables: keeps the Hessian's entries alike
+FORCE_UNIT = 100.0  # N or N m per unit of the solver's variables, for a body of the usual size
 
 
 class ContactQP:
@@ -28,11 +28,12 @@ class ContactQP:
     Attributes:
         limbs: The limbs in contact, in order.
         size: Number of variables.
-        slots: By limb, the slice of x with its wrench in units of `FORCE_UNIT`.
+        slots: By limb, the slice of x with its wrench in the force unit.
     """
 
-    def __init__(self, limbs: tuple[Limb, ...], nv: int):
-        self.limbs, self.nv = limbs, nv
+    def __init__(self, limbs: tuple[Limb, ...], nv: int, force_unit: float = FORCE_UNIT):
+        """Prepare the arrays; the force unit in N or N m keeps the Hessian's entries alike."""
+        self.limbs, self.nv, self._unit = limbs, nv, force_unit
         self.slots: dict[Limb, slice] = {}
         start = nv
         for limb in limbs:
@@ -80,7 +81,7 @@ class ContactQP:
         nv, size, bias, jacobian = self.nv, self.size, dynamics.bias, dynamics.jacobian
         self.rows[:nv, :nv] = dynamics.mass_matrix
         for limb, slot in self.slots.items():
-            to_contact = -FORCE_UNIT * dynamics.limb_rotation[limb]
+            to_contact = -self._unit * dynamics.limb_rotation[limb]
             columns = self.rows[:nv, slot]
             columns[:, :3] = jacobian[limb, :3].T @ to_contact
             if limb.is_foot:
@@ -93,7 +94,7 @@ class ContactQP:
     def set_normal_force(self, limb: Limb, low: float, high: float) -> None:
         """Bound the normal force of a limb in contact, in N."""
         index = self.slots[limb].start + 2
-        self.lower[index], self.upper[index] = low / FORCE_UNIT, high / FORCE_UNIT
+        self.lower[index], self.upper[index] = low / self._unit, high / self._unit
 
     def set_acceleration(self, low: np.ndarray, high: np.ndarray) -> None:
         """Bound the joint accelerations; each bound is (n,) rad/s^2."""

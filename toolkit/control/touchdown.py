@@ -8,6 +8,9 @@ import numpy as np
 
 from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.geometry.limb import Limb
+from toolkit.robot.scale import USUAL, Scale
+
+# Forces, lengths, speeds and times are those of a body of the usual size (`toolkit.robot.scale`).
 
 # When a moving limb is taken to be in contact.
 EARLY_FRACTION = 0.6  # part of the swing after which a force ends it: before, the foot still leaves its surface
@@ -49,11 +52,28 @@ class ContactTracker:
         lead: (4,) s; how far the last swing is ahead of the plan.
         pace: (4,) speed of the swings relative to the plan. A corrector may set it to end swings earlier.
         loose: (4,) bool; limbs that should be in contact but are measured to bear next to nothing.
+        scale: The robot's size.
         current: By limb, the swing under way or the last one; None before the first.
     """
 
-    def __init__(self, reference: Reference, limbs: tuple[Limb, ...], weight: float, max_normal_force: np.ndarray):
-        """Start in the planned contacts; the robot's weight and the largest normal forces (4,) are in N."""
+    def __init__(
+        self,
+        reference: Reference,
+        limbs: tuple[Limb, ...],
+        weight: float,
+        max_normal_force: np.ndarray,
+        scale: Scale = USUAL,
+    ):
+        """Start in the planned contacts.
+
+        Args:
+            reference: The plan at the control ticks.
+            limbs: The limbs that the robot has.
+            weight: The robot's weight in N.
+            max_normal_force: (4,) N; largest normal forces.
+            scale: The robot's size.
+        """
+        self.scale = scale
         self._cap = np.minimum(2.5 * weight, max_normal_force)
         self._pending = {limb: [swing for swing in reference.swings if swing.limb == limb] for limb in limbs}
         self.current: dict[Limb, Swing | None] = dict.fromkeys(limbs)
@@ -83,7 +103,7 @@ class ContactTracker:
                 self.lead[limb] += (self.pace[limb] - 1.0) * period
                 self._advance(limb, swing, time + self.lead[limb], period, normal_force[limb])
             self.in_contact[limb] = self.state[limb] is LimbState.REST
-            self.loose[limb] = self.in_contact[limb] and normal_force[limb] < LOOSE_FORCE
+            self.loose[limb] = self.in_contact[limb] and normal_force[limb] < self.scale.force * LOOSE_FORCE
             self._bound(limb, time)
 
     def _advance(self, limb: Limb, swing: Swing, time: float, period: float, force: float) -> None:
@@ -95,36 +115,38 @@ class ContactTracker:
             return
         late_enough = time - swing.start >= EARLY_FRACTION * (swing.end - swing.start)
         if limb.is_foot:
-            met = force > (LATE_FOOT_FORCE if over else EARLY_FOOT_FORCE)
+            met = force > self.scale.force * (LATE_FOOT_FORCE if over else EARLY_FOOT_FORCE)
         else:
-            self._loaded_ticks[limb] = self._loaded_ticks[limb] + 1 if force > PALM_FORCE else 0
+            loaded = force > self.scale.force * PALM_FORCE
+            self._loaded_ticks[limb] = self._loaded_ticks[limb] + 1 if loaded else 0
             met = self._loaded_ticks[limb] >= CONFIRM_TICKS
         if met and late_enough:
             self.state[limb], self._since[limb] = LimbState.REST, time - self.lead[limb]
             self.made[limb] = True
         elif over:
             self.state[limb] = LimbState.SEARCH
-            speed = LATE_FOOT_SPEED if limb.is_foot else PALM_SPEED
-            self.depth[limb] = min(self.depth[limb] + speed * period, MAX_DEPTH)
+            depth = self.depth[limb] + self._inward_speed(limb) * period
+            self.depth[limb] = min(depth, self.scale.length * MAX_DEPTH)
 
     def search_speed(self, limb: Limb) -> float:
         """Speed in m/s along the inward normal of a limb that searches its contact."""
-        if self.depth[limb] >= MAX_DEPTH:
-            return 0.0
-        return LATE_FOOT_SPEED if limb.is_foot else PALM_SPEED
+        return 0.0 if self.depth[limb] >= self.scale.length * MAX_DEPTH else self._inward_speed(limb)
+
+    def _inward_speed(self, limb: Limb) -> float:
+        return self.scale.speed * (LATE_FOOT_SPEED if limb.is_foot else PALM_SPEED)
 
     def _bound(self, limb: Limb, time: float) -> None:
         """Set the range of the normal force."""
         if not self.in_contact[limb]:
             self.min_force[limb] = self.max_force[limb] = 0.0
             return
-        pending = self._pending[limb]
-        ramp = FOOT_RAMP if limb.is_foot else PALM_RAMP
-        wanted = MIN_FOOT_FORCE if limb.is_foot else MIN_PALM_FORCE
+        pending, scale = self._pending[limb], self.scale
+        ramp = scale.time * (FOOT_RAMP if limb.is_foot else PALM_RAMP)
+        wanted = scale.force * (MIN_FOOT_FORCE if limb.is_foot else MIN_PALM_FORCE)
         share, floor = (time - self._since[limb]) / ramp, SETTLE_FORCE
-        if pending and pending[0].breaks and (left := (pending[0].start - time) / RELEASE_RAMP) < share:
+        if pending and pending[0].breaks and (left := (pending[0].start - time) / (scale.time * RELEASE_RAMP)) < share:
             share, floor = left, RELEASE_FORCE
         share = min(max(share, 0.0), 1.0)
-        floor = min(floor, self._cap[limb])
+        floor = min(scale.force * floor, self._cap[limb])
         self.max_force[limb] = floor + share * (self._cap[limb] - floor)
         self.min_force[limb] = min(share * wanted, floor)

@@ -11,7 +11,7 @@ from toolkit.contacts.failure import Failure
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.execution.scuff import Scuff, scuffs
-from toolkit.execution.slip import SETTLE_TIME, ContactInterval, contact_intervals
+from toolkit.execution.slip import SETTLE_TIME, ContactInterval, bearing_force, contact_intervals
 from toolkit.execution.standard import Move, Standard
 from toolkit.execution.verdict import SCUFF_LIMIT, execution_checks, failure_reason, is_too_fast
 from toolkit.replanning.replanner import ReplanCounts
@@ -50,11 +50,11 @@ def measure(
     """
     robot, goal, scene, count = standard.robot, standard.goal, recorder.scene, recorder.count
     times = standard.times[:count]
-    intervals = []
+    intervals, bearing = [], bearing_force(recorder.mass)
     for limb, model in sorted(robot.limbs.items()):
         force, position = recorder.normal_force[:count, limb], recorder.limb_position[:count, limb]
         rotation = recorder.limb_rotation[:count, limb]
-        intervals += contact_intervals(limb, force, position, rotation, model.half_size, standard.period)
+        intervals += contact_intervals(limb, force, position, rotation, model.half_size, standard.period, bearing)
     slip = _slip_by_stance(intervals, times, standard.moves)
     scuffed = scuffs(standard.moves, recorder.force[: recorder.steps], standard.timestep)
     touchdowns = _touchdowns(intervals, recorder, standard)

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.execution.contact_meter import ContactMeter
 from toolkit.execution.scene_index import SceneIndex
-from toolkit.execution.slip import BEARING_FORCE
+from toolkit.execution.slip import bearing_force
 from toolkit.execution.standard import Standard
 from toolkit.geometry.pose import quaternion_from_rotation
 
@@ -51,6 +51,7 @@ class Recorder:
         self.limb_rotation = np.full((ticks, 4, 3, 3), np.nan)
         self.torque = np.zeros((ticks, scene.nu))
         self.mass = float(scene.body_subtreemass[index.base])
+        self._bearing = bearing_force(self.mass)
 
     def read(self, data: mujoco.MjData) -> None:
         """Read the contacts of the physics step just made."""
@@ -77,7 +78,7 @@ class Recorder:
         for limb, site in index.sites.items():
             rotation = data.site_xmat[site].reshape(3, 3)
             self.limb_position[k, limb], self.limb_rotation[k, limb] = data.site_xpos[site], rotation
-            if meter.normal_force[limb] > BEARING_FORCE:
+            if meter.normal_force[limb] > self._bearing:
                 moment = meter.wrench[limb, 3:] @ rotation
                 half = self._robot.limbs[limb].half_size
                 x, y = -moment[1] / meter.normal_force[limb], moment[0] / meter.normal_force[limb]

@@ -7,10 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.geometry.limb import Limb
+from toolkit.robot.scale import force_factor
 
-BEARING_FORCE = 20.0  # N; a patch that carries more is in contact; less is a mere touch
+_BEARING_FORCE = 20.0  # N for a body of the usual size; a patch that carries more is in contact; less is a mere touch
+# Times belong to the simulated contacts and not to the body. So they are the same for all sizes, as the limit on slip
+# is, which users know in m.
 CONTACT_GAP = 0.03  # s; shorter interruptions do not end a contact: soles chatter
 SETTLE_TIME = 0.02  # s; from touchdown to the pose that slip is counted from, because the impact moves the patch
+
+
+def bearing_force(mass: float) -> float:
+    """N; a patch of a robot of a mass in kg that carries more is in contact, one that carries less merely touches."""
+    return force_factor(mass) * _BEARING_FORCE
 
 
 @dataclass(frozen=True)
@@ -34,10 +42,11 @@ def contact_intervals(
     rotation: np.ndarray,
     half_size: np.ndarray,
     period: float,
+    bearing: float,
 ) -> list[ContactInterval]:
     """Contacts of one limb, in order of time.
 
-    A contact lasts while the force is above `BEARING_FORCE`, interruptions of up to `CONTACT_GAP` included. Slip is
+    A contact lasts while the force is above `bearing`, interruptions of up to `CONTACT_GAP` included. Slip is
     counted from the pose `SETTLE_TIME` after its begin (the impact belongs to the touchdown error) to its end, and for
     the whole of contacts that are shorter.
 
@@ -48,9 +57,10 @@ def contact_intervals(
         rotation: Rotations (C, 3, 3), world_from_patch.
         half_size: Half extents (2,) of the patch in m.
         period: Time between samples in s.
+        bearing: N; see `bearing_force`.
     """
     gap, settle = round(CONTACT_GAP / period), round(SETTLE_TIME / period)
-    loaded = np.flatnonzero(normal_force > BEARING_FORCE)
+    loaded = np.flatnonzero(normal_force > bearing)
     if not len(loaded):
         return []
     breaks = np.flatnonzero(np.diff(loaded) > gap)

@@ -16,12 +16,15 @@ from toolkit.geometry.pose import rotation_about_z, yaw_of
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.robot.model import RobotModel
 
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _LENGTH_MARGIN = 0.01  # m; the CoM is low enough for legs this much shorter than their longest
 
 
 @dataclass(frozen=True)
 class KinematicConfig:
-    """Settings. The objective replaces the dynamics objective and has its order of magnitude.
+    """Settings, for a body of the usual size (`toolkit.robot.scale`).
+
+    The objective replaces the dynamics objective and has its order of magnitude.
 
     Attributes:
         friction: The part of the friction coefficient that a sole at rest may need; steeper surfaces hold no foot.
@@ -55,6 +58,7 @@ class KinematicEvaluator(TransitionEvaluator):
     ) -> TransitionBatch:
         """Judge transitions; see `TransitionEvaluator`."""
         config, rows, n = self._config, TransitionRows.of(transitions), len(transitions)
+        scale = self._robot.scale.length
         feet = [stance[limb] for limb in FEET]
         position = np.tile([foot.pose.position for foot in feet], (n, 1, 1))
         rotation = np.tile([foot.pose.rotation for foot in feet], (n, 1, 1, 1))
@@ -76,10 +80,10 @@ class KinematicEvaluator(TransitionEvaluator):
         lateral = -np.sin(yaw) * apart[:, 0] + np.cos(yaw) * apart[:, 1]
         turn = wrapped(heading[0] - heading[1])
         objective = (
-            config.stride * (np.hypot(*(mean - before)[:, :2].T) / 0.3) ** 2
-            + config.rise * (apart[:, 2] / 0.1) ** 2
+            config.stride * (np.hypot(*(mean - before)[:, :2].T) / (scale * 0.3)) ** 2
+            + config.rise * (apart[:, 2] / (scale * 0.1)) ** 2
             + config.tilt * ((tilt / 0.2) ** 2).sum(1)
-            + config.spread * (((lateral - self._home_width) / 0.1) ** 2 + (turn / 0.3) ** 2)
+            + config.spread * (((lateral - self._home_width) / (scale * 0.1)) ** 2 + (turn / 0.3) ** 2)
         )
         relief = config.palm_relief ** len(stance.palms)
         objective = np.where(rows.limb < len(FEET), objective * relief, 1.0)
@@ -87,13 +91,13 @@ class KinematicEvaluator(TransitionEvaluator):
 
     def _com(self, position: np.ndarray, rotation: np.ndarray, mean: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """(n, 3) m; CoM above the mean of the feet, as high as at home or as both legs reach."""
-        com = mean + [0.0, 0.0, self._robot.com_height]
+        com, margin = mean + [0.0, 0.0, self._robot.com_height], self._robot.scale.length * _LENGTH_MARGIN
         turn = rotation_about_z(yaw)
         for side, limb in enumerate(FEET):
             leg = self._robot.legs[limb]
             ankle = position[:, side] + rotation[:, side] @ leg.ankle_in_sole
             away = mean + turn @ leg.hip_in_com - ankle
-            reach = leg.max_length - _LENGTH_MARGIN
+            reach = leg.max_length - margin
             rise = np.sqrt(np.maximum(reach**2 - away[:, 0] ** 2 - away[:, 1] ** 2, 0.0))
             com[:, 2] = np.minimum(com[:, 2], ankle[:, 2] + rise - leg.hip_in_com[2])
         return com

@@ -11,9 +11,11 @@ from toolkit.contacts.stance import Contact
 from toolkit.control.sampled_plan import Swing
 from toolkit.geometry.pose import Pose
 from toolkit.replanning.situation import Situation
+from toolkit.robot.scale import USUAL, Scale
 from toolkit.world.surface import Surface
 
 CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+# Lengths and speeds are those of a body of the usual size (`toolkit.robot.scale`).
 MAX_SHIFT = 0.15  # m; largest shift of a landing point along each axis of its plane
 MARGIN = 0.01  # m; distance of the sole from the edge of its surface, for errors of the swing's tracking
 GAP = 0.02  # m; between a landing sole and the other one
@@ -42,9 +44,11 @@ class FreeLandings:
 class Landings:
     """The contacts that feet are to make, by their swings, and how far each may be shifted."""
 
-    def __init__(self, swings: tuple[Swing, ...], half_sizes: np.ndarray, surfaces: tuple[Surface, ...]):
+    def __init__(
+        self, swings: tuple[Swing, ...], half_sizes: np.ndarray, surfaces: tuple[Surface, ...], scale: Scale = USUAL
+    ):
         """Collect the contacts of swings on surfaces; the patches' half sizes are (4, 2) in m."""
-        self._swings, self._half_sizes, self._surfaces = swings, half_sizes, surfaces
+        self._swings, self._half_sizes, self._surfaces, self._scale = swings, half_sizes, surfaces, scale
         self.contacts: dict[int, Contact] = {
             event: swing.contact
             for event, swing in enumerate(swings)
@@ -70,20 +74,20 @@ class Landings:
         The swing `event` makes the contact and ends at `end` in s.
         """
         swing, contact = self._swings[event], self.contacts[event]
-        half = self._half_sizes[swing.limb]
+        half, scale = self._half_sizes[swing.limb], self._scale
         if event not in self._regions:
-            self._regions[event] = landing_rows(contact, half, self._surfaces[contact.surface], MARGIN)
+            self._regions[event] = landing_rows(contact, half, self._surfaces[contact.surface], scale.length * MARGIN)
         region, room = self._regions[event]
         axes = np.concatenate([np.eye(2), -np.eye(2)])
-        reach = np.full(4, MAX_SHIFT)
+        reach = np.full(4, scale.length * MAX_SHIFT)
         if event in situation.moving:
             moved = contact.pose.rotation[:, :2].T @ situation.moving[event]
-            left = SLEW * max(end - situation.time - 0.05, 0.0)
+            left = scale.speed * SLEW * max(end - situation.time - 0.05, 0.0)
             reach = np.minimum(reach, np.maximum(axes @ moved + left, 0.0))
         rows, bounds = [region, axes], [room, reach]
         other = situation.standing.get(swing.limb.mirrored)
         if other is not None and swing.start <= situation.time + 1e-9:
-            row, room = apart_row(contact.pose, half, Pose(other[2], other[1]), half, GAP)
+            row, room = apart_row(contact.pose, half, Pose(other[2], other[1]), half, scale.length * GAP)
             rows.append(row[None])
             bounds.append(np.array([room]))
         return np.concatenate(rows), np.concatenate(bounds)

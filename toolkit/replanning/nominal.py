@@ -8,10 +8,11 @@ import numpy as np
 
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion, CentroidalProblem
 from toolkit.control.sampled_plan import Reference, Swing
+from toolkit.robot.scale import USUAL, Scale
 from toolkit.wholebody.motion_dynamics import planned_wrench
 
-HORIZON = 1.6  # s; how far a replan looks ahead
-REST = 0.2  # s; steps of the rest
+HORIZON = 1.6  # s for a body of the usual size (`toolkit.robot.scale`); how far a replan looks ahead
+REST = 0.2  # s for the same; steps of the rest
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class Nominal:
         share: (M, 2) shares of the feet in the load.
         landing: (M, 4) index of the swing that made the contact; -1 for those of the start.
         swings: The planned moves.
+        scale: The robot's size.
     """
 
     problem: CentroidalProblem
@@ -41,11 +43,17 @@ class Nominal:
     share: np.ndarray
     landing: np.ndarray
     swings: tuple[Swing, ...]
+    scale: Scale
+
+    @property
+    def horizon(self) -> float:
+        """How far a replan looks ahead, in s."""
+        return self.scale.time * HORIZON
 
     @classmethod
-    def of(cls, motion: CentroidalMotion, reference: Reference) -> Nominal:
+    def of(cls, motion: CentroidalMotion, reference: Reference, scale: Scale = USUAL) -> Nominal:
         """The grid of a planned motion, with the moves and the postures' angular momentum of its reference."""
-        rested, swings = _rested(motion), reference.swings
+        rested, swings = _rested(motion, scale.time), reference.swings
         problem, mass = rested.problem, rested.problem.mass
         weight = mass * float(np.linalg.norm(GRAVITY))
         moving = problem.times[:-1] < motion.problem.times[-1] - 1e-9
@@ -69,18 +77,19 @@ class Nominal:
             share=load / np.maximum(load.sum(1, keepdims=True), 1e-9),
             landing=landing,
             swings=swings,
+            scale=scale,
         )
 
 
-def _rested(motion: CentroidalMotion) -> CentroidalMotion:
-    """The same motion with a rest at its end."""
+def _rested(motion: CentroidalMotion, pace: float) -> CentroidalMotion:
+    """The same motion with a rest at its end; the pace is the factor on times."""
     problem, room = motion.solved, motion.solved.room
     rest = int(np.ceil(HORIZON / REST)) + 1
     step = np.append(np.arange(problem.steps), np.full(rest, problem.steps - 1))
     zero = np.zeros((rest, 3))
     longer = replace(
         problem,
-        dt=np.append(problem.dt, np.full(rest, REST)),
+        dt=np.append(problem.dt, np.full(rest, pace * REST)),
         active=problem.active[step],
         position=problem.position[step],
         rotation=problem.rotation[step],

@@ -10,7 +10,7 @@ from toolkit.centroidal.program import indices
 from toolkit.centroidal.stages.steps import WRENCH
 from toolkit.control.corrector import PENDULUM_RATE
 from toolkit.replanning.landing import Landings
-from toolkit.replanning.nominal import HORIZON, Nominal
+from toolkit.replanning.nominal import Nominal
 from toolkit.replanning.plan_rows import PlanRows
 from toolkit.replanning.replan_program import ReplanProgram
 from toolkit.replanning.situation import HorizonContacts, Situation
@@ -19,6 +19,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.world.surface import Surface
 
 MOVABLE = 2  # contacts to be made whose places are free, at most
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 DEADBAND = 0.01  # m; divergence that the controller's gains settle, where every foot is as near to its planned place
 
 # Landing points stay where they are planned while the divergence left when the next foot lands is at most SETTLED m
@@ -63,7 +64,7 @@ class ReplanProblem:
 
     def __init__(self, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...]):
         self._nominal = nominal
-        self._landings = Landings(nominal.swings, robot.half_sizes, surfaces)
+        self._landings = Landings(nominal.swings, robot.half_sizes, surfaces, robot.scale)
         self._rows = PlanRows.of(nominal.problem, robot)
 
     def solve(self, situation: Situation) -> Replan | None:
@@ -75,7 +76,11 @@ class ReplanProblem:
         if not situation.displaced:
             kept = self._solve(situation, {}, movable=0)
             # This suffices if the motion is back at the plan when the next foot lands.
-            if kept and kept.divergence[kept.next_landing] <= SETTLED and kept.excess <= EXCESS:
+            if (
+                kept
+                and kept.divergence[kept.next_landing] <= self._nominal.scale.length * SETTLED
+                and kept.excess <= EXCESS
+            ):
                 return kept
         swings = self._nominal.swings
         decided = {event: time for event, time in situation.landing.items() if time < swings[event].end - 1e-3}
@@ -98,7 +103,7 @@ class ReplanProblem:
     def _solve(self, situation: Situation, early: dict[int, float], movable: int = MOVABLE) -> Replan | None:
         """The best motion with given earlier ends of swings, and at most so many movable landing points."""
         nominal = self._nominal
-        window = Window.of(nominal, situation.time, HORIZON)
+        window = Window.of(nominal, situation.time, nominal.horizon)
         contacts = HorizonContacts.of(nominal, situation, window.first, window.times, early)
         events = self._free_landings(situation, window, movable)
         free = self._landings.free(events, situation, window.times, early)
@@ -116,6 +121,7 @@ class ReplanProblem:
         ends = [nominal.swings[event].end for event in self._landings.contacts]
         next_end = min((end for end in ends if end > situation.time), default=np.inf)
         times, off = window.times, y[:, :9] - program.track.states
+        rate = PENDULUM_RATE / nominal.scale.time
         rates = np.diff(off, axis=0) / window.dt[:, None]
         return Replan(
             times=times,
@@ -129,7 +135,7 @@ class ReplanProblem:
             ends=early,
             objective=objective + EARLY * sum(nominal.swings[event].end - end for event, end in early.items()),
             excess=program.excess(y),
-            divergence=np.linalg.norm(off[:, :3] + off[:, 3:6] / PENDULUM_RATE, axis=1),
+            divergence=np.linalg.norm(off[:, :3] + off[:, 3:6] / rate, axis=1),
             next_landing=int(np.searchsorted(times, next_end) if next_end < times[-1] else window.steps),
         )
 
@@ -137,9 +143,11 @@ class ReplanProblem:
         """The measured deviation (9,) from the plan, less a deadband that needs no reaction."""
         com = situation.com - window.com[0] - situation.com_shift
         velocity = situation.velocity - window.velocity[0]
-        divergence = float(np.linalg.norm(com + velocity / PENDULUM_RATE))
+        rate = PENDULUM_RATE / self._nominal.scale.time
+        deadband = self._nominal.scale.length * DEADBAND
+        divergence = float(np.linalg.norm(com + velocity / rate))
         off = np.concatenate([com, velocity, situation.spin - window.spin[0]])
-        off *= max(1.0 - DEADBAND / max(divergence, 1e-9), 0.0)
+        off *= max(1.0 - deadband / max(divergence, 1e-9), 0.0)
         off[:3] += situation.com_shift
         return off
 

@@ -67,7 +67,7 @@ class ReplanProgram:
         span, (step, limb) = slice(window.first, window.last), np.nonzero(contacts.active)
         states = np.column_stack([window.com, window.velocity, window.wrench_spin])
         wrench = nominal.wrench[span][step, limb]
-        track = Tracking(layout, window.dt, states, wrench, nominal.share[span], contacts, free)
+        track = Tracking(layout, window.dt, states, wrench, nominal.share[span], contacts, free, nominal.scale)
         limits = rows.blocks(layout, window.first, window.dt, contacts)
         return cls(window, contacts, free, cones, layout, track, limits)
 

@@ -14,13 +14,13 @@ from toolkit.control.limb_target import LimbTargets
 from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.replanning.nominal import HORIZON, Nominal
+from toolkit.replanning.nominal import Nominal
 from toolkit.replanning.replan import DEADBAND, Replan, ReplanProblem
 from toolkit.replanning.situation import Situation
 from toolkit.wholebody.plan import WholeBodyPlan
 
 MAX_FRICTION = 0.9  # largest friction margin of plans to replan: a descent at the limit of friction is better followed
-PERIOD = 0.04  # s; time between replans
+PERIOD = 0.04  # s; time between replans. The following are those of a body of the usual size
 PACE = 1.9  # largest pace, relative to the plan, of a swing whose contact is needed earlier
 PACE_RATE = 12.0  # 1/s; rate at which the pace changes
 SHORTEST = 0.3  # s; least duration of a whole swing at that pace
@@ -60,16 +60,19 @@ class Replanner:
         """Prepare for a run of a plan, whose reference is sampled at the control ticks."""
         self._reference = reference
         self._period = float(reference.times[1] - reference.times[0])
-        self._nominal = nominal = Nominal.of(plan.motion, reference)
+        self._nominal = nominal = Nominal.of(plan.motion, reference, plan.robot.scale)
         self._problem = ReplanProblem(nominal, plan.robot, plan.world.surfaces)
         self._mass = nominal.problem.mass
         self._weight = self._mass * STANDARD_GRAVITY
+        scale = plan.robot.scale
+        self._rate, self._deadband = PENDULUM_RATE / scale.time, scale.length * DEADBAND
+        self._pace_rate, self._shortest = PACE_RATE / scale.time, scale.time * SHORTEST
         self._due = 0.0
         self._plan: Replan | None = None
         self._made: dict[Limb, int] = {}
         self._goal: dict[int, np.ndarray] = {}
         self._ends: dict[int, float] = {}
-        self._shift, self._rate, self._moved = np.zeros((3, 4, 3))
+        self._shift, self._shift_rate, self._moved = np.zeros((3, 4, 3))
         self._replans = self._departures = self._failures = self._landings = 0
         self._seconds = 0.0
         self.com_shift = np.zeros(3)
@@ -93,7 +96,7 @@ class Replanner:
                 self._made[limb] = self._nominal.swings.index(swing) if swing is not None else -1
                 if swing is not None and swing.contact is not None:
                     off = dynamics.limb_position[limb] - swing.contact.pose.position
-                    self._moved[limb] = off if np.linalg.norm(off) > DEADBAND else 0.0
+                    self._moved[limb] = off if np.linalg.norm(off) > self._deadband else 0.0
         if time >= self._due - 1e-9:
             self._due = time + PERIOD
             self._replan(index, dynamics, tracker, cones)
@@ -104,10 +107,10 @@ class Replanner:
     def _replan(self, index: int, dynamics: RobotDynamics, tracker: ContactTracker, cones: Cones) -> None:
         """Solve once where the plan is left; where that fails the last answer goes on."""
         time, displaced = float(self._reference.times[index]), self._displaced(tracker)
-        if time >= self._nominal.times[-1] - HORIZON:
+        if time >= self._nominal.times[-1] - self._nominal.horizon:
             return
         self._replans += 1
-        if not displaced and self._divergence(index, dynamics) <= DEADBAND:
+        if not displaced and self._divergence(index, dynamics) <= self._deadband:
             self._plan, self._ends = None, {}
             self._goal.clear()
             return
@@ -133,15 +136,15 @@ class Replanner:
                 continue
             shift: np.ndarray = self._shift[foot]
             goal: np.ndarray = self._goal.get(self._nominal.swings.index(swing), shift)
-            if max(np.linalg.norm(goal), np.linalg.norm(shift)) > DEADBAND:
+            if max(np.linalg.norm(goal), np.linalg.norm(shift)) > self._deadband:
                 return True
-        return bool(np.linalg.norm(self.com_shift) > DEADBAND)
+        return bool(np.linalg.norm(self.com_shift) > self._deadband)
 
     def _divergence(self, index: int, dynamics: RobotDynamics) -> float:
         """Divergence in m from the plan moved with the feet that bear it."""
         off = dynamics.com - self._reference.com[index] - self.com_shift
         speed = dynamics.com_velocity - self._reference.com_velocity[index]
-        return float(np.linalg.norm(off + speed / PENDULUM_RATE))
+        return float(np.linalg.norm(off + speed / self._rate))
 
     def _follow_feet(self, index: int, period: float) -> None:
         """Move the plan's shift towards that of the feet that bear it."""
@@ -149,7 +152,7 @@ class Replanner:
         total = float(load.sum())
         if total > 0.0:
             wanted = load @ self._moved[:2] / total
-            self.com_shift += period * PENDULUM_RATE * (wanted - self.com_shift)
+            self.com_shift += period * self._rate * (wanted - self.com_shift)
 
     @property
     def counts(self) -> ReplanCounts:
@@ -198,7 +201,7 @@ class Replanner:
 
     def _most(self, swing: Swing) -> float:
         """Fastest pace of a swing."""
-        return min(max((swing.end - swing.start) / SHORTEST, 1.0), PACE)
+        return min(max((swing.end - swing.start) / self._shortest, 1.0), PACE)
 
     def _track(self, time: float, target: MotionTarget) -> None:
         """Move the target by the last replan, or beyond its horizon with the feet that bear the plan."""
@@ -220,21 +223,21 @@ class Replanner:
         """Move landing points and paces of feet in the air smoothly to those of the last replan."""
         for foot in FEET:
             if tracker.begun[foot]:
-                self._shift[foot] = self._rate[foot] = 0.0
+                self._shift[foot] = self._shift_rate[foot] = 0.0
             swing = tracker.current[foot]
             if swing is None or tracker.state[foot] is not LimbState.SWING or tracker.begun[foot]:
-                self._rate[foot] = 0.0
+                self._shift_rate[foot] = 0.0
                 targets.shift_velocity[foot] = 0.0
                 continue
             event = self._nominal.swings.index(swing)
             end = self._ends.get(event, swing.end)
             pace = (swing.end - time - tracker.lead[foot]) / max(end - time, 0.02) if end < swing.end else 1.0
             pace = min(max(pace, 1.0), self._most(swing))
-            change = PACE_RATE * period
+            change = self._pace_rate * period
             tracker.pace[foot] += min(max(pace - tracker.pace[foot], -change), change)
             goal = self._goal.get(event, self._shift[foot])
             left = max(min(end, swing.start + 0.9 * (swing.end - swing.start)) - 0.03 - time, 0.05)
-            pull = 6.0 * (goal - self._shift[foot]) / left**2 - 4.0 * self._rate[foot] / left
-            self._rate[foot] += period * pull
-            self._shift[foot] += period * self._rate[foot]
-            targets.shift[foot], targets.shift_velocity[foot] = self._shift[foot], self._rate[foot]
+            pull = 6.0 * (goal - self._shift[foot]) / left**2 - 4.0 * self._shift_rate[foot] / left
+            self._shift_rate[foot] += period * pull
+            self._shift[foot] += period * self._shift_rate[foot]
+            targets.shift[foot], targets.shift_velocity[foot] = self._shift[foot], self._shift_rate[foot]

@@ -13,6 +13,7 @@ from toolkit.control.corrector import PENDULUM_RATE
 from toolkit.geometry.limb import FEET
 from toolkit.replanning.landing import FreeLandings
 from toolkit.replanning.situation import HorizonContacts
+from toolkit.robot.scale import Scale
 
 # Weights of the CoM per m^2 s, and of its velocity per m^2/s, horizontal and vertical (no landing point helps there).
 COM, VELOCITY, CLIMB = 100.0, 2.5, 20.0
@@ -38,6 +39,7 @@ class Tracking:
         share: (N, 2) shares of the feet in the load; each foot takes its share of the CoM along.
         contacts: The contacts, C of them active.
         free: Landing points that may move.
+        scale: The robot's size.
     """
 
     layout: Layout
@@ -47,6 +49,7 @@ class Tracking:
     share: np.ndarray
     contacts: HorizonContacts
     free: FreeLandings
+    scale: Scale
 
     def prices(self) -> Prices:
         """Prices of single variables."""
@@ -78,19 +81,19 @@ class Tracking:
 
     def squares(self) -> Squares:
         """Prices of the divergence at the end and, where feet may move, of the CoM from the feet that it follows."""
-        n = len(self.dt)
+        n, rate = len(self.dt), PENDULUM_RATE / self.scale.time
         knot = np.append(np.arange(1, n + 1) if self.free.items else np.zeros(0, np.int64), n)
         count, axis = len(knot), np.arange(3)
         variables = np.zeros((count, 3, 2 + 4 * self.layout.moving), np.int64)
         factors = np.zeros(variables.shape)
         variables[..., 0], variables[..., 1] = axis, 3 + axis
-        factors[..., 0], factors[-1, :, 1] = 1.0, 1.0 / PENDULUM_RATE
+        factors[..., 0], factors[-1, :, 1] = 1.0, 1.0 / rate
         if self.free.items:
             variables[..., 2:] = np.arange(STATE, STATE + 4)
             factors[:-1, :, 2:] = self._following()
             factors[-1, :, 2:] = factors[-2, :, 2:]
         wanted = self.states[knot, :3] + self._led()[knot - 1]
-        wanted[-1] += self.states[-1, 3:6] / PENDULUM_RATE
+        wanted[-1] += self.states[-1, 3:6] / rate
         weight = np.append(COM * self.dt[knot[:-1] - 1], FINAL)
         width = variables.shape[2]
         return Squares(

@@ -13,6 +13,7 @@ import numpy as np
 
 from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.robot.chain import arm_joints, bodies_above, joints_to, side_joints
+from toolkit.robot.scale import Scale
 
 _LATERAL = 0.5  # least |cosine| between the axis of a joint that turns about the lateral axis and that axis
 _SHOULDER = 3  # joints of a shoulder
@@ -153,6 +154,11 @@ class RobotModel:
     def half_sizes(self) -> np.ndarray:
         """Half extents (4, 2) float of the patches by limb, m; zeros for a limb that the robot does not have."""
         return half_sizes_of(self.limbs)
+
+    @property
+    def scale(self) -> Scale:
+        """Factors on lengths, times and forces that are written for a body of the usual size."""
+        return Scale.of(float(np.mean([leg.thigh + leg.shin for leg in self.legs.values()])), self.mass)
 
     def joints_to(self, limb: Limb) -> np.ndarray:
         """Indices (k,) int into `joint_names` of the joints from the base to a limb, in order."""

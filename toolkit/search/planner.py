@@ -175,7 +175,9 @@ class ContactPlanner:
         candidates = CandidateGenerator(moves, limbs, timings, exclusions, tally.rejected)
         reader, reach = StateReader(table, timings), ReachCheck(moves, limbs, timings)
         mass = 0.0 if self._finish is None else self.robot.mass
-        cost = EdgeCost(strategy.cost, table, timings, self.world.goal, way.distance, way.longest, mass)
+        cost = EdgeCost(
+            strategy.cost, table, timings, self.world.goal, way.distance, way.longest, mass, self.robot.scale
+        )
         haste = None
         if strategy.hasty is not None:
             haste = Haste(table, self.robot.com_height, way.forced, cost.per_metre)

@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from toolkit.wholebody.swing import SwingPath
-from toolkit.wholebody.swing_task import GAP, SAMPLES, SwingTask
+from toolkit.wholebody.swing_task import SAMPLES, SwingTask
 
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 STEP, MOST = 0.02, 0.16  # m; the detour grows by STEP until the way is free, at most to MOST
 
 
@@ -29,7 +30,7 @@ def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath]) -> np.nd
         return float(apart.min()), float(min(apart[0], apart[-1]))
 
     free, at_ends = gap(np.zeros(3))
-    wanted = min(GAP, at_ends)
+    wanted = min(task.gap, at_ends)
     if free >= wanted - 1e-6:
         return np.zeros(3)
     travel = (task.end.position - task.start.position)[:2]
@@ -40,7 +41,7 @@ def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath]) -> np.nd
     middle = 0.5 * (task.end.position + task.start.position) - pose.position
     aside *= (1.0 if aside @ middle >= 0.0 else -1.0) / length
     best, best_gap = np.zeros(3), free
-    for size in np.arange(STEP, MOST + 1e-9, STEP):
+    for size in task.scale.length * np.arange(STEP, MOST + 1e-9, STEP):
         reached = gap(size * aside)[0]
         if reached > best_gap:
             best, best_gap = size * aside, reached

@@ -113,7 +113,7 @@ def limb_paths(
     """Paths of the limbs of a schedule, clear of the world's geometry where that is possible.
 
     Free palms hang relative to the CoM of the planned motion. Feet leave and reach their contacts straight along the
-    normal over `foot_lift` m. `LimbPaths.blocked` names the paths that are not clear.
+    normal over `foot_lift` m, which is scaled with the body. `LimbPaths.blocked` names the paths that are not clear.
     """
     collide = box_collide(world)
     segments: list[tuple[Segment, ...]] = []
@@ -179,10 +179,10 @@ def _swing(
         com = np.array([motion.sample(phase.start + share * phase.duration)[0] for share in u])
         leg = SwingingLeg(robot.legs[limb], u, com, standing.pose.yaw)
     free_start, free_end = old is None, new is None
-    size, lift = robot.half_sizes[limb], foot_lift if limb.is_foot else LIFT
-    task = SwingTask(
-        phase.start, phase.duration, start, end, size, limb.is_foot, free_start, free_end, other, leg, lift
-    )
+    size, scale = robot.half_sizes[limb], robot.scale
+    lift = scale.length * (foot_lift if limb.is_foot else LIFT)
+    ends = start, end, size, limb.is_foot, free_start, free_end
+    task = SwingTask(phase.start, phase.duration, *ends, other, leg, lift, scale)
     return Segment(phase.start, phase.end, phase.transition, None, plan_swing(task, collide), free_start, free_end)
 
 

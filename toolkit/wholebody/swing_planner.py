@@ -9,11 +9,12 @@ import numpy as np
 
 from toolkit.wholebody.detour import detour
 from toolkit.wholebody.swing import Move, SwingPath, Window
-from toolkit.wholebody.swing_task import EASY, MARGIN, SAMPLES, STEEP, SwingTask, SwingTiming
+from toolkit.wholebody.swing_task import EASY, SAMPLES, STEEP, SwingTask, SwingTiming
 
 Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool, whether a box touches the world."""
 
+# Lengths and speeds are those of a body of the usual size (`toolkit.robot.scale`).
 SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
 THICKNESS = 0.08  # m; height of the swept box above the patch, to hold the foot or the hand
 SPACING = 0.03  # m; largest way between two poses that are checked: less than the swept box is wide
@@ -41,14 +42,15 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector))
     sides = _free_sides(task, collide)
     candidates = list(_candidates(task))
+    moderate_raise = task.scale.length * MODERATE_RAISE
     needed = 0.0 if not task.is_foot else abs(task.end.position[2] - task.start.position[2])
-    moderate = [item for item in candidates if max(item[:2]) <= needed + MODERATE_RAISE]
-    great = [item for item in candidates if max(item[:2]) > needed + MODERATE_RAISE]
+    moderate = [item for item in candidates if max(item[:2]) <= needed + moderate_raise]
+    great = [item for item in candidates if max(item[:2]) > needed + moderate_raise]
     for group in (moderate, great):
         for share in (1.0, 0.5, 0.0):
             for before, after, timing in group:
                 path = _within_ankle_range(task, _path(task, before, after, timing, bump))
-                if not collide(*_swept_boxes(task, path, share * MARGIN, sides)).any():
+                if not collide(*_swept_boxes(task, path, share * task.margin, sides)).any():
                     return path
     return replace(_path(task, *candidates[-1], bump), clear=False)
 
@@ -57,14 +59,15 @@ def _candidates(task: SwingTask) -> Iterator[tuple[float, float, SwingTiming]]:
     """Extra height (m) before and after the crossing, with the timing, from the easiest to the highest."""
     raises = list(_raises(task))
     level = abs(task.end.position[2] - task.start.position[2]) if task.is_foot else 0.0
-    low = [pair for pair in raises if max(pair) <= level + EASY_RAISE]
+    low = [pair for pair in raises if max(pair) <= level + task.scale.length * EASY_RAISE]
     yield from ((*pair, EASY) for pair in low)
     yield from ((*pair, STEEP) for pair in raises)
 
 
 def _raises(task: SwingTask) -> Iterator[tuple[float, float]]:
     """Extra height (m) before and after the crossing, from the least to the most."""
-    steps = np.arange(0.0, MAX_RAISE + 1e-9, RAISE_STEP).tolist()
+    scale = task.scale.length
+    steps = (scale * np.arange(0.0, MAX_RAISE + 1e-9, RAISE_STEP)).tolist()
     if not task.is_foot:
         yield from ((0.0 if task.free_start else step, 0.0 if task.free_end else step) for step in steps)
         return
@@ -73,7 +76,9 @@ def _raises(task: SwingTask) -> Iterator[tuple[float, float]]:
     up, down = max(climb, 0.0), max(-climb, 0.0)
     # Small raises come first for every climb: along a slope they are enough.
     small = [step for step in steps[:5] if step < abs(climb)]
-    heights = sorted({*small, *np.linspace(0.0, abs(climb), 1 + min(4, int(np.ceil(abs(climb) / RAISE_STEP))))})
+    heights = sorted(
+        {*small, *np.linspace(0.0, abs(climb), 1 + min(4, int(np.ceil(abs(climb) / (scale * RAISE_STEP)))))}
+    )
     yield from ((min(height, up), min(height, down)) for height in heights)
     yield from ((up + step, down + step) for step in steps[1:])
 
@@ -84,9 +89,9 @@ def _path(task: SwingTask, before: float, after: float, timing: SwingTiming, bum
     onto = np.zeros(3) if task.free_end else -task.lift * task.end.normal
     up = np.array([0.0, 0.0, 1.0]) if task.is_foot else _outward(task)
     travel = task.end.position - task.start.position - off - onto - (before - after) * up
-    speed = float(np.linalg.norm(travel)) / task.duration
-    across = _hastened(speed, timing.across, FAST_ACROSS)
-    land = _hastened(speed, timing.land, FAST_LAND) if task.is_foot else timing.land
+    haste = _haste(task, float(np.linalg.norm(travel)))
+    across = _hastened(haste, timing.across, FAST_ACROSS)
+    land = _hastened(haste, timing.land, FAST_LAND) if task.is_foot else timing.land
     moves = [
         Move(off, timing.leave),
         Move(before * up, timing.rise),
@@ -126,9 +131,9 @@ def _pitch(task: SwingTask) -> float:
     trail = (task.other[0].position - task.start.position) @ task.start.rotation[:, 0]
     ahead = (task.end.position - task.start.position) @ task.start.rotation[:, 0]
     # In fast swings the ankle has only time for the pitch that its range demands.
-    speed = float(np.linalg.norm(task.end.position - task.start.position)) / task.duration
-    gain = PITCH_GAIN * (1.0 - _haste(speed))
-    return float(np.clip(gain * (min(trail, ahead) - PITCH_FROM), 0.0, MAX_PITCH))
+    way, scale = float(np.linalg.norm(task.end.position - task.start.position)), task.scale.length
+    gain = PITCH_GAIN / scale * (1.0 - _haste(task, way))
+    return float(np.clip(gain * (min(trail, ahead) - scale * PITCH_FROM), 0.0, MAX_PITCH))
 
 
 def _outward(task: SwingTask) -> np.ndarray:
@@ -140,31 +145,31 @@ def _outward(task: SwingTask) -> np.ndarray:
     return outward / length if length > 1e-3 else np.array([0.0, 0.0, 1.0])
 
 
-def _haste(speed: float) -> float:
-    """Number from 0 for slow swings to 1 for fast ones, of a mean speed in m/s."""
+def _haste(task: SwingTask, way: float) -> float:
+    """Number from 0 for slow swings to 1 for fast ones, of a way in m."""
+    speed = way / task.duration / task.scale.speed
     return min(max((speed - SLOW) / (FAST - SLOW), 0.0), 1.0)
 
 
-def _hastened(speed: float, slow: Window, fast: Window) -> Window:
-    """Window between those of slow and of fast swings, for a mean speed in m/s."""
-    share = _haste(speed)
+def _hastened(share: float, slow: Window, fast: Window) -> Window:
+    """Window between those of slow and of fast swings, for a number from 0 to 1."""
     return Window(slow.start + share * (fast.start - slow.start), slow.end + share * (fast.end - slow.end))
 
 
 def _free_sides(task: SwingTask, collide: Collide) -> tuple[float, float]:
     """How much (m) the patch can be padded sideways where it starts and where it ends, at most the margin."""
-    shares = np.array([1.0, 0.75, 0.5, 0.25])
+    shares, margin, scale = np.array([1.0, 0.75, 0.5, 0.25]), task.margin, task.scale.length
     sides = []
     for pose, free in ((task.start, task.free_start), (task.end, task.free_end)):
         if free:
-            sides.append(MARGIN)
+            sides.append(margin)
             continue
         half = np.empty((len(shares), 3))
-        half[:, :2] = task.half_size + (shares * MARGIN)[:, None]
-        half[:, 2] = 0.5 * THICKNESS - SKIN
-        centers = np.repeat((pose.position + (half[0, 2] + 2 * SKIN) * pose.normal)[None], len(shares), 0)
+        half[:, :2] = task.half_size + (shares * margin)[:, None]
+        half[:, 2] = scale * (0.5 * THICKNESS - SKIN)
+        centers = np.repeat((pose.position + (half[0, 2] + 2 * scale * SKIN) * pose.normal)[None], len(shares), 0)
         hit = collide(centers, np.repeat(pose.rotation[None], len(shares), 0), half)
-        sides.append(float(max(shares[~hit], default=0.0)) * MARGIN)
+        sides.append(float(max(shares[~hit], default=0.0)) * margin)
     return sides[0], sides[1]
 
 
@@ -177,7 +182,8 @@ def _swept_boxes(
     the sides starts from what is free there and grows with the distance.
     """
     length = sum(np.linalg.norm(move.vector) for move in path.moves)
-    count = max(SAMPLES, int(np.ceil(2.0 * length / SPACING)) + 1)  # twice as fast in the middle
+    thickness, skin, spacing = (task.scale.length * each for each in (THICKNESS, SKIN, SPACING))
+    count = max(SAMPLES, int(np.ceil(2.0 * length / spacing)) + 1)  # twice as fast in the middle
     u = np.linspace(0.0, 1.0, count)
     points, rotations = path.positions(u), path.rotations(u)
     below, aside = np.full(count, margin), np.full(count, margin)
@@ -195,7 +201,7 @@ def _swept_boxes(
         aside[half_of_swing] = np.minimum(aside, side + along)[half_of_swing]
     below = np.maximum(below, 0.0)
     half = np.empty((count, 3))
-    half[:, :2] = task.half_size + (aside - np.where(aside > SKIN, 0.0, SKIN))[:, None]
-    half[:, 2] = 0.5 * (THICKNESS + below - SKIN)
-    centers = points + (0.5 * (THICKNESS - below + SKIN))[:, None] * rotations[:, :, 2]
+    half[:, :2] = task.half_size + (aside - np.where(aside > skin, 0.0, skin))[:, None]
+    half[:, 2] = 0.5 * (thickness + below - skin)
+    centers = points + (0.5 * (thickness - below + skin))[:, None] * rotations[:, :, 2]
     return centers, rotations, half

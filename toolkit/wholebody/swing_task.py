@@ -10,8 +10,10 @@ from toolkit.geometry.heading import mean_heading
 from toolkit.geometry.pose import Pose, yaw_of
 from toolkit.physics.leg import leg_posture
 from toolkit.robot.model import LegGeometry
+from toolkit.robot.scale import USUAL, Scale
 from toolkit.wholebody.swing import SwingPath, Window
 
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 LIFT = 0.05  # m; guarded motion along the surface normal at both ends of a swing
 MARGIN = 0.02  # m; kept free around the swept patch, where the start and the end leave that much
 GAP = 0.02  # m; kept between the soles of the swinging and the standing foot
@@ -81,6 +83,7 @@ class SwingTask:
         other: The standing sole as (pose, half size); None for palms.
         leg: Keeps the ankle of a foot in its range; None for palms and where no other foot stands.
         lift: m; guarded motion along the surface normal at both ends.
+        scale: The robot's size.
     """
 
     begin: float
@@ -94,3 +97,14 @@ class SwingTask:
     other: tuple[Pose, np.ndarray] | None = None
     leg: SwingingLeg | None = None
     lift: float = LIFT
+    scale: Scale = USUAL
+
+    @property
+    def margin(self) -> float:
+        """m; kept free around the swept patch, where the start and the end leave that much."""
+        return self.scale.length * MARGIN
+
+    @property
+    def gap(self) -> float:
+        """m; kept between the soles of the swinging and the standing foot."""
+        return self.scale.length * GAP

@@ -13,7 +13,6 @@ from toolkit.geometry.limb import FEET
 from toolkit.robot.model import RobotModel
 from toolkit.world.authoring import numbers
 
-_LEG = 0.8  # m; thigh and shin of the legs that the generators' numbers are meant for
 _ANKLE_MARGIN = 0.1  # rad; ankles stay so far inside their range on the steepest tile
 _TIMES = ("shift", "swing")  # options of generators that are times
 _LENGTHS = {
@@ -41,11 +40,10 @@ class Fit:
 
     @classmethod
     def of(cls, robot: RobotModel) -> Fit:
-        """The fit to a robot; the factor is rounded to 1 %, so that a robot of the usual size gets the usual worlds."""
+        """The fit to a robot; one of the usual size gets the usual worlds."""
         legs = [robot.legs[foot] for foot in FEET]
-        factor = round(float(np.mean([leg.thigh + leg.shin for leg in legs])) / _LEG, 2)
         ends = [abs(end) for leg in legs for role in ("ankle_roll", "ankle_pitch") for end in leg.ranges[role]]
-        return cls(factor, float(np.floor(np.degrees(max(min(ends) - _ANKLE_MARGIN, 0.0)))))
+        return cls(robot.scale.length, float(np.floor(np.degrees(max(min(ends) - _ANKLE_MARGIN, 0.0)))))
 
 
 def fitted(generator: Callable[..., str], rng: np.random.Generator, fit: Fit, given: Mapping[str, float]) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 
 from toolkit.centroidal.sequence import CALM
 from toolkit.geometry.limb import Limb
+from toolkit.robot.scale import USUAL, Scale
 from toolkit.search.costs.heuristic import Distance
 from toolkit.search.moves.candidates import Candidates
 from toolkit.search.states.contact_table import ContactTable
@@ -22,7 +23,7 @@ from toolkit.world.world import Goal
 
 _LEAST_RESERVE = 0.02  # part of the friction; contacts that slide cost no more than those that barely hold
 _SURE = 0.98  # part of the least momentum's cost that is counted: the objective takes it at the ends of steps
-_LEAN = 0.3  # m; by so much less than the mean of the feet the CoM may move
+_LEAN = 0.3  # m for a body of the usual size; by so much less than the mean of the feet the CoM may move
 _RESTS = 1.4  # s; at both ends of a plan, in which it may move too
 _ARRIVAL = 0.01  # m; plans end this far inside the goal, as robots land a little beside their plans
 
@@ -136,6 +137,7 @@ class EdgeCost(TransitionCost):
         distance: Distance to the goal.
         longest: The farthest, in m, that the mean of the feet moves in one transition.
         mass: kg; of the robot whose motions the objectives are of. 0 where they are not those of motions.
+        scale: The size of that robot.
     """
 
     def __init__(
@@ -147,10 +149,11 @@ class EdgeCost(TransitionCost):
         distance: Distance,
         longest: float,
         mass: float = 0.0,
+        scale: Scale = USUAL,
     ):
         super().__init__(config, table, timings, goal)
-        self._distance, self._longest = distance, longest
-        self._momentum = _SURE * self.dynamics * CALM.linear_momentum / 0.2 * mass**2
+        self._distance, self._longest, self._lean = distance, longest, scale.length * _LEAN
+        self._momentum = _SURE * self.dynamics * CALM.scaled(scale).linear_momentum / 0.2 * mass**2
         self._slowest = float(self._durations.max())
         # Of one transition, as long as the slowest and as cheap as the shortest one.
         self._step = config.step + self.time * float(self._durations.min())
@@ -176,7 +179,7 @@ class EdgeCost(TransitionCost):
     def _least(self, distance: np.ndarray, away: np.ndarray) -> np.ndarray:
         """(n,) least cost of ways (n,) in m; `away` (n,) says where at least one transition is missing."""
         count = np.maximum(distance / self._longest, away)
-        moved = np.maximum(distance - _LEAN, 0.0)
+        moved = np.maximum(distance - self._lean, 0.0)
         slack = _RESTS + self._slowest * count
         time = np.maximum(slack, moved * np.sqrt(self._momentum * self._slowest / max(self._step, 1e-9)))
         return distance + self._step * (count + (time - slack) / self._slowest) + self._momentum * moved**2 / time

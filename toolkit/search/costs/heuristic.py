@@ -23,7 +23,6 @@ from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.world import Goal
 
 _MAX_NODES = 1_600_000  # cells in XY times layers of yaw; cells are larger where the world would need more
-_MERGE = 0.3  # m; heights in one cell that differ by less are one
 _OCTILE = 1.0 / 1.0823923  # largest ratio of 8-connected to straight distance, inverted: keeps the estimate low
 
 
@@ -67,10 +66,16 @@ class Mesh:
     Attributes:
         cell: Edge of a cell in m.
         yaws: Layers of yaw over half a turn; a box is the same both ways.
+        merge: Heights in one cell that differ by less m are one.
     """
 
     cell: float
     yaws: int
+    merge: float = 0.3
+
+    def scaled(self, factor: float) -> Mesh:
+        """The same with its lengths multiplied by a factor."""
+        return Mesh(factor * self.cell, self.yaws, factor * self.merge)
 
 
 class GridDistance:
@@ -94,14 +99,14 @@ class GridDistance:
         climb: float,
         footholds: Footholds,
     ):
-        self._goal = goal
+        self._goal, self._merge = goal, mesh.merge
         extent = np.array(bounds[2:]) - bounds[:2]
         self._cell = cell = max(mesh.cell, float(np.sqrt(extent.prod() * mesh.yaws / _MAX_NODES)))
         shape = np.ceil(extent / cell).astype(np.int64) + 1
         self._corner = np.array(bounds[:2], float)
         self._soles = self._grounds(projector, footholds, shape)
         levels, around = self._soles.copy(), disc(stride / 2 / cell)
-        spread(self._soles, around, _MERGE, levels)
+        spread(self._soles, around, self._merge, levels)
         self._height, self._stride, self._climb = levels, stride, climb
         nodes = np.full((*levels.shape, mesh.yaws), -1, np.int32)
         low = np.zeros(nodes.shape, np.bool_)
@@ -133,7 +138,7 @@ class GridDistance:
             self._cell,
             projector.half_sizes[Limb.LEFT_FOOT],
             np.ascontiguousarray(projector.offsets),
-            _MERGE,
+            self._merge,
             projector.table,
             low,
         )
@@ -151,7 +156,9 @@ class GridDistance:
         reached = self._distance.min(3) == 0.0
         free = np.isfinite(self._distance).any(3) & between[..., None]
         reached &= free
-        mark_stances(self._height, self._soles, np.insert(disc(reach / 2), 0, 0, axis=0), self._climb, _MERGE, reached)
+        mark_stances(
+            self._height, self._soles, np.insert(disc(reach / 2), 0, 0, axis=0), self._climb, self._merge, reached
+        )
         flood(self._height, free, self._climb, none, reached)
         i, j = np.clip(np.round((place[:2] - self._corner) / self._cell).astype(int), 1, np.array(ground.shape) - 2)
         return bool(reached[i - 1 : i + 2, j - 1 : j + 2].any())
@@ -166,12 +173,12 @@ class GridDistance:
         last = np.clip(np.ceil((upper[:, :2] - self._corner) / self._cell).astype(int) + 1, 0, shape)
         for index in np.flatnonzero(table.foot & (first < last).all(1)).tolist():
             near = levels[first[index, 0] : last[index, 0], first[index, 1] : last[index, 1]]
-            if ((near > lower[index, 2] - _MERGE) & (near < upper[index, 2] + _MERGE)).any():
+            if ((near > lower[index, 2] - self._merge) & (near < upper[index, 2] + self._merge)).any():
                 continue
             for point in footholds.samples(index, self._cell):
                 i, j = np.floor((point[:2] - self._corner) / self._cell + 0.5).astype(int)
                 if 0 <= i < shape[0] and 0 <= j < shape[1]:
-                    add_level(levels[i, j], point[2], _MERGE)
+                    add_level(levels[i, j], point[2], self._merge)
 
     def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """See `Distance`; at least the straight line."""

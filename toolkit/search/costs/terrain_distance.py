@@ -19,6 +19,7 @@ from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.surface import Surface
 from toolkit.world.world import World
 
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _DETOURS = (2.0, 8.0)  # m around start and goal that the grid covers; the larger where the smaller has no way
 _BENT = 0.3  # m by which a m of way with bent knees seems longer
 _TURN = 1e-4  # m; cost of one layer of yaw, only there to prefer straight ways
@@ -56,7 +57,7 @@ class TerrainDistance:
 
     def __init__(self, robot: RobotModel, world: World, projector: Projector, footholds: Footholds):
         self._robot, self._world, self._projector, self._footholds = robot, world, projector, footholds
-        self._climb = climb(robot)
+        self._climb, self._scale = climb(robot), robot.scale.length
         self.box, self._drops = BodyBox.of(robot), drops(robot)
         table = projector.table
         first, last = table.edge_start[:-1], table.edge_start[1:]
@@ -66,8 +67,8 @@ class TerrainDistance:
         upper = np.maximum.reduceat(points, first)[table.foot]
         self._ground = lower, upper  # corners of the boxes around foot surfaces
         self._bounds = [self._around(detour) for detour in _DETOURS]
-        self._detour, self._cell = 0, _CELL
-        self.occupancy = self._occupy(self._bounds[0], _CELL)
+        self._detour, self._cell = 0, self._scale * _CELL
+        self.occupancy = self._occupy(self._bounds[0], self._cell)
 
     def _around(self, detour: float) -> tuple[float, float, float, float]:
         """Bounds in XY around start and goal, no larger than the ground."""
@@ -90,7 +91,7 @@ class TerrainDistance:
 
         Where narrow places count, the grid is finer and knows that they are passed sideways.
         """
-        cell = _FINE if narrow else _CELL
+        cell = self._scale * (_FINE if narrow else _CELL)
         for detour in range(0 if narrow else self._detour, len(_DETOURS)):
             if detour > 0 and self._bounds[detour] == self._bounds[detour - 1]:
                 continue
@@ -104,12 +105,13 @@ class TerrainDistance:
 
     def _grid(self, occupancy: Occupancy, stride: float) -> GridDistance:
         body = GridBody(self.box, self._drops, _TURN, 0.0, _BENT)
-        return self._distance(occupancy, body, _WIDE, stride)
+        return self._distance(occupancy, body, _WIDE.scaled(self._scale), stride)
 
     def _narrow(self, stride: float) -> GridDistance:
-        box = self.box._replace(half_depth=self.box.half_depth - _TOUCHED, half_width=self.box.half_width - _TOUCHED)
-        body = GridBody(box, self._drops, 2 * _QUARTER / _NARROW.yaws, _SIDEWAYS, _BENT)
-        return self._distance(self.occupancy, body, _NARROW, stride)
+        depth, width = (half - self._scale * _TOUCHED for half in (self.box.half_depth, self.box.half_width))
+        box = self.box._replace(half_depth=depth, half_width=width)
+        body = GridBody(box, self._drops, self._scale * 2 * _QUARTER / _NARROW.yaws, _SIDEWAYS, _BENT)
+        return self._distance(self.occupancy, body, _NARROW.scaled(self._scale), stride)
 
     def _distance(self, occupancy: Occupancy, body: GridBody, mesh: Mesh, stride: float) -> GridDistance:
         bounds, goal = self._bounds[self._detour], self._world.goal

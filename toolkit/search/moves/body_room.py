@@ -17,6 +17,7 @@ from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
 from toolkit.search.moves.shanks import leg_free, shanks_of
 from toolkit.world.world import World
 
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _CELL = 0.025  # m; edge of the cells
 _AROUND = 1.0  # m around the feet that are looked at
 _AHEAD, _ASIDE = 0.12, 0.05  # m; the CoM may be so far from the middle of the feet when it meets a ceiling
@@ -33,6 +34,7 @@ class _Walker(NamedTuple):
         legs, shanks, box: See `toolkit.search.moves.screen.Body`.
         com_height: m; height of the CoM above the soles at home.
         deepest: m; the most that the CoM sinks.
+        scale: Factor on lengths.
     """
 
     legs: Legs
@@ -40,6 +42,7 @@ class _Walker(NamedTuple):
     box: BodyBox
     com_height: float
     deepest: float
+    scale: float
 
 
 class BodyRoom:
@@ -54,7 +57,12 @@ class BodyRoom:
         self._world = world
         box = BodyBox.of(robot)
         self._walker = _Walker(
-            legs_of(robot, MARGINS), shanks_of(robot), box, robot.com_height, float(drops(robot)[-1])
+            legs_of(robot, MARGINS),
+            shanks_of(robot),
+            box,
+            robot.com_height,
+            float(drops(robot)[-1]),
+            robot.scale.length,
         )
         self._occupancy: Occupancy | None = None
         self._bounds = np.zeros((2, 3))  # of the occupancy
@@ -99,14 +107,15 @@ class BodyRoom:
 
     def _around(self, places: np.ndarray) -> Occupancy | None:
         """Cells around places (n, 3) m; None where nothing is there at the height of the body."""
-        box = self._walker.box
-        low, high = places.min(0) + [-_AROUND, -_AROUND, box.bottom], places.max(0) + [_AROUND, _AROUND, box.top]
+        box, scale = self._walker.box, self._walker.scale
+        around = scale * _AROUND
+        low, high = places.min(0) + [-around, -around, box.bottom], places.max(0) + [around, around, box.top]
         occupancy = self._occupancy
         if occupancy is None or (low < self._bounds[0]).any() or (high > self._bounds[1]).any():
             if occupancy is not None:
                 low, high = np.minimum(low, self._bounds[0]), np.maximum(high, self._bounds[1])
-            self._bounds = np.stack([low - _AROUND, high + _AROUND])
-            occupancy = self._occupancy = Occupancy.of(self._world.mujoco_model, *self._bounds, cell=_CELL)
+            self._bounds = np.stack([low - around, high + around])
+            occupancy = self._occupancy = Occupancy.of(self._world.mujoco_model, *self._bounds, cell=scale * _CELL)
         first, last = (np.floor((end - occupancy.corner) / occupancy.cell).astype(int) for end in (low, high))
         near = occupancy.below[first[0] : last[0] + 1, first[1] : last[1] + 1]
         return occupancy if (near[:, :, last[2] + 1] > near[:, :, first[2]]).any() else None
@@ -132,7 +141,7 @@ def _fill_sinks(occupancy, walker, places, yaw, sink):
     Columns that are occupied below the top of the lowest body are walls, of which ceilings know nothing.
     """
     corner, cell, below, box = occupancy.corner, occupancy.cell, occupancy.below, walker.box
-    depth, width = box.half_depth + _AHEAD, box.half_width + _ASIDE
+    depth, width = box.half_depth + walker.scale * _AHEAD, box.half_width + walker.scale * _ASIDE
     for row in range(len(yaw)):
         x, y, z = places[row]
         c, s = np.cos(yaw[row]), np.sin(yaw[row])
@@ -185,7 +194,7 @@ def _fill_reach(occupancy, walker, places, yaw, sink, feet, turns, standing, rea
     Where none is, inf stays. The arrays are those of `_Posture`, for n postures.
     """
     box = walker.box
-    slim = BodyBox(box.half_depth, box.half_width - _ARM, box.bottom, box.top)
+    slim = BodyBox(box.half_depth, box.half_width - walker.scale * _ARM, box.bottom, box.top)
     for row in range(len(yaw)):
         posture = _Posture(places[row], yaw[row], sink[row], feet[row], turns[row], standing[row])
         for side in range(_SIDES):
@@ -197,20 +206,20 @@ def _fill_reach(occupancy, walker, places, yaw, sink, feet, turns, standing, rea
 @compiled
 def _reach_of(occupancy, walker, body, posture, side):
     """How far a body can move to a side (see `_fill_reach`) in m; inf where it is far."""
-    tries = int(_FAR / _STEP)
+    tries, step = int(_FAR / _STEP), walker.scale * _STEP
     free = tries
     for k in range(tries, 0, -1):
-        if not _body_free(occupancy, body, posture, side, k * _STEP):
+        if not _body_free(occupancy, body, posture, side, k * step):
             free = k - 1
     if free == tries:
         return np.inf
     if side % 2 == 1:
-        return max(free * _STEP, _SWAY)
+        return max(free * step, walker.scale * _SWAY)
     if _legs_free(occupancy, walker, posture, side, 0.0):
         for k in range(free, 0, -1):
-            if not _legs_free(occupancy, walker, posture, side, k * _STEP):
+            if not _legs_free(occupancy, walker, posture, side, k * step):
                 free = k - 1
-    return max(free * _STEP, _LEAST)
+    return max(free * step, walker.scale * _LEAST)
 
 
 @compiled

@@ -13,7 +13,7 @@ import numpy as np
 from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projected
 from toolkit.contacts.surface_table import SurfaceTable
-from toolkit.contacts.transition_model import leg_scale, soles_apart
+from toolkit.contacts.transition_model import soles_apart
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
@@ -25,7 +25,7 @@ _ADVANCE = 0.1  # m for a leg of 0.8 m; landing places of the table that lead fa
 _ALONG = np.array([-0.25, 0.0, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85])  # m for a leg of 0.8 m; places wanted ahead
 _ACROSS = np.array([0.0, 0.1, 0.2, 0.3])  # m for a leg of 0.8 m; and to the side of the foot
 _NEAREST = 40  # surfaces that are looked at
-_SAME = 0.02  # m; places that differ by less are one
+_SAME = 0.02  # m for a leg of 0.8 m; places that differ by less are one
 
 
 class DrawnSteps:
@@ -47,9 +47,9 @@ class DrawnSteps:
         distance: Callable[[np.ndarray, np.ndarray], np.ndarray],
         longest: float,
     ):
-        scale = leg_scale(robot)
+        scale = robot.scale.length
         self._table, self._footholds, self._distance, self._longest = table, footholds, distance, longest
-        self._advance = scale * _ADVANCE
+        self._advance, self._same = scale * _ADVANCE, scale * _SAME
         across = np.append(scale * _ACROSS, soles_apart(robot))
         self._wishes = np.stack(np.meshgrid(scale * _ALONG, across, indexing="ij"), axis=-1).reshape(-1, 2)
 
@@ -70,7 +70,7 @@ class DrawnSteps:
         for index in near[np.argsort(away[near], kind="stable")][:_NEAREST].tolist():
             for heading in self._footholds.headings(index, yaw):
                 soles = self._footholds.nearest(index, heading, wishes)
-                _, first = np.unique(np.round(soles.position / _SAME), axis=0, return_index=True)
+                _, first = np.unique(np.round(soles.position / self._same), axis=0, return_index=True)
                 first = np.sort(first[soles.found[first]])
                 kept = first[np.hypot(*(soles.position[first] - stand)[:, :2].T) < self._longest]
                 found.append(soles.select(kept))

@@ -22,6 +22,7 @@ from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
 
 _SLOW = 6.0  # w T beyond which everything is within reach
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _CENTRED = 0.02  # m; miss of feet at the edge of what is within reach; in its middle it is 0
 _BEHIND = 0.25  # m; the farthest that the mean of the feet may stay behind a CoM that slides
 
@@ -31,6 +32,7 @@ class Drift:
 
     def __init__(self, robot: RobotModel, table: ContactTable, timings: tuple[Timing, ...]):
         self._table = table
+        self._centred, self._behind = robot.scale.length * _CENTRED, robot.scale.length * _BEHIND
         self._sole = float(robot.half_sizes[FEET[0]].max())
         self._shift, self._swing = (np.array([getattr(t, name) for t in timings]) for name in ("shift", "swing"))
         rate = float(np.sqrt(-GRAVITY[2] / robot.com_height))
@@ -59,7 +61,7 @@ class Drift:
         outside = np.maximum(np.maximum(least - centre, centre - most), 0.0)
         off = np.minimum(np.abs(2 * centre - least - most) / (most - least), 1.0)
         slide = self._slide(contacts, com, velocity, candidates)
-        return np.hypot(*outside.T) + _CENTRED * np.hypot(*off.T) + slide
+        return np.hypot(*outside.T) + self._centred * np.hypot(*off.T) + slide
 
     def _slide(self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray, candidates: Candidates) -> np.ndarray:
         """(n,) m; distance that the CoM must slide beyond the feet."""
@@ -76,6 +78,6 @@ class Drift:
             if both:
                 shift = self._shift[k]
                 way += (velocity[:2] @ downhill[stand]) * (shift + t) + gain.min() * (shift**2 / 2 + shift * t)
-            ahead = (com[:2] - candidates.centre[rows, :2]) @ downhill[stand] - _BEHIND
+            ahead = (com[:2] - candidates.centre[rows, :2]) @ downhill[stand] - self._behind
             result[rows] = np.maximum(ahead + way, 0.0)
         return result

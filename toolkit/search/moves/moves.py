@@ -37,6 +37,8 @@ from toolkit.search.moves.shanks import shanks_of
 from toolkit.search.states.contact_table import ContactTable
 
 _KEPT = 20_000  # entries of each memory
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
+_WALL = (0.4, 0.6)  # m above the soles; see `StepLimits`
 _APART = 0.02  # m; least distance between two soles
 _PALM_SIDE = 0.15  # m; least distance of a palm to the side of the body's middle
 _PALM_ANGLE = np.radians(65.0)  # largest angle between the arm and the surface's normal
@@ -89,15 +91,17 @@ class MoveGenerator:
         self._drawn = drawn
         self.robot, self.arms, self.table = robot, arms, ContactTable(projector.table.friction)
         self._projector, self._model = projector, model
-        self._climb = climb(robot)
+        self._climb, self._scale = climb(robot), robot.scale.length
         self.legs, self.shanks = legs_of(robot, MARGINS), shanks_of(robot)
         self.has_palm_surfaces = bool(projector.table.palm.any())
         self._body = Body(self.legs, self.shanks, box, occupancy)
         self._limits = StepLimits(
-            half=robot.half_sizes[Limb.LEFT_FOOT] + _APART / 2,
+            half=robot.half_sizes[Limb.LEFT_FOOT] + self._scale * _APART / 2,
             climb=self._climb,
             com_height=robot.com_height,
             drops=drops(robot),
+            wall_bottom=self._scale * _WALL[0],
+            wall_top=self._scale * _WALL[1],
         )
         self._steps: dict[tuple, Moves] = {}
         self._palms: dict[tuple, Moves] = {}
@@ -152,7 +156,7 @@ class MoveGenerator:
         """Codes (n,) of the ways of a foot from `old` to each new place; see `screen_swings` and `screen_midway`."""
         table, codes = self.table, np.empty(len(numbers), np.int64)
         places, feet = (table.position[numbers], table.yaw[numbers]), (self._sole(old), self._sole(standing))
-        screen_swings(*places, *feet, self._limits.half, longest, _STILL, _STILL_YAW, codes)
+        screen_swings(*places, *feet, self._limits.half, longest, self._scale * _STILL, _STILL_YAW, codes)
         screen_midway(*places, *feet, self._limits, self._body, codes)
         return codes
 
@@ -188,7 +192,7 @@ class MoveGenerator:
 
     def aimed(self, limb: Limb, left: int, right: int, rays: np.ndarray) -> tuple[Projected, np.ndarray]:
         """Palms along rays (n, 3) from the shoulder, with the feet at `left` and `right`, and their codes (n,)."""
-        arm = self.robot.arms[limb]
+        arm, margin = self.robot.arms[limb], self._scale * _PALM_MARGIN
         centre, yaw = self._stand(left, right)
         shoulder, turn = self.shoulder(limb, left, right), rotation_about_z(yaw)
         palms = self._projector.project_palms(limb, shoulder, rays, yaw, arm.max_reach)
@@ -200,8 +204,8 @@ class MoveGenerator:
             centre,
             yaw,
             1.0 if limb.is_left else -1.0,
-            (arm.min_reach + _PALM_MARGIN, arm.max_reach - _PALM_MARGIN),
-            _PALM_SIDE,
+            (arm.min_reach + margin, arm.max_reach - margin),
+            self._scale * _PALM_SIDE,
             float(np.cos(_PALM_ANGLE)),
         )
         relative, normals = (palms.position - shoulder) @ turn, palms.rotation[:, :, 2] @ turn

@@ -14,6 +14,7 @@ from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reasons import Reason
 from toolkit.world.timing import Timing
 
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _COM_DROPS = np.array([0.0, 0.03, 0.06, 0.1])  # m by which the CoM may be lower than predicted for the legs to reach
 _LIFT_OFF = (1.0, 0.5)  # parts of the shift at whose CoM the legs may reach at lift-off; the optimiser chooses the time
 _ARM_MARGIN = 0.05  # m that an arm in contact reaches less far than it could, since the CoM moves in between
@@ -25,6 +26,8 @@ class ReachCheck:
 
     def __init__(self, moves: MoveGenerator, palms: Sequence[Limb], timings: tuple[Timing, ...]):
         self._moves, self._table, self._palms = moves, moves.table, palms
+        scale = moves.robot.scale.length
+        self._drops, self._margin, self._sway = scale * _COM_DROPS, scale * _ARM_MARGIN, scale * _ARM_SWAY
         self._shift = np.array([item.shift for item in timings])
         self._total = self._shift + np.array([item.swing for item in timings])
 
@@ -67,12 +70,12 @@ class ReachCheck:
                 reach, normal = table.position[after[held, palm]] - shoulder, table.rotation[after[held, palm], :, 2]
                 local = [np.einsum("nij,ni->nj", turn, vectors) for vectors in (reach, normal)]
                 distance = np.linalg.norm(reach, axis=1)
-                within = (distance > arm.min_reach + _ARM_MARGIN / 2) & (distance < arm.max_reach - _ARM_MARGIN)
+                within = (distance > arm.min_reach + self._margin / 2) & (distance < arm.max_reach - self._margin)
                 limb = candidates.limb[held]
                 standing = after[held, np.where(limb == Limb.LEFT_FOOT, Limb.RIGHT_FOOT, Limb.LEFT_FOOT)]
                 aside = table.position[standing] - end[held]  # to where the CoM goes while the other foot swings
                 aside[:, 2] = 0.0
-                stretched = np.linalg.norm(reach - aside, axis=1) > arm.max_reach + _ARM_SWAY
+                stretched = np.linalg.norm(reach - aside, axis=1) > arm.max_reach + self._sway
                 within &= ~(stretched & (limb < len(FEET)))
                 codes[held[~(within & self._moves.arms[palm].serves(*local))]] = Reason.ARM
         return codes
@@ -80,7 +83,7 @@ class ReachCheck:
     def _violated(self, com: np.ndarray, yaw: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
         moves, table = self._moves, self._table
         soles = table.position[left], table.rotation[left], table.position[right], table.rotation[right]
-        return stances_violated(moves.legs, moves.shanks, com, _COM_DROPS, yaw, *soles)
+        return stances_violated(moves.legs, moves.shanks, com, self._drops, yaw, *soles)
 
 
 def _cubic(

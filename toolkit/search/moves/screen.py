@@ -16,7 +16,6 @@ from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free, lowest
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.shanks import leg_free, legs_apart
 
-_WALL = (0.4, 0.6)  # m above the soles; what is there stops a foot, however high it is lifted
 _SHIFTS = (0.0, -0.25, 0.25)  # parts of the way from one sole to the other, from their middle, where the CoM may be
 
 
@@ -68,12 +67,15 @@ class StepLimits(NamedTuple):
         climb: Largest difference of height in m.
         com_height: Height in m of the CoM above the mean of the soles, standing straight.
         drops: (k,) m by which the CoM may be lower.
+        wall_bottom, wall_top: m above the soles; what is there stops a foot, however high it is lifted.
     """
 
     half: np.ndarray
     climb: float
     com_height: float
     drops: np.ndarray
+    wall_bottom: float
+    wall_top: float
 
 
 @compiled
@@ -179,7 +181,7 @@ def screen_midway(position, yaw, old, stand, limits, body, codes):
     """
     p, r = old.position, stand.position
     before = mean_heading(old.yaw, stand.yaw)
-    foot = BodyBox(limits.half[0], limits.half[1], _WALL[0], _WALL[1])
+    foot = BodyBox(limits.half[0], limits.half[1], limits.wall_bottom, limits.wall_top)
     for row in range(len(yaw)):
         if codes[row] == 0:
             q = position[row]

@@ -12,6 +12,7 @@ from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reasons import Reason
 from toolkit.world.world import PALM_SITE_REACH, PALM_SITES, World
 
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _SEARCH, _STEP = 0.1, 0.02  # m; farthest from the point nearest to its site that a palm may start, and the grid's step
 
 
@@ -36,12 +37,13 @@ def with_palms(world: World, feet: Stance, moves: MoveGenerator) -> Stance:
 def _placed(world: World, limb: Limb, site: np.ndarray, moves: MoveGenerator, left: int, right: int) -> Contact:
     """The palm's contact nearest to its site (3,) m, with the feet at `left` and `right`."""
     shoulder, reach = moves.shoulder(limb, left, right), moves.robot.arms[limb].max_reach
-    rays = _points(world, site) - shoulder
+    scale = moves.robot.scale.length
+    rays = _points(world, site, scale) - shoulder
     distance = np.maximum(np.linalg.norm(rays, axis=1), 1e-9)
     palms, codes = moves.aimed(limb, left, right, rays / distance[:, None])
     codes[(codes == Reason.NO_WALL) & (distance > reach)] = Reason.FAR
     far = np.linalg.norm(palms.position - site, axis=1)  # what is hit before the point may be elsewhere
-    codes[(codes == 0) & (far > PALM_SITE_REACH + _SEARCH)] = Reason.NO_WALL
+    codes[(codes == 0) & (far > PALM_SITE_REACH + scale * _SEARCH)] = Reason.NO_WALL
     if not (codes == 0).any():
         code = Reason.POSTURE if (codes == Reason.POSTURE).any() else codes[0]  # the last screen, or the nearest point
         at, above = (f"({x:.3g}, {y:.3g}, {z:.3g})" for x, y, z in (site, shoulder))
@@ -54,9 +56,9 @@ def _placed(world: World, limb: Limb, site: np.ndarray, moves: MoveGenerator, le
     return moves.table.contact(int(moves.table.add(limb, palms.select(np.array([row])))[0]))
 
 
-def _points(world: World, site: np.ndarray) -> np.ndarray:
-    """(n, 3) m; places for the palm about the nearest point of every palm surface near the site."""
-    spread = shifts(_SEARCH, _STEP)
+def _points(world: World, site: np.ndarray, scale: float) -> np.ndarray:
+    """(n, 3) m; places for the palm about the point of each palm surface nearest to the site; `scale` is of lengths."""
+    spread = shifts(scale * _SEARCH, scale * _STEP)
     points = []
     for surface in world.surfaces:
         if surface.serves_palm:

@@ -14,7 +14,8 @@ from toolkit.robot.model import RobotModel
 from toolkit.world.world import World
 
 _BELOW, _ABOVE = 0.3, 0.15  # m below and above the start site between which the ground is looked for
-_SEARCH = 0.16  # m; farthest from its place that a foot may start
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
+_SEARCH, _STEP = 0.16, 0.02  # m; farthest from its place that a foot may start, and the grid's step
 
 
 def _home_feet(robot: RobotModel) -> dict[Limb, np.ndarray]:
@@ -36,7 +37,8 @@ def place_feet(robot: RobotModel, world: World, projector: Projector) -> list[St
     Raises:
         PlanningError: A foot finds no room.
     """
-    spread = shifts(_SEARCH, 0.02)
+    scale = robot.scale.length
+    spread = shifts(scale * _SEARCH, scale * _STEP)
     start = world.start
     places: dict[Limb, list[Contact]] = {}
     for limb, foot in _home_feet(robot).items():
