@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion
-from toolkit.geometry.limb import FEET
+from toolkit.geometry.limb import FEET, PALMS
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.motion_dynamics import contact_wrenches
 
@@ -55,7 +55,7 @@ class Effort:
         data.qpos[:], data.qvel[:], data.qacc[:] = qpos, before / self.tick, (after - before) / self.tick**2
         mujoco.mj_inverse(self.model, data)
         torque = data.qfrc_inverse.copy()
-        if self.palms:
+        if motion.problem.active[:, PALMS].any():
             wrench = contact_wrenches(motion, np.array([time]), self.tick)[0]
             for limb, site in self.palms:
                 if wrench[limb].any():

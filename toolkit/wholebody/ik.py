@@ -41,8 +41,7 @@ class WholeBodyIK:
         self.solver.dt = tick
         self.maps: dict[Limb, ArmMap] = {}
         self.reaching: dict[Limb, tuple] = {}
-        self.arm_joints, self.trunk = robot.arm_sides, np.flatnonzero(robot.trunk_joints)
-        self.effort = Effort(robot, tick)
+        self.arm_joints, self.effort = robot.arm_sides, Effort(robot, tick)
         self.home = dict(zip(robot.joint_names, robot.home[7:], strict=True))
         self._set_limits()
         self._add_tasks()
@@ -88,8 +87,7 @@ class WholeBodyIK:
     def _groups(self) -> list[tuple[list[str], float]]:
         """Joint names with the weight of their posture: arms, trunk, legs."""
         robot = self.robot
-        legs, arms, trunk = robot.carrying(FEET), *np.zeros((2, len(robot.joint_names)), bool)
-        trunk[self.trunk] = True
+        legs, trunk, arms = robot.carrying(FEET), robot.trunk_joints, np.zeros(len(robot.joint_names), bool)
         for joints in self.arm_joints.values():
             arms[joints] = True
         groups: dict[float, list[str]] = {}
@@ -276,16 +274,12 @@ class WholeBodyIK:
     def _set_ranges(self, angles: np.ndarray, free: list[Limb]) -> None:
         """Set the ranges of this tick, whose ends joints approach ever more slowly.
 
-        They are narrow for arms that hang free, and for the trunk where both do: the momentum task alone would swing
-        them wider than people do.
+        They are narrow for arms that hang free: the momentum task alone would swing them wider than people do.
         """
         lower, upper = self.lower.copy(), self.upper.copy()
         share = np.full(len(angles), min(weights.RANGE_RATE * self.tick, 1.0))
-        narrow = [(self.arm_joints[arm], weights.ARM_SWING) for arm in free]
-        if len(free) == len(self.arm_joints):
-            narrow.append((self.trunk, weights.TRUNK_SWING))
-        for joints, swing in narrow:
-            home = self.robot.home[7:][joints]
+        for joints in (self.arm_joints[arm] for arm in free):
+            home, swing = self.robot.home[7:][joints], weights.ARM_SWING
             lower[joints] = np.maximum(lower[joints], np.minimum(home - swing, angles[joints]))
             upper[joints] = np.minimum(upper[joints], np.maximum(home + swing, angles[joints]))
             share[joints] = min(weights.SWING_RATE * self.tick, 1.0)
