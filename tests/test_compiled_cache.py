@@ -24,3 +24,11 @@ def test_a_disk_that_is_full(monkeypatch):
     monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
     monkeypatch.setattr(caching.IndexDataCacheFile, "load", lambda *args: None)
     np.testing.assert_array_equal(compiled(_doubled, kept=True)(np.ones(2)), [2.0, 2.0])
+
+
+def test_an_index_that_names_a_type_which_is_no_longer_there(monkeypatch):
+    def lost(*args):
+        raise AttributeError("Can't get attribute 'Gone'")
+
+    monkeypatch.setattr(caching.IndexDataCacheFile, "_load_index", lost)
+    np.testing.assert_array_equal(compiled(_doubled, kept=True)(np.ones(2)), [2.0, 2.0])

@@ -211,6 +211,16 @@ def _read(item: Any) -> nb.Type:
     return nb.Array(scalar, int(parts[2]), "C") if parts[2] else scalar
 
 
+class _Index(IndexDataCacheFile):
+    """numba's index of one function; one that names a type which is no longer there counts as empty."""
+
+    def _load_index(self):
+        try:
+            return super()._load_index()
+        except (AttributeError, ImportError):  # of a class that the code has renamed or lost since
+            return {}
+
+
 class _SourceCache(FunctionCache):
     """numba's cache of one function, whose index is dropped when the digest of the function changes."""
 
@@ -249,7 +259,7 @@ class _SourceCache(FunctionCache):
         if not self._digested:
             self._digested = True
             stamp = digest(self._py_func)
-            self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
+            self._cache_file = _Index(self._cache_path, self._impl.filename_base, stamp)
 
 
 def _described(function: Callable) -> tuple[str, list[Callable]]:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.centroidal.body import SWING_LIFT
 from toolkit.centroidal.problem import CentroidalProblem
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z
@@ -43,7 +42,7 @@ def ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
             start, swing = tip[max(lift - 1, 0)], slice(lift, land + 1)
             duration, way = times[land] - times[lift], tip[land] - start
             s = (times[swing] - times[lift]) / duration
-            climb = np.array([0.0, 0.0, SWING_LIFT + max(way[2], 0.0)])
+            climb = np.array([0.0, 0.0, problem.swing_lift + max(way[2], 0.0)])
             place[swing, foot], velocity[swing, foot] = start, 0.0
             for move, window in ((way * [1, 1, 0], ACROSS), (climb, RISE), (way * [0, 0, 1] - climb, SINK)):
                 part, rate = _step(s, *window)
