@@ -10,6 +10,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.physics.leg import LIMITS, TORQUE_ROLES
 from toolkit.robot.model import ArmGeometry, LegGeometry, LegMass, LimbModel
+from toolkit.robot.scale import USUAL, Scale
 
 
 def _limbs():
@@ -43,6 +44,7 @@ class NumbersOnlyRobot:
     arms: dict = field(default_factory=lambda: {Limb.LEFT_PALM: _arm(1), Limb.RIGHT_PALM: _arm(-1)})
     leg_mass: LegMass = LegMass(0.06, 0.045, np.array([[0.0, 0.0, -0.75]] * 2))
     turning_torque: float = 1e4  # enough for all of the legs' momentum
+    scale: Scale = USUAL
 
 
 @pytest.fixture(scope="session")
