@@ -59,6 +59,26 @@ def test_path_rises_over_a_wall_in_the_way():
     assert lowest_over(path, HALF, (0.23, 0.27)) > 0.2
 
 
+def test_a_narrow_way_is_taken_with_what_margin_it_leaves():
+    """A quarter of the margin is better than none; the last test is that of the path that is taken."""
+    padded = []
+
+    def narrow(centers, rotations, halves):
+        padded.append((halves[:, 0] - HALF[0]).max())
+        return halves[:, 0] - HALF[0] > 0.3 * MARGIN
+
+    assert plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), narrow).clear
+    assert padded[-1] == pytest.approx(0.25 * MARGIN)
+
+
+def test_great_heights_come_before_no_margin():
+    def only_high(centers, rotations, halves):
+        return (halves[:, 0] > HALF[0]) & (np.abs(centers[:, 0] - 0.25) < 0.05) & (centers[:, 2] < 0.3)
+
+    path = plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), only_high)
+    assert path.clear and path.positions(np.linspace(0, 1, 101))[:, 2].max() > 0.2
+
+
 def test_a_wall_too_high_leaves_no_clear_path():
     wall = '<geom type="box" size="0.02 1 1.0" pos="0.25 0 1.0"/>'
     path = plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), box_collide(world_of(wall)))

@@ -220,25 +220,23 @@ class Avoidance:
         model, data = self.model, self.data
         self.height[:] = np.inf
         for geom in np.flatnonzero(~self.static).tolist():
-            turn = data.geom_xmat[geom].reshape(3, 3)
-            middle = data.geom_xpos[geom] + turn @ model.geom_aabb[geom, :3]
-            body = int(model.geom_bodyid[geom])
-            self.height[body] = max(
-                min(self.height[body], middle[2] - np.abs(turn[2]) @ model.geom_aabb[geom, 3:]), 0.0
-            )
+            upward, body = data.geom_xmat[geom].reshape(3, 3)[2], int(model.geom_bodyid[geom])
+            lowest = data.geom_xpos[geom, 2] + upward @ model.geom_aabb[geom, :3]
+            lowest -= np.abs(upward) @ model.geom_aabb[geom, 3:]
+            self.height[body] = max(min(self.height[body], lowest), 0.0)
 
 
 def _box_pairs(model: mujoco.MjModel, static: np.ndarray) -> np.ndarray:
-    """(k, 2) int; pairs of colliding boxes whose bodies are neither fixed to each other nor parent and child."""
-    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-    boxes = np.flatnonzero(solid & (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX))
-    first, second = (boxes[index] for index in np.triu_indices(len(boxes), 1))
+    """(k, 2) int; pairs of boxes, one of them of the robot, between which MuJoCo looks for collisions."""
+    first, second = model.geom_contype, model.geom_conaffinity
+    boxes = np.flatnonzero(((first | second) != 0) & (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX))
+    own = boxes[~static[boxes]]
+    a, b = (grid.ravel() for grid in np.meshgrid(own, boxes, indexing="ij"))
+    kept = (static[b] | (a < b)) & ((first[a] & second[b] | first[b] & second[a]) != 0)
+    a, b = a[kept], b[kept]
     weld = model.body_weldid[model.geom_bodyid]
     above = model.body_weldid[model.body_parentid[weld]]
-    a, b = weld[first], weld[second]
-    joined = (a == b) | (~static[first] & (above[first] == b)) | (~static[second] & (above[second] == a))
-    masks = (model.geom_contype[first] & model.geom_conaffinity[second]) | (
-        model.geom_contype[second] & model.geom_conaffinity[first]
-    )
-    kept = (masks != 0) & ~(joined & ~static[first] & ~static[second]) & ~(static[first] & static[second])
-    return np.column_stack([first, second])[kept]
+    joined = (weld[a] == weld[b]) | (~static[b] & ((above[a] == weld[b]) | (above[b] == weld[a])))
+    bodies = np.sort([model.geom_bodyid[a], model.geom_bodyid[b]], axis=0).astype(np.int64)
+    joined |= np.isin((bodies[0] << 16) + bodies[1], model.exclude_signature)
+    return np.column_stack([a, b])[~joined]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -21,6 +22,7 @@ SPACING = 0.03  # m; largest way between two poses that are checked: less than t
 
 RAISE_STEP, MAX_RAISE = 0.03, 0.36  # m; a path is raised in these steps until it is clear, at most by MAX_RAISE
 EASY_RAISE = 0.04  # m; paths raised by more than that are first tried with the steep timing
+MARGIN_SHARES = (1.0, 0.5, 0.25)  # parts of the margin, in the order in which they are tried
 MODERATE_RAISE = 0.12  # m; higher paths come after lower ones with less margin
 
 # Windows of the crossing and the landing of feet that swing fast. The crossing takes nearly the whole swing, to keep
@@ -37,7 +39,7 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     """The least raised path that is clear; where none is, the highest one with `clear` False.
 
     Candidates are tried from the straightest to the highest. Moderate heights are tried first with the whole margin,
-    then with half of it, then with none. Great heights follow in the same way.
+    then with half and a quarter of it. Great heights follow in the same way. No margin at all is the last resort.
     """
     bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector))
     sides = _free_sides(task, collide)
@@ -46,8 +48,8 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     needed = 0.0 if not task.is_foot else abs(task.end.position[2] - task.start.position[2])
     moderate = [item for item in candidates if max(item[:2]) <= needed + moderate_raise]
     great = [item for item in candidates if max(item[:2]) > needed + moderate_raise]
-    for group in (moderate, great):
-        for share in (1.0, 0.5, 0.0):
+    for shares, groups in ((MARGIN_SHARES, (moderate, great)), ((0.0,), (moderate, great))):
+        for group, share in product(groups, shares):
             for before, after, timing in group:
                 path = _within_ankle_range(task, _path(task, before, after, timing, bump))
                 if not collide(*_swept_boxes(task, path, share * task.margin, sides)).any():
