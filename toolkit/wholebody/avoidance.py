@@ -58,7 +58,8 @@ FAR = replace(BODY, safe_world=0.035)
 """The same for motions that touched the world in execution."""
 CLOSE = replace(BODY, safe_world=0.003, safe_self=0.003, room=0.015)
 """The same for motions that are too fast to keep more than clear."""
-_HOME_SHARE = 0.5  # of a pair's distance in the home posture, where it is safe at no more than that
+_BELOW = 0.8  # least vertical part of the normal to what is below a link, as the ground is
+_SAFE_SHARE, _NOTICE_SHARE = 0.5, 0.9  # of a pair's distance at home, where it is safe and noticed at no more than that
 
 
 class _Pair(NamedTuple):
@@ -125,9 +126,10 @@ class Avoidance:
         stand = self.base if standing is None else self.body[standing]
         found = []
         for pair in self._near(reaching):
-            damper = self._damper(pair)
-            safe = self._safe(pair, damper)
-            if safe is not None and pair.distance < safe + damper.room:
+            damper, at_home = self._damper(pair), self._home_distance(pair)
+            wanted = damper.safe_world if self._of_world(pair) else damper.safe_self
+            safe = min(wanted, _SAFE_SHARE * at_home)
+            if pair.distance < min(safe + damper.room, _NOTICE_SHARE * at_home):
                 found.append((pair.distance - safe, pair, damper))
         found.sort(key=lambda item: item[0])
         found = found[:MAX_ROWS]
@@ -143,13 +145,15 @@ class Avoidance:
     def _of_world(self, pair: _Pair) -> bool:
         return bool(self.static[pair.first] or self.static[pair.second])
 
-    def _safe(self, pair: _Pair, damper: Damper) -> float | None:
-        """Wanted distance of a pair in m; None where its links touch at home, as neighbours may."""
+    def _home_distance(self, pair: _Pair) -> float:
+        """Distance in m of a pair's links at home, or of a link from the ground below; -inf where links touch."""
         if self._of_world(pair):
+            if abs(pair.normal[2]) < _BELOW:
+                return np.inf
             link = pair.second if self.static[pair.first] else pair.first
-            return min(damper.safe_world, _HOME_SHARE * float(self.height[self.model.geom_bodyid[link]]))
+            return float(self.height[self.model.geom_bodyid[link]])
         at_home = self.at_home.get(body_pair(self.model, pair.first, pair.second), np.inf)
-        return min(damper.safe_self, _HOME_SHARE * at_home) if at_home > 0.0 else None
+        return at_home if at_home > 0.0 else -np.inf
 
     def _rate(self, pair: _Pair, root: int, drift: np.ndarray) -> tuple[np.ndarray, float]:
         """(n,) derivative of a pair's distance by the joints beyond a root, and what the root's own motion adds."""
