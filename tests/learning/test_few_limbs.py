@@ -1,7 +1,7 @@
 """Robots with one arm, or with feet only: a plan, every command of the training, and a plan judged by what it made."""
 
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -30,6 +30,13 @@ ROBOTS = {
 }
 
 
+@dataclass(frozen=True)
+class Small(CollectConfig):
+    per_shard: int = 8
+    paper_share: float = 0.8
+    most_worlds: int = 30
+
+
 @pytest.mark.parametrize("name", ["feet_only", "left_arm", pytest.param("right_arm", marks=pytest.mark.slow)])
 def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
     model, toml = ROBOTS[name]
@@ -51,9 +58,7 @@ def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
 
     # Few samples, made in this process; the commands themselves are as they are.
     monkeypatch.setattr(jobs, "executor", lambda workers, cluster, unencrypted: ThreadPoolExecutor(1))
-    monkeypatch.setattr(
-        collect_config, "CollectConfig", partial(CollectConfig, per_shard=8, paper_share=0.8, most_worlds=30)
-    )
+    monkeypatch.setattr(collect_config, "CollectConfig", Small)
     monkeypatch.setattr(fit, "MINIMUM", 3)
     data = str(tmp_path / "data")
     assert trained("collect", "--out", data, "--samples", "8") == 0
