@@ -29,6 +29,8 @@ LARGEST = 2**31 - 1
 """Largest count that a command accepts, and the largest seed: what every library behind it can hold."""
 
 
+_PERSISTENCE = 5  # times the limit on expansions that a search without a solution has
+
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """How many threads a library of matrix products takes: one, since more of them change a result's last digits, and the
 matrices are small."""
@@ -120,8 +122,8 @@ def add_planning_options(target: argparse.ArgumentParser) -> None:
         type=positive(int),
         default=1000,
         metavar="N",
-        help="states that the search expands at most, whatever the time (ten times as many where feet have to "
-        "slide); reproducible (default: %(default)s)",
+        help="states that the search expands at most, whatever the time (five times as many while nothing is found, "
+        "ten times where feet have to slide); reproducible (default: %(default)s)",
     )
     target.add_argument("--no-palms", action="store_true", help="plan with the feet alone")
     target.add_argument("--steps", type=int, choices=(38, 60), default=60, help="foot transition model (default: 60)")
@@ -178,7 +180,7 @@ class PlanningOptions:
             palms=not self.no_palms,
             heuristic=self.heuristic,
             timings=self.timing,
-            search=AnaStarConfig(max_expansions=self.expansions),
+            search=AnaStarConfig(max_expansions=self.expansions, persistence=_PERSISTENCE),
         )
 
 

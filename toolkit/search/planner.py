@@ -119,8 +119,11 @@ class ContactPlanner:
         blame = Blame(exclusions, _STRIKES)
         parts = self._parts(way, strategy, timings, tally, blame.exclusions, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
-        unit = parts.cost.per_metre
-        searches = [(ContactProblem(parts, state), replace(strategy.patient, unit=unit))]
+        unit, may_yield = parts.cost.per_metre, self.timings(calmer + 1, slides=way.slides) != timings
+        patient = replace(strategy.patient, unit=unit)
+        if may_yield or way.slides:  # a calmer search follows, or the strategy has extended the limit
+            patient = replace(patient, persistence=1)
+        searches = [(ContactProblem(parts, state), patient)]
         if strategy.hasty is not None:  # a sequence that begins with the right foot often mirrors one that does not
             hasty = replace(strategy.hasty, unit=unit)
             searches.insert(0, (ContactProblem(parts, moved_last(state, Limb.RIGHT_FOOT)), hasty))
@@ -140,7 +143,7 @@ class ContactPlanner:
             reason="" if result.paths else self._reason(result, tally),
             warning=_UNTRAINED if tally.untrained else "",
             slides=way.slides,
-            may_yield=self.timings(calmer + 1, slides=way.slides) != timings,
+            may_yield=may_yield,
             screen=parts.screen,
         )
 
@@ -190,7 +193,7 @@ class ContactPlanner:
         return Parts(table, reader, candidates, at_once, waiting, cost, delay, tally, screen)
 
     def _reason(self, result: AnaStarResult[bytes], tally: Tally) -> str:
-        limit = self.config.search.max_expansions  # the setting, not the multiple of it that the strategy allows
+        limit = self.config.search.max_expansions  # the setting, not the multiple of it that was allowed
         expansions = limit if result.stopped_by == "expansions" and limit is not None else result.expansions
         return reason_of(result.stopped_by, result.seconds, expansions, tally.rejected, self._evaluator.rejection)
 

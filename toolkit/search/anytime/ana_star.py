@@ -50,6 +50,7 @@ class AnaStarConfig:
             there is no solution it grows by the same amount with every `patience` expansions.
         patience: See `crowding`.
         max_expansions: Limit on the expansions; None: no limit.
+        persistence: Multiple of that limit up to which a search without solution goes on where no other one follows.
         first_only: Whether the first solution ends the search.
         unit: A cost that matters little beside that of a whole path, such as the least cost of 1 m of way.
     """
@@ -60,6 +61,7 @@ class AnaStarConfig:
     crowding: float = 0.04
     patience: int = 200
     max_expansions: int | None = None
+    persistence: int = 1
     first_only: bool = False
     unit: float = 1.0
 
@@ -133,6 +135,7 @@ class AnaStar(Generic[State]):
         """
         began = time.perf_counter()
         config, paths, expanded = self._config, [], []
+        most = config.max_expansions
         start = self._problem.start()
         reported = 0.0
         if self._problem.is_goal([start])[0]:
@@ -148,7 +151,7 @@ class AnaStar(Generic[State]):
                 stopped_by = "time"
             elif config.first_only and paths:
                 stopped_by = "solution"
-            elif config.max_expansions is not None and len(expanded) >= config.max_expansions:
+            elif most is not None and len(expanded) >= (most if paths else config.persistence * most):
                 stopped_by = "expansions"
             elif len(self._edge) >= _MAX_STATES:
                 stopped_by = "memory"
