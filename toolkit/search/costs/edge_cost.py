@@ -21,7 +21,7 @@ from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
 from toolkit.world.world import Goal
 
-_LEAST_RESERVE = 0.15  # part of the friction; contacts that barely hold, or slide, cost no more than those with so much left
+_LEAST_RESERVE = 0.15  # part of the friction; a contact that leaves less costs no more than one that leaves so much
 _SURE = 0.98  # part of the least momentum's cost that is counted: the objective takes it at the ends of steps
 _LEAN = 0.3  # m for a body of the usual size; by so much less than the mean of the feet the CoM may move
 _RESTS = 1.4  # s; at both ends of a plan, in which it may move too
