@@ -27,12 +27,14 @@ class Kind:
         options: of the generator.
         random: whether a seed makes another world; else it only seeds the planner.
         ranges: of options that the seed draws, uniformly.
+        few: whether `AUTHORED_TRIALS` seeds are enough, although a seed makes another world.
     """
 
     generator: str = ""
     options: dict[str, float] = field(default_factory=dict)
     random: bool = False
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
+    few: bool = False
 
 
 KINDS = {
@@ -55,13 +57,27 @@ DRAWN = {
 }
 """Kinds of which every seed makes another world."""
 
+_FRICTION_ANGLE = 26.565  # deg; of the friction 0.5 that slopes have
+SCALED = {
+    "rubble_field": KINDS["rubble_field"],
+    "rubble_corridor": KINDS["rubble_corridor"],
+    "generated_stairs": Kind("stairs"),
+    "generated_stones": Kind("stepping_stones", random=True, few=True),
+    "generated_mesh": Kind("mesh_patches", random=True, few=True),
+    "wide_gap": KINDS["wide_gap"],
+    "resting_slope": Kind("slope", {"angle": _FRICTION_ANGLE - 3.0}),
+    "rubble_field_20": Kind("rubble_field", {"tilt": 20.0}, random=True, few=True),
+    "rubble_corridor_20": Kind("rubble_corridor", {"tilt": 20.0}, random=True, few=True),
+}
+"""Kinds for any robot, to the scale of its legs; tiles are as its ankles follow, or up to 20 deg as the paper's."""
+
 
 @dataclass(frozen=True)
 class Case:
     """One world and one seed.
 
     Attributes:
-        kind: a key of `KINDS` or `DRAWN`, or the name of a file in worlds/ without its ending.
+        kind: a key of `KINDS`, `DRAWN` or `SCALED`, or the name of a file in worlds/ without its ending.
         seed: of the world where it is random, and of everything that the run draws.
         options: of the generator, beyond those of the kind.
         fit: what the terrain has to be like for the robot; files in worlds/ stay as they are.
@@ -99,7 +115,7 @@ def kind_of(name: str) -> Kind:
     Raises:
         InputError: there is none.
     """
-    known = {**KINDS, **DRAWN}
+    known = {**KINDS, **DRAWN, **SCALED}
     if name in known:
         return known[name]
     files = sorted(path.stem for path in WORLDS.glob("*.xml"))
@@ -109,9 +125,10 @@ def kind_of(name: str) -> Kind:
 
 
 def make_cases(kinds: Sequence[str], trials: int, seed_offset: int, fit: Fit | None = None) -> list[Case]:
-    """Cases of several kinds: `trials` seeds of a random one, at most `AUTHORED_TRIALS` of any other."""
+    """Cases of several kinds: `trials` seeds of a random one, `AUTHORED_TRIALS` at most where few are enough."""
     cases = []
     for kind in kinds:
-        count = trials if kind_of(kind).random else min(trials, AUTHORED_TRIALS)
+        many = kind_of(kind).random and not kind_of(kind).few
+        count = trials if many else min(trials, AUTHORED_TRIALS)
         cases += [Case(kind, seed_offset + index, fit=fit or Fit()) for index in range(count)]
     return cases

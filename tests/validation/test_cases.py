@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from toolkit.errors import InputError
-from validation.cases import AUTHORED_TRIALS, DRAWN, KINDS, WORLDS, Case, kind_of, make_cases
+from validation.cases import AUTHORED_TRIALS, DRAWN, KINDS, SCALED, WORLDS, Case, kind_of, make_cases
 
 
-@pytest.mark.parametrize("kind", sorted({*KINDS, *DRAWN}))
+@pytest.mark.parametrize("kind", sorted({*KINDS, *DRAWN, *SCALED}))
 def test_every_kind_makes_a_world(kind):
     case = Case(kind, 3)
     world = case.world()

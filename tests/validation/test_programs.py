@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from validation import ablation, budgets, calibration, execution, options, planning, robustness, sequences
+from validation import ablation, bodies, budgets, calibration, execution, options, planning, robustness, sequences
 from validation.run_trial import shown
 
 
@@ -22,7 +22,7 @@ def result(folders: list[str], name: str) -> dict:
 
 @pytest.mark.parametrize(
     "module",
-    [ablation, budgets, calibration, execution, planning, robustness, sequences],
+    [ablation, bodies, budgets, calibration, execution, planning, robustness, sequences],
     ids=lambda module: module.__name__,
 )
 def test_an_unknown_kind_of_world_is_refused_before_anything_runs(module, folders):
