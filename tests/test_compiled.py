@@ -155,7 +155,7 @@ table = SurfaceTable(
 _fill(table, np.array([[0.0, 0.2, 0.1, 0.2]]), zero, np.array([[0, 1, 0, 1]]), 0.16, zero.copy())
 
 ranges = np.tile([-9.0, 9.0], (2, len(LIMITS), 1))
-legs = Legs(np.zeros((2, 3)), np.zeros((2, 3)), np.full((2, 2), 0.4), ranges)
+legs = Legs(np.zeros((2, 3)), np.zeros((2, 3)), np.full((2, 2), 0.4), ranges, np.array([-1.0, 1.0]))
 reason, _ = reach(legs, 0, (0.0, 0.0, 0.7), 0.0, np.zeros(3), np.eye(3))
 
 codes = np.empty(1, np.int64)

@@ -55,6 +55,7 @@ def test_a_lower_com_brings_long_strides_into_reach():
 def test_legs_in_each_others_way_are_no_stance():
     robot = load_robot(OWN[0])
     legs, shanks = legs_of(robot, ReachMargins(ankle=0.0, hip=-0.5)), shanks_of(robot)
+    legs = legs._replace(toes=np.array([-np.pi, np.pi]))
     com, drop = np.array([[0.0, 0.0, robot.com_height]]), np.array([0.1])
 
     def verdict(turn, apart):
@@ -63,3 +64,17 @@ def test_legs_in_each_others_way_are_no_stance():
         return int(stances_violated(legs, shanks, com, drop, np.zeros(1), left, turns[0], right, turns[1])[0])
 
     assert verdict(0.0, 0.2) == 0 and verdict(0.5, 0.24) == Reason.KNEES and verdict(0.5, 0.5) == 0
+
+
+def test_feet_turned_towards_each_other_need_the_yaw_of_both_hips():
+    robot = load_robot(OWN[0])
+    legs, shanks = legs_of(robot, ReachMargins(ankle=0.0, hip=-0.1)), shanks_of(robot)
+    com, drop = np.array([[0.0, 0.0, robot.com_height]]), np.array([0.05])
+    most = robot.legs[FEET[1]].ranges["hip_yaw"][1] - robot.legs[FEET[0]].ranges["hip_yaw"][0]
+
+    def verdict(inwards):
+        left, right = (np.array([[0.0, sign * 0.2, 0.0]]) for sign in (1, -1))
+        turns = [rotation_about_z(np.array([-sign * inwards / 2])) for sign in (1, -1)]
+        return int(stances_violated(legs, shanks, com, drop, np.zeros(1), left, turns[0], right, turns[1])[0])
+
+    assert verdict(most - 0.05) == 0 and verdict(most + 0.05) == Reason.HIP_YAW

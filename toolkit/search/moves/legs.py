@@ -34,23 +34,28 @@ class Legs(NamedTuple):
         ankle: (2, 3) m; ankles in the sole's frame.
         links: (2, 2) m; lengths of thigh and shin.
         ranges: (2, k, 2) m or rad; least and greatest values in the order of `LIMITS`.
+        toes: (2,) rad; least and greatest heading of the left sole less that of the right one. The base turns between
+            the feet as it likes, so that only both hips' yaw together bounds them.
     """
 
     hip: np.ndarray
     ankle: np.ndarray
     links: np.ndarray
     ranges: np.ndarray
+    toes: np.ndarray
 
 
 def legs_of(robot: RobotModel, margins: ReachMargins) -> Legs:
     """Arrays of a robot's legs, whose ranges are narrower than the limits by the margins."""
     legs = [robot.legs[limb] for limb in FEET]
+    left, right = (leg.ranges["hip_yaw"] for leg in legs)
     inward = np.array([[getattr(margins, limit.margin)] for limit in LIMITS]) * [1.0, -1.0]
     return Legs(
         hip=np.array([leg.hip_in_com for leg in legs]),
         ankle=np.array([leg.ankle_in_sole for leg in legs]),
         links=np.array([[leg.thigh, leg.shin] for leg in legs]),
         ranges=np.array([[limit.range_of(leg) for limit in LIMITS] + inward for leg in legs]),
+        toes=np.array([left[0] - right[1], left[1] - right[0]]),
     )
 
 
@@ -76,6 +81,12 @@ def reach(legs, side, com, yaw, position, rotation):
     return 0, points
 
 
+@compiled
+def _heading(rotation):
+    """Heading in rad of a sole with the rotation (3, 3)."""
+    return np.arctan2(rotation[1, 0], rotation[0, 0])
+
+
 @compiled(kept=True)
 def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, right_rotation):
     """(n,) int; why the legs cannot take each of n stances with the first drop, 0 where they can with some drop.
@@ -85,6 +96,11 @@ def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, 
     """
     result = np.zeros(len(com), np.int64)
     for row in range(len(com)):
+        toes = _heading(left_rotation[row]) - _heading(right_rotation[row])
+        toes = (toes + np.pi) % (2.0 * np.pi) - np.pi
+        if toes < legs.toes[0] or toes > legs.toes[1]:
+            result[row] = Reason.HIP_YAW
+            continue
         for k in range(len(drops)):
             place = (com[row, 0], com[row, 1], com[row, 2] - drops[k])
             reason, a = reach(legs, 0, place, yaw[row], left[row], left_rotation[row])
