@@ -22,7 +22,15 @@ from toolkit.learning.dataset import (
 from toolkit.learning.evaluate import balanced, score
 from toolkit.learning.samples import PARTS, Samples, Split
 from toolkit.prediction.features import feature_size
-from toolkit.prediction.network import OBJECTIVE_SCALE, load_network, network_path, training_summary
+from toolkit.prediction.network import (
+    OBJECTIVE_SCALE,
+    Perceptron,
+    load_network,
+    network_path,
+    restored,
+    stored,
+    training_summary,
+)
 from toolkit.prediction.networks import NetworkEvaluator
 
 CATEGORY = Category.BREAK_ONLY_PALM
@@ -203,3 +211,22 @@ def test_notes_on_the_training_that_are_no_json_are_refused(saved, notes):
     save_file(values, path, METADATA | {"training": notes})
     with pytest.raises(NetworkError, match="no JSON"):
         training_summary(load_network(path, CATEGORY, "abc"))
+
+
+def test_weights_in_half_precision_hardly_change_a_network():
+    rng, size = np.random.default_rng(2), 20
+    widths = [size, 64, 64, 64, 7]
+    lower = rng.normal(scale=5.0, size=size).astype(np.float32)
+    upper = lower + np.exp(rng.uniform(-6.0, 3.0, size)).astype(np.float32)
+    upper[3] = lower[3]
+    inputs = rng.uniform(lower, upper, (200, size)).astype(np.float32)
+    pairs = zip(widths, widths[1:], strict=False)
+    weights = [rng.normal(size=pair).astype(np.float32) / np.float32(np.sqrt(pair[0])) for pair in pairs]
+    spread = np.where(upper > lower, upper - lower, 1.0)[:, None]
+    weights[0] /= spread.astype(np.float32)
+    biases = [rng.normal(size=width).astype(np.float32) for width in widths[1:]]
+    biases[0] -= (lower + upper) / 2 @ weights[0]
+    net = Perceptron(tuple(weights), tuple(biases))
+    half = stored(net, lower, upper)
+    assert all(weight.dtype == np.float16 for weight in half.weights)
+    np.testing.assert_allclose(restored(half, lower, upper)(inputs), net(inputs), atol=0.01)

@@ -72,11 +72,12 @@ def test_a_file_holds_what_was_trained(tmp_path, trained):
     assert {state[0] for state in seen} == {"classifier", "regressor"} == set(curves)
     network = load_network(network_path(tmp_path, CATEGORY), CATEGORY, "abc")
     features = samples(50, seed=3).features
-    np.testing.assert_array_equal(network.predict(features), trained.predict(features))
-    np.testing.assert_array_equal(network.feasible(features), trained.feasible(features))
+    found, wanted = network.predict(features), trained.predict(features)  # files hold half precision
+    np.testing.assert_allclose(found, wanted, rtol=0.02, atol=0.002)
+    assert (network.feasible(features) == trained.feasible(features)).mean() >= 0.98
     np.testing.assert_array_equal(network.upper, samples().features.max(0))
     assert training_summary(network)["samples"] == 2500
-    assert network_path(tmp_path, CATEGORY).stat().st_size < 1.5e6  # ten of them in 15 MB
+    assert network_path(tmp_path, CATEGORY).stat().st_size < 0.6e6  # ten of them in 6 MB
 
 
 def test_only_known_outcomes_are_learnt():

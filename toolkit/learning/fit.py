@@ -27,6 +27,7 @@ from toolkit.prediction.network import (
     load_network,
     network_path,
     outcome,
+    stored,
     training_summary,
 )
 
@@ -194,14 +195,17 @@ def fit_category(
         kept = load_network(path, category, fingerprint)
         classifier, start, before = kept.classifier, kept.regressor if refine else None, training_summary(kept)
     trained = train_networks(samples, config, progress, classifier=classifier, start=start)
+    lower, upper = samples.features.min(0), samples.features.max(0)
     tensors = {
         f"{name}.{layer}.{part}": array
-        for name, net in (("classifier", trained.classifier), ("regressor", trained.regressor))
+        for name, net in (
+            ("classifier", stored(trained.classifier, lower, upper)),
+            ("regressor", stored(trained.regressor, lower, upper)),
+        )
         for part, arrays in (("weight", net.weights), ("bias", net.biases))
         for layer, array in enumerate(arrays)
     }
-    tensors["features.lower"] = samples.features.min(0)
-    tensors["features.upper"] = samples.features.max(0)
+    tensors["features.lower"], tensors["features.upper"] = lower, upper
     metadata = {
         "schema": SCHEMA,
         "category": str(int(category)),

@@ -14,7 +14,7 @@ from toolkit.contacts.category import Category
 from toolkit.errors import NetworkError
 from toolkit.prediction.features import COM, TARGETS, TIMING_AND_FRICTION, feature_size
 
-SCHEMA = "transition-network-3"
+SCHEMA = "transition-network-4"
 HIDDEN = 256
 LAYERS = 4  # three hidden ones and the output
 OBJECTIVE_SCALE = 30.0  # objectives below it are learnt in proportion to themselves, larger ones to their logarithm
@@ -40,6 +40,34 @@ class Perceptron:
             x += bias
             np.maximum(x, 0.0, out=x)
         return x @ self.weights[-1] + self.biases[-1]
+
+
+def stored(net: Perceptron, lower: np.ndarray, upper: np.ndarray) -> Perceptron:
+    """A perceptron as files hold it: weights in half precision, those of the first layer for inputs within -1 and 1.
+
+    Args:
+        net: The perceptron.
+        lower: (d,) least inputs of the training.
+        upper: (d,) greatest ones.
+    """
+    centre, reach = _middle(lower, upper)
+    first, bias = net.weights[0] * reach[:, None], net.biases[0] + centre @ net.weights[0]
+    weights = [weight.astype(np.float16) for weight in (first, *net.weights[1:])]
+    return Perceptron(tuple(weights), (bias.astype(np.float32), *net.biases[1:]))
+
+
+def restored(net: Perceptron, lower: np.ndarray, upper: np.ndarray) -> Perceptron:
+    """The perceptron of one that was `stored`."""
+    centre, reach = _middle(lower, upper)
+    weights = [weight.astype(np.float32) for weight in net.weights]
+    weights[0] /= reach[:, None]
+    return Perceptron(tuple(weights), (net.biases[0] - centre @ weights[0], *net.biases[1:]))
+
+
+def _middle(lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Middle and half width of ranges; 1 where there is no width."""
+    reach = (upper - lower) / 2
+    return (lower + upper) / 2, np.where(reach > 0.0, reach, 1.0).astype(np.float32)
 
 
 def feasibility(classifier: Perceptron, features: np.ndarray) -> np.ndarray:
@@ -139,6 +167,7 @@ def load_network(path: Path, category: Category, fingerprint: str) -> Transition
         if metadata.get(key) != value:
             raise NetworkError(f"{path}: {key} is {metadata.get(key)!r}, expected {value!r}; {remedy}")
     size = feature_size(category)
+    lower, upper = (_tensor(path, tensors, f"features.{name}", (size,)) for name in ("lower", "upper"))
     parts = []
     for name, outputs in (("classifier", 1), ("regressor", TARGETS)):
         widths = [size, *[HIDDEN] * (LAYERS - 1), outputs]
@@ -146,8 +175,7 @@ def load_network(path: Path, category: Category, fingerprint: str) -> Transition
         for layer in range(LAYERS):
             weights.append(_tensor(path, tensors, f"{name}.{layer}.weight", (widths[layer], widths[layer + 1])))
             biases.append(_tensor(path, tensors, f"{name}.{layer}.bias", (widths[layer + 1],)))
-        parts.append(Perceptron(tuple(weights), tuple(biases)))
-    lower, upper = (_tensor(path, tensors, f"features.{name}", (size,)) for name in ("lower", "upper"))
+        parts.append(restored(Perceptron(tuple(weights), tuple(biases)), lower, upper))
     return TransitionNetwork(category, parts[0], parts[1], lower, upper, metadata)
 
 
