@@ -30,6 +30,8 @@ class LimbModel:
         body: Name of the body that carries the site.
         half_size: Half extents (2,) float of the patch along x and y of the site, m.
         max_normal_force: Largest normal force, N; inf if only friction and weight bound it.
+        rolls: Whether a foot rolls about the x axis of its site while it is in contact, because its leg has no ankle
+            roll: its patch is a line, along which all force acts.
     """
 
     limb: Limb
@@ -37,6 +39,7 @@ class LimbModel:
     body: str
     half_size: np.ndarray
     max_normal_force: float = float("inf")
+    rolls: bool = False
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,8 @@ class LegGeometry:
         thigh, shin: Lengths of the two links, m.
         min_length, max_length: Distances from hip to ankle that the knee allows, with a margin to the straight leg, m.
         ranges: Joint limits (lower, upper) in rad by role: hip_yaw, hip_roll, hip_pitch, knee, ankle_pitch, ankle_roll.
-            Signs: roll about x, pitch about y, yaw about z of the base or sole; a flexed knee is positive.
+            Signs: roll about x, pitch about y, yaw about z of the base or sole; a flexed knee is positive. The ankle
+            roll of a sole that rolls is how far its shapes let it roll.
         torques: Torque limits by the same roles, N m.
     """
 
