@@ -144,7 +144,7 @@ class Controller:
             urgent: Cones(
                 min(1.0 + NESTING * (margins.friction - 1.0), MAX_FRICTION),
                 min(1.0 + NESTING * (margins.yaw - 1.0), MAX_YAW),
-                robot.half_sizes - shrink * np.minimum(margins.cop, robot.half_sizes / 2.0),
+                robot.bearings - shrink * np.minimum(margins.cop, robot.bearings / 2.0),
             )
             for urgent, shrink in ((False, NESTING), (True, URGENT_NESTING))
         }

@@ -17,6 +17,8 @@ from toolkit.robot.scale import Scale
 
 _LATERAL = 0.5  # least |cosine| between the axis of a joint that turns about the lateral axis and that axis
 _SHOULDER = 3  # joints of a shoulder
+LINE = 0.002
+"""m; half the width of the line on which a sole that rolls stands: its edge is round by about as much."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class LimbModel:
         half_size: Half extents (2,) float of the patch along x and y of the site, m.
         max_normal_force: Largest normal force, N; inf if only friction and weight bound it.
         rolls: Whether a foot rolls about the x axis of its site while it is in contact, because its leg has no ankle
-            roll: its patch is a line, along which all force acts.
+            roll. It stands on the line along that axis, and its patch is only the room that it takes.
     """
 
     limb: Limb
@@ -40,6 +42,11 @@ class LimbModel:
     half_size: np.ndarray
     max_normal_force: float = float("inf")
     rolls: bool = False
+
+    @property
+    def bearing(self) -> np.ndarray:
+        """Half extents (2,) float of the part of the patch on which the centre of pressure can be, m."""
+        return np.array([self.half_size[0], LINE]) if self.rolls else self.half_size
 
 
 @dataclass(frozen=True)
@@ -158,6 +165,14 @@ class RobotModel:
     def half_sizes(self) -> np.ndarray:
         """Half extents (4, 2) float of the patches by limb, m; zeros for a limb that the robot does not have."""
         return half_sizes_of(self.limbs)
+
+    @property
+    def bearings(self) -> np.ndarray:
+        """Half extents (4, 2) float by limb within which the centre of pressure can be, m; zeros for a missing limb."""
+        sizes = np.zeros((4, 2))
+        for limb, model in self.limbs.items():
+            sizes[limb] = model.bearing
+        return sizes
 
     @property
     def scale(self) -> Scale:

@@ -12,7 +12,6 @@ from toolkit.robot.chain import joints_to
 from toolkit.robot.mend import geom_spheres
 
 JOINTS = 5  # of a leg without ankle roll
-WIDEST = 0.02  # m; a patch is a line where it is no wider
 SINK = 0.003  # m; how deep another part of the foot may reach below its line
 _MOST = 0.6  # rad; no sole rolls farther
 _STEP = 0.005  # rad; resolution of the range
