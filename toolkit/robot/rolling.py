@@ -13,6 +13,7 @@ from toolkit.robot.mend import geom_spheres
 
 JOINTS = 5  # of a leg without ankle roll
 SINK = 0.003  # m; how deep another part of the foot may reach below its line
+LEAST = 0.2  # rad; what a sole has to roll by, so that the CoM can sway from one foot to the other
 _MOST = 0.6  # rad; no sole rolls farther
 _STEP = 0.005  # rad; resolution of the range
 
@@ -28,7 +29,7 @@ def rolling_range(model: mujoco.MjModel, limb: Limb) -> tuple[float, float]:
     The sign is that of an ankle's roll: positive where the leg leans to the left, and the foot's left side goes down.
 
     Raises:
-        RobotError: The foot lies flat on its shapes, so that it cannot roll.
+        RobotError: Another part of the foot reaches below the patch, or the foot lies flat, so that it cannot roll.
     """
     centres, radii = _spheres(model, limb)
     angles = np.arange(-_MOST, _MOST + _STEP / 2, _STEP)
@@ -42,6 +43,12 @@ def rolling_range(model: mujoco.MjModel, limb: Limb) -> tuple[float, float]:
         low -= 1
     while high < len(angles) - 1 and free[high + 1]:
         high += 1
+    if angles[high] - angles[low] < LEAST:
+        raise RobotError(
+            f"{limb.label}: the leg has no ankle roll, so its foot has to roll on the ground, but on the x axis of its "
+            f"patch it rolls by {np.degrees(angles[high] - angles[low]):.0f}° only (at least {np.degrees(LEAST):.0f}°); "
+            "put the patch on the edge or the line of the foot that stays on the ground, or unlock the ankle"
+        )
     return float(angles[low]), float(angles[high])
 
 
