@@ -289,7 +289,7 @@ BAD_TOML = {
     ),
     "locked hip": (
         "[limbs.left_foot]", '[model.locked_joints]\n"*_hip_yaw" = 0.0\n[limbs.left_foot]',
-        "left_foot: the leg must be hip yaw, roll and pitch in any order, knee pitch, ankle pitch and roll in any order",
+        "left_foot: the leg must be hip yaw, roll and pitch in any order, knee pitch, ankle pitch and",
     ),
     "NaN in a table": ("[limits.velocity]", "[declared]\nmass = [1.0, nan]\n[limits.velocity]",
         "'declared.mass.1' = nan must be a finite number up to 1e+09",

@@ -149,7 +149,9 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
             mass=float(model.body_subtreemass[1]),
             com_height=float(data.subtree_com[1, 2]),
             limbs={
-                limb: LimbModel(limb, limb.label, assembly.bodies[limb], item.patch / 2, item.max_force, sole_rolls(model, limb))
+                limb: LimbModel(
+                    limb, limb.label, assembly.bodies[limb], item.patch / 2, item.max_force, sole_rolls(model, limb)
+                )
                 for limb, item in description.limbs.items()
             },
             legs=legs,

@@ -43,13 +43,14 @@ def rolling_range(model: mujoco.MjModel, limb: Limb) -> tuple[float, float]:
         low -= 1
     while high < len(angles) - 1 and free[high + 1]:
         high += 1
-    if angles[high] - angles[low] < LEAST:
+    least, found = angles[low], angles[high]
+    if found - least < LEAST:
         raise RobotError(
             f"{limb.label}: the leg has no ankle roll, so its foot has to roll on the ground, but on the x axis of its "
-            f"patch it rolls by {np.degrees(angles[high] - angles[low]):.0f}° only (at least {np.degrees(LEAST):.0f}°); "
+            f"patch it rolls by {np.degrees(found - least):.0f}° only (at least {np.degrees(LEAST):.0f}°); "
             "put the patch on the edge or the line of the foot that stays on the ground, or unlock the ankle"
         )
-    return float(angles[low]), float(angles[high])
+    return float(least), float(found)
 
 
 def _spheres(model: mujoco.MjModel, limb: Limb) -> tuple[np.ndarray, np.ndarray]:
