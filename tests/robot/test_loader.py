@@ -285,7 +285,11 @@ BAD_TOML = {
     ),
     "locked leg": (
         "[limbs.left_foot]", '[model.locked_joints]\n"*_ankle_roll" = 0.0\n[limbs.left_foot]',
-        "left_foot: the leg must be hip yaw, roll and pitch in any order",
+        "left_foot: the leg has no ankle roll, so its foot has to roll on the ground, but",
+    ),
+    "locked hip": (
+        "[limbs.left_foot]", '[model.locked_joints]\n"*_hip_yaw" = 0.0\n[limbs.left_foot]',
+        "left_foot: the leg must be hip yaw, roll and pitch in any order, knee pitch, ankle pitch and",
     ),
     "NaN in a table": ("[limits.velocity]", "[declared]\nmass = [1.0, nan]\n[limits.velocity]",
         "'declared.mass.1' = nan must be a finite number up to 1e+09",

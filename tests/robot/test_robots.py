@@ -12,7 +12,7 @@ import placo
 import pytest
 
 from tests.shipped_robots import EVERY, loaded
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.description import FILE_NAME, RobotDescription, read_description
 from toolkit.robot.model import RobotModel
 from toolkit.robot.picture import standing_scene
@@ -103,7 +103,10 @@ def test_home_stands_on_its_soles(robot: RobotModel) -> None:
     data, model = home_data(robot), robot.mujoco_model
     feet = [data.site(robot.limbs[foot].site) for foot in robot.legs]
     np.testing.assert_allclose([foot.xpos[2] for foot in feet], 0, atol=3e-3)
-    np.testing.assert_allclose([foot.xmat[8] for foot in feet], 1, atol=1e-3)
+    level = [
+        foot.xmat[6] if robot.limbs[limb].rolls else 1 - foot.xmat[8] for limb, foot in zip(FEET, feet, strict=True)
+    ]
+    np.testing.assert_allclose(level, 0, atol=1e-3)
     np.testing.assert_allclose(np.mean([foot.xpos for foot in feet], 0), 0, atol=1e-9)
     assert feet[0].xpos[1] > feet[1].xpos[1]
     assert data.subtree_com[1, 2] == pytest.approx(robot.com_height, abs=1e-12)
@@ -125,7 +128,7 @@ def test_nothing_is_lower_than_the_soles(robot: RobotModel) -> None:
 
 
 def test_patches_lie_on_shapes(robot: RobotModel) -> None:
-    """The corners of every patch touch a collision shape of its body, and none of them sticks out beyond."""
+    """The corners of every patch, or the ends of its line, touch a collision shape of its body."""
     model = mujoco.MjModel.from_xml_string(robot.mjcf, robot.assets)
     model.geom_group[:] = np.where(model.geom_contype | model.geom_conaffinity, 0, 5)  # what is only drawn is left out
     data = mujoco.MjData(model)
@@ -135,7 +138,7 @@ def test_patches_lie_on_shapes(robot: RobotModel) -> None:
     for limb, item in robot.limbs.items():
         site, body = data.site(item.site), model.body(item.body).id
         rotation = site.xmat.reshape(3, 3)
-        for x, y in ((0.9, 0.9), (0.9, -0.9), (-0.9, 0.9), (-0.9, -0.9)):
+        for x, y in ((1, 0), (-1, 0)) if item.rolls else ((0.9, 0.9), (0.9, -0.9), (-0.9, 0.9), (-0.9, -0.9)):
             corner = site.xpos + rotation @ np.array([x, y, 0] * np.append(item.half_size, 0))
             outside = corner - 0.05 * rotation[:, 2]  # a ray from the touched surface into the limb
             hit = np.zeros(1, np.int32)

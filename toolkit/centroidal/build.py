@@ -196,7 +196,7 @@ def _problem(
     half_size, force = np.zeros((4, 2)), np.zeros(4)
     bound = config.max_normal_force * robot.mass * STANDARD_GRAVITY
     for limb, model in robot.limbs.items():
-        half_size[limb] = model.half_size
+        half_size[limb] = model.bearing
         force[limb] = min(model.max_normal_force, bound)
         if limb.is_foot:
             leg = robot.legs[limb]

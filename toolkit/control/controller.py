@@ -144,7 +144,7 @@ class Controller:
             urgent: Cones(
                 min(1.0 + NESTING * (margins.friction - 1.0), MAX_FRICTION),
                 min(1.0 + NESTING * (margins.yaw - 1.0), MAX_YAW),
-                robot.half_sizes - shrink * np.minimum(margins.cop, robot.half_sizes / 2.0),
+                robot.bearings - shrink * np.minimum(margins.cop, robot.bearings / 2.0),
             )
             for urgent, shrink in ((False, NESTING), (True, URGENT_NESTING))
         }
@@ -170,6 +170,7 @@ class Controller:
         patches' normals.
         """
         self.dynamics.update(qpos, qvel)
+        self.dynamics.roll_soles(self._reference.limb_rotation[index, :, :, 2])
         self.tracker.update(float(self._reference.times[index]), self._period, normal_force)
         self._com[:], self._com_velocity[:] = self._reference.com[index], self._reference.com_velocity[index]
         self.aim.follow(self._reference, index)
@@ -266,10 +267,13 @@ class Controller:
         share = 1.0 if self.tracker.in_contact[limb] else targets.authority[limb]
         rows = self._append(limb, slice(0, 3), linear, share, rows)
         rows = self._append(limb, slice(3, 6), angular, share, rows)
-        if limb.is_foot or self.tracker.in_contact[limb]:
+        if self._robot.limbs[limb].rolls:
+            axes = slice(1, 3)  # the leg rolls the sole, in contact and in the air
+        elif limb.is_foot or self.tracker.in_contact[limb]:
             return rows
-        # In the air a palm may turn about the normal as its arm likes: only its two other axes are rows.
-        last, tilt = slice(rows - 3, rows), dynamics.limb_rotation[limb, :, :2].T
+        else:
+            axes = slice(0, 2)  # in the air a palm may turn about the normal as its arm likes
+        last, tilt = slice(rows - 3, rows), dynamics.limb_rotation[limb, :, axes].T
         self._tasks[rows - 3 : rows - 1] = tilt @ self._tasks[last]
         self._wanted[rows - 3 : rows - 1] = tilt @ self._wanted[last]
         return rows - 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from toolkit.geometry.pose import rolled_onto
 from toolkit.robot.model import RobotModel
 
 
@@ -25,6 +26,7 @@ class RobotDynamics:
         nv: Number of degrees of freedom, 6 + n.
         mass: Mass in kg.
         limbs: The limbs that the robot has.
+        rolling: Those of them whose soles roll.
         mass_matrix, bias: (nv, nv), and (nv,) Coriolis and gravity forces less passive joint forces.
         jacobian, drift: (4, 6, nv) of the linear, then angular velocity of each limb's site in the world, and (4, 6)
             dJ/dt v. Both are zero for missing limbs.
@@ -43,6 +45,7 @@ class RobotDynamics:
         self.mass = float(model.body_subtreemass[self._base])
         self.gravity = np.array(model.opt.gravity)
         self.limbs = tuple(sorted(robot.limbs))
+        self.rolling = tuple(limb for limb in self.limbs if robot.limbs[limb].rolls)
         self._sites = {limb: model.site(robot.limbs[limb].site).id for limb in self.limbs}
         self._bodies = {limb: int(model.site_bodyid[site]) for limb, site in self._sites.items()}
         self.mass_matrix = np.zeros((self.nv, self.nv))
@@ -85,6 +88,11 @@ class RobotDynamics:
             mujoco.mj_jacDot(model, data, dot[:3], dot[3:], data.site_xpos[site], self._bodies[limb])
             np.dot(jacobian, qvel, out=self.limb_velocity[limb])
             np.dot(dot, qvel, out=self.drift[limb])
+
+    def roll_soles(self, normals: np.ndarray) -> None:
+        """Take the frames of soles that roll as turned about their x axes onto normals (4, 3): contacts do not roll."""
+        for limb in self.rolling:
+            self.limb_rotation[limb] = rolled_onto(self.limb_rotation[limb], normals[limb])
 
     def _momentum(self, qvel: np.ndarray) -> None:
         """Evaluate momentum and its rate from the base's rows of the equation of motion."""

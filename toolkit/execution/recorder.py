@@ -80,7 +80,7 @@ class Recorder:
             self.limb_position[k, limb], self.limb_rotation[k, limb] = data.site_xpos[site], rotation
             if meter.normal_force[limb] > self._bearing:
                 moment = meter.wrench[limb, 3:] @ rotation
-                half = self._robot.limbs[limb].half_size
+                half = self._robot.limbs[limb].bearing
                 x, y = -moment[1] / meter.normal_force[limb], moment[0] / meter.normal_force[limb]
                 self.cop_margin[k, limb] = min(half[0] - abs(x), half[1] - abs(y))
         self._judge(data)

@@ -97,6 +97,14 @@ def rotation_on_surface(normal: np.ndarray, yaw: np.ndarray | float) -> np.ndarr
     return np.stack([x, np.cross(normal, x), normal], axis=-1)
 
 
+def rolled_onto(rotation: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """A rotation (3, 3) turned about its own x axis until its z axis is as near as it gets to a direction (3,)."""
+    x = rotation[:, 0]
+    y = np.cross(normal, x)
+    y = y / np.linalg.norm(y)
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
 @dataclass(frozen=True)
 class Pose:
     """A rigid transform `a_from_b`: maps points in frame b to points in frame a.

@@ -6,7 +6,8 @@ roll and pitch, the ankle one of pitch and roll (the usual humanoid leg). With
     h = R_sole^T (c + Rz(psi) hip_in_com - p) - ankle_in_sole        hip seen from the ankle, in the sole frame
 
 all six joint angles follow: the ankle rolls until h lies in the plane of the leg, the cosine rule gives the knee and
-the shin, and the thigh's frame seen from the base gives the hip.
+the shin, and the thigh's frame seen from the base gives the hip. Where a leg has no ankle roll, that angle is the one
+by which its foot rolls on the ground.
 
 The laws serve numbers in compiled code, arrays and CasADi's symbols. A vector is anything with components v[0], v[1]
 and v[2], and a rotation has components r[i, j]. Each component is a number, an array (n,) or a symbol.

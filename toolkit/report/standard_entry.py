@@ -22,7 +22,7 @@ def standard_entry(standard: Standard) -> dict[str, Any]:
     """A standard as JSON; a limit that is infinite becomes null."""
     robot = standard.robot
     limbs = {
-        limb.label: {"site": model.site, "body": model.body, "half_size": model.half_size}
+        limb.label: {"site": model.site, "body": model.body, "half_size": model.half_size, "rolls": model.rolls}
         for limb, model in sorted(robot.limbs.items())
     }
     names = ("name", "base", "joint_names", "com_height", *_JOINTS)
@@ -46,7 +46,9 @@ def read_standard(entry: dict[str, Any]) -> Standard:
     limbs = {}
     for label, model in robot["limbs"].items():
         limb = Limb.from_label(label)
-        limbs[limb] = LimbModel(limb, str(model["site"]), str(model["body"]), _finite(model["half_size"], 2))
+        rolls = bool(model.get("rolls", False))  # older runs have none that do
+        half_size = _finite(model["half_size"], 2)
+        limbs[limb] = LimbModel(limb, str(model["site"]), str(model["body"]), half_size, rolls=rolls)
     if not set(FEET) <= set(limbs):
         raise ValueError(f"robot {robot['name']} has not both feet")
     subject = Subject(

@@ -9,8 +9,10 @@ import numpy as np
 
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.pose import rolled_onto
 from toolkit.robot.chain import arm_joints, joints_to
 from toolkit.robot.model import ArmGeometry, LegGeometry
+from toolkit.robot.rolling import rolling_range
 
 STRAIGHT_LEG_MARGIN = 0.015  # share of the length from hip to ankle
 STRAIGHT_ARM_MARGIN = 0.05  # share of the length from shoulder to palm
@@ -25,19 +27,24 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
     the joints differ.
 
     Raises:
-        RobotError: The chain from base to foot is not hip (yaw, roll, pitch in any order), knee, ankle (two joints).
+        RobotError: The chain from base to foot is not hip (yaw, roll, pitch in any order), knee, ankle (pitch and roll
+            in any order, or pitch alone).
     """
     joints = joints_to(model, int(model.site_bodyid[model.site(limb.label).id]))
     roles = _leg_roles(model, data, joints, limb)
     base = data.xmat[1].reshape(3, 3)
     site = model.site(limb.label).id
-    sole = data.site_xmat[site].reshape(3, 3)
+    sole, place = data.site_xmat[site].reshape(3, 3), data.site_xpos[site]
+    rolls = "ankle_roll" not in roles
     hip = _axes_crossing(data, [roles[role] for role in ("hip_yaw", "hip_roll", "hip_pitch")])
-    ankle = _axes_crossing(data, [roles["ankle_pitch"], roles["ankle_roll"]])
 
     # The plane of the leg is normal to the knee axis.
     across = data.xaxis[roles["knee"]] * np.sign(data.xaxis[roles["knee"]] @ base[:, 1])
     knee = data.xanchor[roles["knee"]]
+    if rolls:
+        ankle = place + _across(data.xanchor[roles["ankle_pitch"]] - place, across)
+    else:
+        ankle = _axes_crossing(data, [roles["ankle_pitch"], roles["ankle_roll"]])
     upward_thigh, upward_shin = _across(hip - knee, across), _across(knee - ankle, across)
     thigh, shin = float(np.linalg.norm(upward_thigh)), float(np.linalg.norm(upward_shin))
     angles = {
@@ -45,6 +52,8 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
         "knee": _angle(upward_thigh, upward_shin, across),
         "ankle_pitch": _angle(upward_shin, sole[:, 2], across),
     }
+    if rolls:
+        angles |= _rolled(base, rolled_onto(sole, base[:, 2]), place, sole.T @ (ankle - place), hip)
 
     ranges, torques = {}, {}
     for role, joint in roles.items():
@@ -56,16 +65,26 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
         low, high = sorted(offset + sign * limit for limit in model.jnt_range[joint])
         ranges[role] = float(low), float(high)
         torques[role] = float(model.actuator_forcerange[joint - 1, 1])  # joint 0 is the free one
+    aside = 0.0
+    if rolls:
+        # The sole rolls with the leg's plane, which passes beside the hip.
+        aside = float(across @ (hip - place))
+        offset = angles["ankle_roll"] - _tilt(sole, rolled_onto(sole, base[:, 2]))
+        low, high = rolling_range(model, limb)
+        ranges["ankle_roll"] = low + offset, high + offset
+        torques["ankle_roll"] = float(model.body_subtreemass[1] * -model.opt.gravity[2]) * (thigh + shin)
     flexed, straight = ranges["knee"][1], max(ranges["knee"][0], 0.0)
     if flexed < 0.1:
         raise RobotError(f"{limb.label}: the knee does not flex backwards in the home posture; bend it in [home]")
     return LegGeometry(
         hip_in_com=base.T @ (hip - data.subtree_com[1]),
-        ankle_in_sole=sole.T @ (ankle - data.site_xpos[site]),
-        thigh=thigh,
+        ankle_in_sole=sole.T @ (ankle - place),
+        thigh=float(np.hypot(thigh, aside)),
         shin=shin,
-        min_length=_length(thigh, shin, min(flexed, np.pi)),
-        max_length=min(_length(thigh, shin, straight), (1 - STRAIGHT_LEG_MARGIN) * (thigh + shin)),
+        min_length=float(np.hypot(_length(thigh, shin, min(flexed, np.pi)), aside)),
+        max_length=float(
+            np.hypot(min(_length(thigh, shin, straight), (1 - STRAIGHT_LEG_MARGIN) * (thigh + shin)), aside)
+        ),
         ranges=ranges,
         torques=torques,
     )
@@ -131,21 +150,43 @@ def _leg_roles(model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], li
     slides = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
     found = ["slide" if slide else role for slide, role in zip(slides, found, strict=True)]
     if (
-        len(joints) != 6
-        or sorted(found[:3]) != sorted(_ROLES)
-        or found[3] != "pitch"
-        or (sorted(found[4:]) != ["pitch", "roll"])
+        sorted(found[:3]) != sorted(_ROLES)
+        or found[3:4] != ["pitch"]
+        or sorted(found[4:]) not in (["pitch", "roll"], ["pitch"])
     ):
         listed = ", ".join(f"{name} ({role})" for name, role in zip(names, found, strict=True)) or "none"
         raise RobotError(
             f"{limb.label}: the leg must be hip yaw, roll and pitch in any order, knee pitch, ankle pitch and roll in "
-            f"any order; found from the base down: {listed}; lock other joints or correct [home]"
+            f"any order or ankle pitch alone; found from the base down: {listed}; lock other joints or correct [home]"
         )
     roles = {f"hip_{role}": joint for role, joint in zip(found[:3], joints[:3], strict=True)}
     roles["knee"] = joints[3]
     roles |= {f"ankle_{role}": joint for role, joint in zip(found[4:], joints[4:], strict=True)}
     order = ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle_pitch", "ankle_roll")
-    return {role: roles[role] for role in order}
+    return {role: roles[role] for role in order if role in roles}
+
+
+def _rolled(
+    base: np.ndarray, sole: np.ndarray, place: np.ndarray, ankle_in_sole: np.ndarray, hip: np.ndarray
+) -> dict[str, float]:
+    """Roll and yaw angles that a two-link leg between a hip and a level sole has, by role, in rad.
+
+    They differ from those of a leg whose sole rolls with it, because its plane passes beside the hip, and because the
+    line on which it stands may be oblique to it.
+    """
+    towards = sole.T @ (hip - place) - ankle_in_sole
+    roll = float(np.arctan2(towards[1], towards[2]))
+    axis = base.T @ sole @ [0.0, np.cos(roll), -np.sin(roll)]
+    return {
+        "ankle_roll": roll,
+        "hip_roll": float(np.arcsin(axis[2])),
+        "hip_yaw": float(np.arctan2(-axis[0], axis[1])),
+    }
+
+
+def _tilt(sole: np.ndarray, level: np.ndarray) -> float:
+    """Angle in rad by which a rolling sole leans to the left of its level frame."""
+    return float(np.arctan2(sole[:, 2] @ level[:, 1], sole[:, 2] @ level[:, 2]))
 
 
 def _axes_crossing(data: mujoco.MjData, joints: list[int]) -> np.ndarray:

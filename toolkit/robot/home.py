@@ -10,11 +10,12 @@ from scipy.optimize import least_squares
 
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.geometry.pose import Pose, yaw_of
-from toolkit.geometry.triangles import mesh_vertices
+from toolkit.geometry.pose import Pose, rolled_onto, yaw_of
 from toolkit.robot.assemble import Assembly
 from toolkit.robot.chain import joints_to
 from toolkit.robot.description import RobotDescription
+from toolkit.robot.mend import geom_spheres
+from toolkit.robot.rolling import sole_rolls
 from toolkit.robot.skeleton import colliding_only
 
 MAX_SOLE_TILT = 0.02  # rad
@@ -47,7 +48,12 @@ def home_posture(description: RobotDescription, model: mujoco.MjModel, values: M
     mujoco.mj_comPos(model, data)
 
     sites = [model.site(foot.label).id for foot in FEET]
-    soles = [Pose(data.site_xmat[site].reshape(3, 3), data.site_xpos[site]) for site in sites]
+    turns = [data.site_xmat[site].reshape(3, 3) for site in sites]
+    turns = [
+        rolled_onto(turn, np.array([0.0, 0.0, 1.0])) if sole_rolls(model, foot) else turn
+        for foot, turn in zip(FEET, turns, strict=True)
+    ]
+    soles = [Pose(turn, data.site_xpos[site]) for turn, site in zip(turns, sites, strict=True)]
     _check_level(description, soles)
     up = soles[0].normal + soles[1].normal
     up = up / np.linalg.norm(up)
@@ -66,15 +72,19 @@ def home_posture(description: RobotDescription, model: mujoco.MjModel, values: M
 
 
 def _flatten(model: mujoco.MjModel, data: mujoco.MjData, foot: Limb) -> None:
-    """Turn the joints below the knee until the sole's normal is the base's z axis, or as near to it as they go."""
+    """Turn the joints below the knee until the sole's normal is the base's z axis, or as near to it as they go.
+
+    A sole that rolls is turned until its x axis is level.
+    """
     site = model.site(foot.label).id
     ankle = np.array(joints_to(model, int(model.site_bodyid[site]))[4:], int)
-    address = model.jnt_qposadr[ankle]
+    address, rolls = model.jnt_qposadr[ankle], sole_rolls(model, foot)
 
     def tilt(angles: np.ndarray) -> np.ndarray:
         data.qpos[address] = angles
         mujoco.mj_kinematics(model, data)
-        return data.site_xmat[site].reshape(3, 3)[:2, 2].copy()  # the base stands upright while this is solved
+        turn = data.site_xmat[site].reshape(3, 3)  # the base stands upright while this is solved
+        return turn[2, :1].copy() if rolls else turn[:2, 2].copy()
 
     low, high = model.jnt_range[ankle].T
     start = np.clip(data.qpos[address], low + 1e-6, high - 1e-6)
@@ -180,16 +190,13 @@ def _check_lowest(description: RobotDescription, model: mujoco.MjModel, data: mu
     for geom in range(model.ngeom):
         if not model.geom_contype[geom] | model.geom_conaffinity[geom]:
             continue
-        centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
-        points = centre + half * (np.stack(np.meshgrid(*[[-1, 1]] * 3), -1).reshape(-1, 3))
-        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
-            points = mesh_vertices(model, model.geom_dataid[geom])
-        lowest = float((points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])[:, 2].min())
+        points, radius = geom_spheres(model, geom)
+        body = int(model.geom_bodyid[geom])
+        lowest = float((points @ data.xmat[body].reshape(3, 3).T + data.xpos[body])[:, 2].min()) - radius
         if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_BOX:
             lowest = max(lowest, float(data.geom_xpos[geom][2] - model.geom_rbound[geom]))
         if lowest < -MAX_SINK:
-            body = model.body(model.geom_bodyid[geom]).name
             raise RobotError(
-                f"{description.path}: in the home posture a collision shape of body '{body}' reaches "
+                f"{description.path}: in the home posture a collision shape of body '{model.body(body).name}' reaches "
                 f"{-1e3 * lowest:.1f} mm below the soles; move the [limbs] poses down, or correct [home] or the model"
             )

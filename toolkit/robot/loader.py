@@ -23,6 +23,7 @@ from toolkit.robot.home import check_patches, home_posture, touching_neighbours
 from toolkit.robot.model import LimbModel, RobotModel
 from toolkit.robot.problems import Problems
 from toolkit.robot.reader import suggestion
+from toolkit.robot.rolling import sole_rolls
 from toolkit.robot.soundness import bare_trunk, check_palms, straight_legs
 from toolkit.robot.source import find_model_file, read_model
 from toolkit.robot.urdf import urdf_from_model
@@ -148,7 +149,9 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
             mass=float(model.body_subtreemass[1]),
             com_height=float(data.subtree_com[1, 2]),
             limbs={
-                limb: LimbModel(limb, limb.label, assembly.bodies[limb], item.patch / 2, item.max_force)
+                limb: LimbModel(
+                    limb, limb.label, assembly.bodies[limb], item.patch / 2, item.max_force, sole_rolls(model, limb)
+                )
                 for limb, item in description.limbs.items()
             },
             legs=legs,

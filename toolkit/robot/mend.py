@@ -161,6 +161,20 @@ def geom_points(model: mujoco.MjModel, geom: int) -> np.ndarray:
     return pose @ points
 
 
+def geom_spheres(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, float]:
+    """Centres (n, 3) m in its body and the radius in m of equal spheres whose hull holds a shape.
+
+    They are exact for spheres, capsules, boxes and meshes; the radius of the latter two is 0.
+    """
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    round_ends = kind == mujoco.mjtGeom.mjGEOM_CAPSULE
+    if not (round_ends or kind == mujoco.mjtGeom.mjGEOM_SPHERE):
+        return geom_points(model, geom), 0.0
+    pose = Pose.from_quaternion(model.geom_pos[geom], model.geom_quat[geom])
+    half = float(size[1]) if round_ends else 0.0
+    return pose @ np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), float(size[0])
+
+
 def _exclude(spec: mujoco.MjSpec, pairs: Iterable[tuple[str, str]], problems: Problems) -> None:
     there = {frozenset((exclude.bodyname1, exclude.bodyname2)) for exclude in spec.excludes}
     for first, second in pairs:

@@ -17,6 +17,8 @@ from toolkit.robot.scale import Scale
 
 _LATERAL = 0.5  # least |cosine| between the axis of a joint that turns about the lateral axis and that axis
 _SHOULDER = 3  # joints of a shoulder
+LINE = 0.002
+"""m; half the width of the line on which a sole that rolls stands: its edge is round by about as much."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,8 @@ class LimbModel:
         body: Name of the body that carries the site.
         half_size: Half extents (2,) float of the patch along x and y of the site, m.
         max_normal_force: Largest normal force, N; inf if only friction and weight bound it.
+        rolls: Whether a foot rolls about the x axis of its site while it is in contact, because its leg has no ankle
+            roll. It stands on the line along that axis, and its patch is only the room that it takes.
     """
 
     limb: Limb
@@ -37,6 +41,12 @@ class LimbModel:
     body: str
     half_size: np.ndarray
     max_normal_force: float = float("inf")
+    rolls: bool = False
+
+    @property
+    def bearing(self) -> np.ndarray:
+        """Half extents (2,) float of the part of the patch on which the centre of pressure can be, m."""
+        return np.array([self.half_size[0], LINE]) if self.rolls else self.half_size
 
 
 @dataclass(frozen=True)
@@ -49,7 +59,8 @@ class LegGeometry:
         thigh, shin: Lengths of the two links, m.
         min_length, max_length: Distances from hip to ankle that the knee allows, with a margin to the straight leg, m.
         ranges: Joint limits (lower, upper) in rad by role: hip_yaw, hip_roll, hip_pitch, knee, ankle_pitch, ankle_roll.
-            Signs: roll about x, pitch about y, yaw about z of the base or sole; a flexed knee is positive.
+            Signs: roll about x, pitch about y, yaw about z of the base or sole; a flexed knee is positive. The ankle
+            roll of a sole that rolls is how far its shapes let it roll.
         torques: Torque limits by the same roles, N m.
     """
 
@@ -154,6 +165,14 @@ class RobotModel:
     def half_sizes(self) -> np.ndarray:
         """Half extents (4, 2) float of the patches by limb, m; zeros for a limb that the robot does not have."""
         return half_sizes_of(self.limbs)
+
+    @property
+    def bearings(self) -> np.ndarray:
+        """Half extents (4, 2) float by limb within which the centre of pressure can be, m; zeros for a missing limb."""
+        sizes = np.zeros((4, 2))
+        for limb, model in self.limbs.items():
+            sizes[limb] = model.bearing
+        return sizes
 
     @property
     def scale(self) -> Scale:

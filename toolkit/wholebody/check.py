@@ -9,8 +9,7 @@ import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.failure import Failure
-from toolkit.geometry.limb import Limb
-from toolkit.robot.model import RobotModel
+from toolkit.robot.model import LimbModel, RobotModel
 from toolkit.wholebody.collision import first_collision
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.motion_dynamics import inverse_dynamics, velocities
@@ -97,7 +96,7 @@ def _tracking(
             if not sample.in_contact:
                 note(f"{limb.label} in the air", "m", error, SWING_ERROR, time)
                 continue
-            turn = _angle(limb, site.xmat.reshape(3, 3), sample.pose.rotation)
+            turn = _angle(item, site.xmat.reshape(3, 3), sample.pose.rotation)
             limit = FOOT_ERROR if limb.is_foot else PALM_ERROR
             position = max(position, note(limb.label, "m", error, limit, time))
             orientation = max(orientation, note(limb.label, "rad", turn, ORIENTATION_ERROR, time))
@@ -109,10 +108,14 @@ def _tracking(
     return position, orientation, findings
 
 
-def _angle(limb: Limb, actual: np.ndarray, planned: np.ndarray) -> float:
-    """Angle in rad between two orientations; for palms, whose twist is free, between their normals."""
-    if not limb.is_foot:
-        return float(np.arctan2(np.linalg.norm(np.cross(actual[:, 2], planned[:, 2])), actual[:, 2] @ planned[:, 2]))
+def _angle(item: LimbModel, actual: np.ndarray, planned: np.ndarray) -> float:
+    """Angle in rad between two orientations.
+
+    For palms, whose twist is free, it is that between their normals, and for soles that roll between their x axes.
+    """
+    if item.rolls or not item.limb.is_foot:
+        axis, wanted = (turn[:, 0 if item.rolls else 2] for turn in (actual, planned))
+        return float(np.arctan2(np.linalg.norm(np.cross(axis, wanted)), axis @ wanted))
     # |R - I|_F = 2 sqrt(2) sin(angle / 2): accurate for small angles, unlike the trace.
     return float(2.0 * np.arcsin(min(np.linalg.norm(actual - planned) / (2.0 * np.sqrt(2.0)), 1.0)))
 

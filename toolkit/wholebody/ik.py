@@ -67,6 +67,8 @@ class WholeBodyIK:
         for foot in FEET:
             task = solver.add_frame_task(robot.limbs[foot].site, np.eye(4))
             task.configure(foot.label, "soft", weights.FOOT_POSITION, weights.FOOT_ORIENTATION)
+            if robot.limbs[foot].rolls:
+                task.orientation().mask.set_axises("yz", "local")
             self.feet[foot] = task
         for palm in (limb for limb in PALMS if limb in robot.limbs):
             site, z = robot.limbs[palm].site, np.array([0.0, 0.0, 1.0])
