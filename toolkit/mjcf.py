@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -35,10 +35,11 @@ def one_line(message: object) -> str:
     return " ".join(text.split()).removeprefix("Error: ")
 
 
-def read_spec(path: Path, text: str | None = None) -> mujoco.MjSpec:
+def read_spec(path: Path, text: str | None = None, assets: Mapping[str, bytes] | None = None) -> mujoco.MjSpec:
     """Read an MJCF file, or MJCF or URDF text in place of the file's content, with all files that it names.
 
-    The content of the files is in `spec.assets`, so that later changes on the disk have no effect.
+    The content of the files is in `spec.assets`, so that later changes on the disk have no effect. The names in
+    `assets` stand for files that are not on the disk.
 
     Raises:
         ValueError: MuJoCo cannot read it, or a file is missing.
@@ -50,7 +51,11 @@ def read_spec(path: Path, text: str | None = None) -> mujoco.MjSpec:
         raise InputError("the name of the file or of its folder is not UTF-8; rename it") from None
     _check_copies(path.read_text(encoding="utf-8", errors="replace") if text is None else text, path.parent)
     with _caught() as found:
-        spec = mujoco.MjSpec.from_file(str(path)) if text is None else mujoco.MjSpec.from_string(text)
+        spec = (
+            mujoco.MjSpec.from_file(str(path))
+            if text is None
+            else mujoco.MjSpec.from_string(text, assets=dict(assets or {}))
+        )
     if any("NaN" in warning for warning in found):
         text = path.read_text(encoding="utf-8") if text is None else text
         lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), 1) if _NAN.search(line)]
@@ -67,7 +72,7 @@ def read_spec(path: Path, text: str | None = None) -> mujoco.MjSpec:
     for name in [name for name in dir(spec) if name.startswith(("nuser", "nkey"))]:
         if getattr(spec, name) > _MOST_USER_VALUES:
             raise InputError(f"{name} of <size> is {getattr(spec, name)}; at most {_MOST_USER_VALUES} are read")
-    _take_assets(spec, path.parent)
+    _take_assets(spec, path.parent, assets or {})
     return spec
 
 
@@ -213,14 +218,14 @@ def _caught() -> Iterator[list[str]]:
         raise ValueError(one_line(error)) from error
 
 
-def _take_assets(spec: mujoco.MjSpec, folder: Path) -> None:
-    """Read a spec's files under short unique names; MuJoCo reads those of an attached model."""
-    assets: dict[str, bytes] = {}
+def _take_assets(spec: mujoco.MjSpec, folder: Path, given: Mapping[str, bytes]) -> None:
+    """Read a spec's files under short unique names, but those given; MuJoCo reads those of an attached model."""
+    assets = dict(given)
     names: dict[Path, str] = {}
 
     def taken(name: str, directory: str) -> str:
         file = (folder / directory / (Path(name).name if spec.strippath else name)).resolve()
-        if not name or not _regular(file).is_file():
+        if not name or name in given or not _regular(file).is_file():
             return name
         if file not in names:
             names[file] = file.name if file.name not in assets else f"{len(names)}_{file.name}"

@@ -152,3 +152,45 @@ def test_arm_with_too_few_joints(tmp_path: Path) -> None:
     toml = TOML.replace("[home]", '[limbs.left_palm]\nbody = "stump"\npatch = [0.05, 0.05]\n[home]')
     with pytest.raises(RobotError, match="left_palm: 1 joints between the trunk and the palm; an arm needs four"):
         load_robot(str(write_robot(tmp_path / "biped", model, toml)))
+
+
+def oblique_hips() -> str:
+    """Hips whose two upper joints lie between roll and yaw, with the pitch below them."""
+    model = biped_mjcf()
+    for side in ("left", "right"):
+        names = {role: f'name="{side}_{role}"' for role in ("hip_pitch", "hip_roll", "hip_yaw")}
+        model = model.replace(f'{names["hip_pitch"]} axis="0 1 0" range="-2.0 1.0"', "first")
+        bounds = "-0.5 1.0" if side == "left" else "-1.0 0.5"
+        model = model.replace(f'{names["hip_yaw"]} axis="0 0 1" range="{bounds}"', "third")
+        model = model.replace(f'{names["hip_roll"]} axis="1 0 0" range="-0.5 0.5"', "second")
+        model = model.replace("first", f'{names["hip_yaw"]} axis="1 0 1" range="-0.6 0.6"')
+        model = model.replace("second", f'{names["hip_roll"]} axis="-1 0 1" range="-0.6 0.6"')
+        model = model.replace("third", f'{names["hip_pitch"]} axis="0 1 0" range="-2.0 1.0"')
+    return model
+
+
+def test_two_oblique_joints_share_roll_and_yaw_of_the_hip(tmp_path: Path) -> None:
+    robot = load_robot(str(write_robot(tmp_path / "oblique", oblique_hips())))
+    model, data = robot.mujoco_model, mujoco.MjData(robot.mujoco_model)
+    for foot, leg in robot.legs.items():
+        side = foot.label.partition("_")[0]
+        for role in ("hip_roll", "hip_yaw"):  # half as far: the joints have to serve the other axis as well
+            np.testing.assert_allclose(leg.ranges[role], [-0.6 / np.sqrt(2), 0.6 / np.sqrt(2)], rtol=1e-5)
+        assert leg.ranges["hip_pitch"] == pytest.approx((-2.0, 1.0), abs=0.01)
+        thigh = model.body(model.jnt_bodyid[model.joint(f"{side}_hip_pitch").id]).id
+        for roll, yaw in ((0.2, 0.3), (-0.3, 0.1), (0.42, -0.42)):
+            data.qpos[:] = 0.0
+            data.qpos[3] = 1.0
+            joints = np.linalg.inv([[1, -1], [1, 1]]) @ [np.sqrt(2) * roll, np.sqrt(2) * yaw]
+            for name, angle in zip(("hip_yaw", "hip_roll"), joints, strict=True):
+                assert abs(angle) <= 0.6
+                data.qpos[model.jnt_qposadr[model.joint(f"{side}_{name}").id]] = angle
+            mujoco.mj_kinematics(model, data)
+            turned = data.xmat[thigh].reshape(3, 3)  # yaw, then roll, to the second order
+            np.testing.assert_allclose([-turned[0, 1], turned[2, 1]], [yaw, roll], atol=0.12)
+
+
+def test_hips_without_three_directions_are_refused(tmp_path: Path) -> None:
+    model = biped_mjcf().replace('hip_yaw" axis="0 0 1"', 'hip_yaw" axis="0 1 0.3"')
+    with pytest.raises(RobotError, match="the leg must be hip yaw, roll and pitch in any order"):
+        load_robot(str(write_robot(tmp_path / "twice", model)))

@@ -57,7 +57,8 @@ def _joint(
         return f"{name or 'free joint'}: floats"
     axis = data.xaxis[joint]
     along = int(np.abs(axis).argmax())
-    shown = "xyz"[along] if abs(axis[along]) > 0.999 else ", ".join(f"{value:.2f}" for value in axis + 0.0)
+    sign = "" if axis[along] > 0 else "-"
+    shown = f"{sign}{'xyz'[along]}" if abs(axis[along]) > 0.999 else ", ".join(f"{value:.2f}" for value in axis + 0.0)
     low, high = model.jnt_range[joint]
     limits = f"{low:.3f}…{high:.3f} rad" if model.jnt_limited[joint] else "no range"
     torque = f"{torques[name]:g} N m" if torques.get(name) else "no torque limit"

@@ -16,6 +16,8 @@ FLAT = 0.001  # m; points so near to the lowest one belong to the sole
 _AROUND = 48  # points around round shapes
 _LEAST_PATCH = 0.02  # m; least side of a patch that is proposed
 _HAND_DEPTH = 0.01  # m; points so near to the end of a hand belong to its palm
+_PALM_JOINTS = 4  # least joints of an arm whose palm is proposed
+_LEAST_ARM = 3  # least joints of an arm; what has fewer is an eye or an ear
 _ARM_JOINTS = 7  # most joints of an arm; what comes after them is a finger
 _STEEPEST = 0.7  # least cosine between the normal of a sole and straight down in the zero posture
 
@@ -50,7 +52,8 @@ class Anatomy:
         others: Names of further root bodies.
         forward: Direction (2,) of the toes in the axes of the base.
         feet: Soles, left one first; empty where no two legs were found.
-        palms: Palms, left one first; empty where no two arms were found.
+        palms: Palms, left one first; empty where no two arms of four joints or more were found.
+        arms: Joints of the arms in order, left arm first; empty where no two arms of three joints or more were found.
         shared: Joints that both legs hang on, such as a waist below a floating trunk.
         fingers: Joints beyond the hands.
     """
@@ -60,6 +63,7 @@ class Anatomy:
     forward: np.ndarray
     feet: tuple[FoundPatch, ...]
     palms: tuple[FoundPatch, ...]
+    arms: tuple[tuple[str, ...], ...]
     shared: tuple[str, ...]
     fingers: tuple[str, ...]
 
@@ -74,7 +78,7 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
     feet = _feet(model, data, tips)
     if len(feet) != 2:
         others = tuple(model.body(b).name for b in roots if b != base)
-        return Anatomy(model.body(base).name, others, np.array([1.0, 0.0]), (), (), (), ())
+        return Anatomy(model.body(base).name, others, np.array([1.0, 0.0]), (), (), (), (), ())
     first, second = (joints_to(model, foot) for foot in feet)
     shared = [j for j in first if j in second]
     forward = _forward(model, data, base, [j for j in first if j not in shared])
@@ -82,7 +86,9 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
     feet = sorted(feet, key=lambda b: -float(across @ data.xpos[b]))
     legs = {j for foot in feet for j in joints_to(model, foot)}
     arms = _arms(model, data, tips, legs, across, base)
-    hands = [hand for hand, _ in arms]
+    hands = [
+        int(model.jnt_bodyid[joints[-1]]) for joints, _ in arms if min(len(arm) for arm, _ in arms) >= _PALM_JOINTS
+    ]
     fingers = sorted({j for _, beyond in arms for j in beyond})
     return Anatomy(
         base=model.body(base).name,
@@ -90,6 +96,7 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
         forward=forward,
         feet=tuple(_sole(model, data, foot, forward) for foot in feet),
         palms=tuple(_palm(model, data, hand, legs, forward) for hand in hands),
+        arms=tuple(_names(model, joints) for joints, _ in arms),
         shared=_names(model, shared),
         fingers=_names(model, fingers),
     )
@@ -229,8 +236,8 @@ def _area(points: np.ndarray, down: np.ndarray, forward: np.ndarray) -> float:
 
 def _arms(
     model: mujoco.MjModel, data: mujoco.MjData, tips: list[int], legs: set[int], across: np.ndarray, base: int
-) -> list[tuple[int, list[int]]]:
-    """The left and the right hand with the joints beyond them; none where there are not both."""
+) -> list[tuple[list[int], list[int]]]:
+    """The joints of the left and the right arm, each with the joints beyond its hand; none where there are not both."""
     others = [tip for tip in tips if not legs & set(joints_to(model, tip)[-1:])]
     side = {tip: float(across @ (data.xpos[tip] - data.xpos[base])) for tip in others}
     found = []
@@ -246,10 +253,9 @@ def _arms(
         if not moved:
             return []
         joints = [j for j in joints_to(model, max(moved)) if int(model.jnt_bodyid[j]) in chain][:_ARM_JOINTS]
-        if len(joints) < 4:
+        if len(joints) < _LEAST_ARM:
             return []
-        hand = int(model.jnt_bodyid[joints[-1]])
-        found.append((hand, [j for tip in arm for j in joints_to(model, tip) if j > max(joints)]))
+        found.append((joints, [j for tip in arm for j in joints_to(model, tip) if j > max(joints)]))
     return found
 
 

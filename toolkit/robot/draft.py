@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 
 import mujoco
 import numpy as np
@@ -11,11 +13,9 @@ import numpy as np
 from toolkit.geometry.limb import Limb
 from toolkit.robot.anatomy import Anatomy, FoundPatch, find_anatomy
 from toolkit.robot.motors import file_torques
+from toolkit.robot.posture import standing, within
 from toolkit.robot.source import ModelSource
 
-_KNEE = 0.7  # rad; flexion of the knees where no keyframe says how to stand
-_SPREAD = 0.25  # rad; arms out to the sides
-_ARM_JOINTS = 7  # most joints of an arm
 _LEAST_MASS, _LEAST_INERTIA = 1e-3, 1e-6  # kg and kg m^2, of bodies without any
 _STANDING = ("home", "stand", "standing", "default")  # names of keyframes that are likely to be postures to stand in
 _GAIN = 3.0  # stiffness of the joints that carry the robot, as a multiple of m g h
@@ -62,7 +62,7 @@ def draft(source: ModelSource, where: Sequence[str]) -> Draft:
         *(_palm(limb, patch, model) for limb, patch in zip(list(Limb)[2:], anatomy.palms, strict=False)),
         _home(model, anatomy, moved),
         _gains(model, anatomy),
-        _limits(source, moved),
+        _limits(model, source, anatomy, moved),
     ]
     text = "\n\n".join("\n".join(part) for part in parts if part) + "\n"
     return Draft(text, tuple(missing), anatomy, model)
@@ -128,7 +128,7 @@ def _locked(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
 def _lock_lines(model: mujoco.MjModel, names: list[str]) -> list[str]:
     if not names:
         return []
-    values = ", ".join(f"{_key(name)} = {_within(model, name, 0.0):g}" for name in names)
+    values = ", ".join(f"{_key(name)} = {within(model, model.joint(name).id, 0.0):g}" for name in names)
     return [f"locked_joints = {{ {values} }}"]
 
 
@@ -179,35 +179,28 @@ def _palm(limb: Limb, patch: FoundPatch, model: mujoco.MjModel) -> list[str]:
 
 
 def _home(model: mujoco.MjModel, anatomy: Anatomy, moved: list[str]) -> list[str]:
+    """The posture of a keyframe, with bent knees where its own are straight; else one that hangs its arms."""
     if not anatomy.feet:
         return []
-    lines = ["[home]"]
     keys = [model.key(k).name for k in range(model.nkey)]
-    standing = next((name for name in _STANDING if name in keys), keys[0] if keys and keys[0] else None)
-    lines.append("flat_soles = true")
-    if standing:
-        return [*lines, f"keyframe = {_text(standing)}"]
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    left = np.array([-anatomy.forward[1], anatomy.forward[0], 0.0])
-    for foot in anatomy.feet:
-        leg = [name for name in foot.joints if name not in anatomy.shared]
-        pitch = [name for name in leg if abs(float(left @ data.xaxis[model.joint(name).id])) > 0.72]
-        for name, angle in zip(pitch, (-_KNEE / 2, _KNEE), strict=False):
-            sign = float(np.sign(left @ data.xaxis[model.joint(name).id]))
-            lines.append(f"{_key(name)} = {_within(model, name, sign * angle):g}")
-    ahead, spread = np.array([*anatomy.forward, 0.0]), {}
-    for palm, side in zip(anatomy.palms, (1.0, -1.0), strict=False):
-        for name in palm.joints[-_ARM_JOINTS:]:
-            along = float(ahead @ data.xaxis[model.joint(name).id])
-            if name not in spread and abs(along) > 0.72:
-                spread[name] = side * float(np.sign(along)) * _SPREAD
-                break  # the shoulder's, not the wrist's
-    used = {name for foot in anatomy.feet for name in foot.joints}
-    for name in (name for name in moved if name not in used):
-        value = _within(model, name, spread.get(name, 0.0))
-        if value:
-            lines.append(f"{_key(name)} = {value:g}")
+    standing_key = next((name for name in _STANDING if name in keys), keys[0] if keys and keys[0] else None)
+    lines, start = ["[home]", "flat_soles = true"], dict[str, float]()
+    if standing_key:
+        lines.append(f"keyframe = {_text(standing_key)}")
+        start = {name: float(model.key(standing_key).qpos[model.jnt_qposadr[model.joint(name).id]]) for name in moved}
+    angles = standing(model, anatomy, start)
+    if start and angles:
+        lines.append("# the keyframe's legs are too straight to step")
+    ankles = {name for foot in anatomy.feet for name in foot.joints} - set(angles)
+    said = {name: within(model, model.joint(name).id, angles.get(name, 0.0)) for name in moved if name not in ankles}
+    said = {name: value for name, value in said.items() if value and (name in angles or not start)}
+    patterns = _patterns(model, anatomy, list(said))
+    for pattern in patterns:
+        values = [value for name, value in said.items() if fnmatchcase(name, pattern)]
+        if len(set(values)) == 1:
+            lines.append(f"{_key(pattern)} = {values[0]:g}")
+        else:
+            lines += [f"{_key(name)} = {value:g}" for name, value in said.items() if fnmatchcase(name, pattern)]
     return lines
 
 
@@ -221,24 +214,52 @@ def _gains(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
     stiffness = float(f"{_GAIN * 9.81 * float(model.body_subtreemass[base]) * height:.1g}")
     lines = ["[gains]", f'"*" = [{stiffness / 10}, {_DAMPING * stiffness / 10:g}]']
     legs = [name for foot in anatomy.feet for name in foot.joints if name not in anatomy.shared]
-    return lines + [f"{_key(name)} = [{stiffness}, {_DAMPING * stiffness:g}]" for name in legs]
+    return lines + [
+        f"{_key(name)} = [{stiffness}, {_DAMPING * stiffness:g}]" for name in _patterns(model, anatomy, legs)
+    ]
 
 
-def _limits(source: ModelSource, moved: list[str]) -> list[str]:
-    lacking = [name for name in moved if name not in source.velocity]
-    if not lacking:
-        return []
-    lines = ["# rad/s, of the motors' data sheets; remove the # before each line", "# [limits.velocity]"]
-    return [*lines, *(f"# {_key(name)} =" for name in lacking)]
+def _limits(model: mujoco.MjModel, source: ModelSource, anatomy: Anatomy, moved: list[str]) -> list[str]:
+    """Tables of what a file does not say, to be filled in."""
+    ranges = [name for name in moved if not model.jnt_limited[model.joint(name).id]]
+    speeds = [name for name in moved if name not in source.velocity]
+    lines = []
+    for table, what, names, value in (
+        ("limits.position", "rad", ranges, "[-1.5, 1.5]"),
+        ("limits.velocity", "rad/s, of the motors' data sheets", speeds, "10.0"),
+    ):
+        if names:
+            lines += [f'# {what}; remove the # before the lines, or say "*" = {value} of all', f"# [{table}]"]
+            lines += [f"# {_key(name)} =" for name in _patterns(model, anatomy, names)]
+    return lines
 
 
-def _within(model: mujoco.MjModel, name: str, value: float) -> float:
-    """A position, moved into the joint's range by a tenth of it where it is out."""
-    joint = model.joint(name).id
-    low, high = model.jnt_range[joint]
-    if not model.jnt_limited[joint] or low <= value <= high:
-        return value
-    return float(np.round(low + 0.1 * (high - low) if value < low else high - 0.1 * (high - low), 4))
+def _patterns(model: mujoco.MjModel, anatomy: Anatomy, names: Sequence[str]) -> list[str]:
+    """The shortest list of names of joints and patterns, each of which means a joint and its mirror image."""
+    arms, every = anatomy.arms or ((), ()), _joints(model)
+    chains = [tuple(foot.joints for foot in anatomy.feet) or ((), ()), arms]
+    pairs = {name: pair for left, right in chains for pair in zip(left, right, strict=False) for name in pair}
+    found: list[str] = []
+    for name in names:
+        pair = pairs.get(name, (name, name))
+        pattern = _pattern_of(*pair)
+        fits = set(pair) <= set(names) and {other for other in every if fnmatchcase(other, pattern)} == set(pair)
+        if (chosen := pattern if fits and len(set(pair)) == 2 else name) not in found:
+            found.append(chosen)
+    return found
+
+
+def _pattern_of(first: str, second: str) -> str:
+    """What the names of a left and a right joint have in common, with a wildcard where they differ."""
+    before = len(os.path.commonprefix([first, second]))
+    ends = [name[before:] for name in (first, second)]
+    words = [end[: len(word)] for end, word in zip(ends, ("left", "right"), strict=True)]
+    if [word.lower() for word in words] == ["left", "right"]:
+        ends = [end[len(word) :] for end, word in zip(ends, words, strict=True)]
+        return f"{first[:before]}*{ends[0]}"
+    after = len(os.path.commonprefix([end[::-1] for end in ends]))
+    middle = max(len(end) for end in ends) - after
+    return f"{first[:before]}{'?' if middle == 1 else '*'}{ends[0][len(ends[0]) - after :]}"
 
 
 def _key(name: str) -> str:

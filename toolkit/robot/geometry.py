@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 
 import mujoco
@@ -18,6 +19,7 @@ STRAIGHT_LEG_MARGIN = 0.015  # share of the length from hip to ankle
 STRAIGHT_ARM_MARGIN = 0.05  # share of the length from shoulder to palm
 _ROLES = ("roll", "pitch", "yaw")
 _ALIGNED = 0.72  # least |cosine| between a joint axis in the home posture and the base axis that defines its role
+_OBLIQUE = 0.6  # the same of hips, where two joints may share what roll and yaw are
 
 
 def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegGeometry:
@@ -73,6 +75,7 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
         low, high = rolling_range(model, limb)
         ranges["ankle_roll"] = low + offset, high + offset
         torques["ankle_roll"] = float(model.body_subtreemass[1] * -model.opt.gravity[2]) * (thigh + shin)
+    ranges |= _shared_ranges(data, roles, ranges, base)
     flexed, straight = ranges["knee"][1], max(ranges["knee"][0], 0.0)
     if flexed < 0.1:
         raise RobotError(f"{limb.label}: the knee does not flex backwards in the home posture; bend it in [home]")
@@ -142,12 +145,38 @@ def derive_limbs(
     return legs, arms
 
 
+def _shared_ranges(
+    data: mujoco.MjData, roles: Mapping[str, int], ranges: Mapping[str, tuple[float, float]], base: np.ndarray
+) -> dict[str, tuple[float, float]]:
+    """Ranges of hip angles about the base's axes where oblique joints share them; nothing where none is oblique.
+
+    The ranges of the joints nearest to the axes are shrunk by one factor, until every rotation within them is in reach
+    of the joints: to the first order, angles theta about the base's axes need the joint angles A^-1 theta, with the
+    joints' axes as columns of A.
+    """
+    hips = [f"hip_{role}" for role in _ROLES]
+    axes = base.T @ data.xaxis[[roles[role] for role in hips]].T
+    axes = axes * np.sign(np.diag(axes))
+    oblique = np.flatnonzero(np.diag(axes) < _ALIGNED)
+    if not len(oblique):
+        return {}
+    low, high = np.array([ranges[role] for role in hips]).T
+    needed = np.linalg.inv(axes)
+    most = np.maximum(needed * low, needed * high).sum(1)
+    least = np.minimum(needed * low, needed * high).sum(1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.fmin(high / most, low / least)[oblique]
+    share = float(np.clip(np.fmin(shares.min(), 1.0), 0.0, 1.0))
+    return {hips[k]: (share * float(low[k]), share * float(high[k])) for k in oblique}
+
+
 def _leg_roles(model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], limb: Limb) -> dict[str, int]:
     base = data.xmat[1].reshape(3, 3)
     names = [model.joint(joint).name for joint in joints]
     cosines = np.abs(data.xaxis[joints] @ base)
     found = [_ROLES[k] if row[k] >= _ALIGNED else "oblique" for row, k in zip(cosines, cosines.argmax(1), strict=True)]
     slides = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
+    found[:3] = _hip_roles(cosines[:3]) or found[:3]
     found = ["slide" if slide else role for slide, role in zip(slides, found, strict=True)]
     if (
         sorted(found[:3]) != sorted(_ROLES)
@@ -187,6 +216,19 @@ def _rolled(
 def _tilt(sole: np.ndarray, level: np.ndarray) -> float:
     """Angle in rad by which a rolling sole leans to the left of its level frame."""
     return float(np.arctan2(sole[:, 2] @ level[:, 1], sole[:, 2] @ level[:, 2]))
+
+
+def _hip_roles(cosines: np.ndarray) -> list[str]:
+    """Roles of three hip joints by |cosines| (3, 3) between their axes and the base's; empty where they do not fit.
+
+    Two joints between roll and yaw are both as near to either. The upper one is then taken for the yaw.
+    """
+    if len(cosines) < 3:
+        return []
+    orders = sorted(itertools.permutations(range(3)), key=lambda order: -order[0])
+    fits = [round(float(np.prod(cosines[[0, 1, 2], order])), 2) for order in orders]
+    order = list(orders[int(np.argmax(fits))])
+    return [_ROLES[k] for k in order] if cosines[[0, 1, 2], order].min() >= _OBLIQUE else []
 
 
 def _axes_crossing(data: mujoco.MjData, joints: list[int]) -> np.ndarray:

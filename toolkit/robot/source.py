@@ -16,9 +16,8 @@ from toolkit.errors import InputError, PackageError, RobotError
 from toolkit.mjcf import one_line, read_spec
 from toolkit.robot.description import RobotDescription
 from toolkit.robot.mend_table import Box, Mend
+from toolkit.robot.mesh_files import READABLE, converted
 from toolkit.robot.reader import suggestion
-
-_MESH_ENDINGS = {".stl", ".obj", ".msh"}
 
 
 @dataclass(frozen=True)
@@ -133,8 +132,8 @@ def read_model(path: Path, mend: Mend | None = None, *, lenient: bool = False) -
             spec = read_spec(path)
         else:
             velocity = _velocity_limits(path, root)
-            unread = _prepare_urdf(path, root, mend, lenient)
-            spec = read_spec(path, ElementTree.tostring(root, encoding="unicode"))
+            unread, assets = _prepare_urdf(path, root, mend, lenient)
+            spec = read_spec(path, ElementTree.tostring(root, encoding="unicode"), assets)
             spec.compiler.fusestatic = False
             for geom in spec.geoms:
                 geom.density = 0.0  # a link without <inertial> has no mass, whatever its shapes
@@ -162,10 +161,18 @@ def _velocity_limits(path: Path, root: ElementTree.Element) -> dict[str, float]:
     return limits
 
 
-def _prepare_urdf(path: Path, root: ElementTree.Element, mend: Mend | None, lenient: bool) -> list[str]:
-    """Make a URDF readable for MuJoCo; returns the links that lost a collision shape which cannot be read."""
+def _prepare_urdf(
+    path: Path, root: ElementTree.Element, mend: Mend | None, lenient: bool
+) -> tuple[list[str], dict[str, bytes]]:
+    """Make a URDF readable for MuJoCo.
+
+    Returns:
+        The links that lost a collision shape which cannot be read, and the content of the meshes that were converted,
+        by the names that the URDF now gives them.
+    """
     names: set[str] = set()
     unread: list[str] = []
+    meshes = _Meshes(path)
     for link in root.iter("link"):
         if mend is not None and _is_replaced(mend, link.get("name", "")):
             for shape in link.findall("collision"):
@@ -177,24 +184,55 @@ def _prepare_urdf(path: Path, root: ElementTree.Element, mend: Mend | None, leni
             mesh = shape.find("geometry/mesh")
             if mesh is None:
                 continue
-            file = _resolve(path, mesh.get("filename", ""))
-            readable = file is not None and file.suffix.lower() in _MESH_ENDINGS
-            if readable:
-                mesh.set("filename", str(file))
-            elif shape.tag == "visual" or lenient:
+            name = mesh.get("filename", "")
+            drawn = shape.tag == "visual"
+            try:
+                mesh.set("filename", meshes.name_of(name, drawn))
+            except ValueError as error:
+                if not drawn and not lenient:
+                    raise RobotError(
+                        f"{path}: collision mesh '{name}' of link '{link.get('name')}' {error}; add the file, or "
+                        "replace the shape in [mend.collision]"
+                    ) from None
                 link.remove(shape)
-                unread += [link.get("name", "")] if shape.tag == "collision" else []
-            else:
-                reason = "is missing" if file is None else f"is not one of {', '.join(sorted(_MESH_ENDINGS))}"
-                raise RobotError(
-                    f"{path}: collision mesh '{mesh.get('filename')}' of link '{link.get('name')}' {reason}; "
-                    "add the file, or replace the shape in [mend.collision]"
-                )
+                unread += [] if drawn else [link.get("name", "")]
     for extension in root.findall("mujoco"):
         root.remove(extension)
     extension = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(extension, "compiler", strippath="false", fusestatic="false", discardvisual="false")
-    return list(dict.fromkeys(unread))
+    return list(dict.fromkeys(unread)), meshes.assets
+
+
+class _Meshes:
+    """The mesh files of a URDF, as MuJoCo can read them.
+
+    Attributes:
+        assets: Content of those that had to be converted, by new names.
+    """
+
+    def __init__(self, urdf: Path) -> None:
+        self._urdf = urdf
+        self._names: dict[Path, str] = {}
+        self.assets: dict[str, bytes] = {}
+
+    def name_of(self, name: str, drawn: bool) -> str:
+        """What a mesh is called from now on: a path, or a name in `assets`.
+
+        Raises:
+            ValueError: It cannot be read, or is COLLADA and only drawn; the message has the mesh as its subject.
+        """
+        file = _resolve(self._urdf, name)
+        if file is None:
+            raise ValueError("is missing")
+        ending = file.suffix.lower()
+        if ending not in READABLE or (drawn and ending == ".dae"):
+            raise ValueError(f"is not one of {', '.join(sorted(READABLE))}")
+        if file not in self._names:
+            content, self._names[file] = converted(file), str(file)
+            if content is not None:
+                self._names[file] = f"{len(self._names)}_{file.stem}.stl"
+                self.assets[self._names[file]] = content
+        return self._names[file]
 
 
 def _resolve(path: Path, name: str) -> Path | None:

@@ -1,0 +1,56 @@
+"""Mesh files that MuJoCo cannot read, turned into those that it can: COLLADA, and STL in plain text."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import cast
+
+import coal
+import numpy as np
+import trimesh
+from scipy.spatial import ConvexHull, QhullError
+
+from toolkit.mjcf import one_line
+
+READABLE = frozenset({".stl", ".obj", ".msh", ".dae"})
+"""Endings of the mesh files that can be read."""
+_STL_HEADER, _STL_FACE = 84, 50  # bytes of a binary STL
+_SAID = 80  # most letters of what the loader says
+
+
+def converted(file: Path) -> bytes | None:
+    """A mesh file as binary STL, in the file's own axes and before any scale of the model; None where MuJoCo reads it.
+
+    A COLLADA file becomes the convex hull of all its parts, which is what MuJoCo collides with. Its unit counts, its
+    `up_axis` does not, as everywhere in ROS.
+
+    Raises:
+        ValueError: The file holds no solid that can be read.
+    """
+    ending = file.suffix.lower()
+    if ending == ".dae":
+        try:
+            points = np.asarray(coal.MeshLoader().load(str(file), np.ones(3)).vertices(), float)
+            points = _unit(file) * points[ConvexHull(points).vertices]  # which raises where they lie in a plane
+            mesh = trimesh.convex.convex_hull(points)
+        except (QhullError, ElementTree.ParseError, ValueError, RuntimeError) as error:
+            raise ValueError(f"holds no solid ({one_line(error)[:_SAID]})") from None
+    elif ending == ".stl" and _is_text(file):
+        mesh = trimesh.load_mesh(file, file_type="stl_ascii")
+    else:
+        return None
+    return cast(bytes, mesh.export(file_type="stl"))
+
+
+def _unit(file: Path) -> float:
+    """Metres of a unit of a COLLADA file, which the loader leaves out."""
+    unit = next((item for item in ElementTree.parse(file).iter() if item.tag.rpartition("}")[2] == "unit"), None)
+    return 1.0 if unit is None else float(unit.get("meter", "1"))
+
+
+def _is_text(file: Path) -> bool:
+    """Whether an STL file is in plain text: the size of a binary one follows from its number of faces."""
+    data = file.read_bytes()
+    faces = int.from_bytes(data[_STL_HEADER - 4 : _STL_HEADER], "little")
+    return data.lstrip().startswith(b"solid") and len(data) != _STL_HEADER + _STL_FACE * faces
