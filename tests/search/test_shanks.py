@@ -19,7 +19,7 @@ from toolkit.search.planner import ContactPlanner
 @pytest.mark.parametrize("name", OWN)
 def test_points_and_radii_of_the_legs(name):
     robot = load_robot(name)
-    radius = shanks_of(robot)
+    radius = shanks_of(robot).radius
     assert ((radius > 0.01) & (radius < 0.15)).all()
     rng = np.random.default_rng(0)
     legs = legs_of(robot, ReachMargins(ankle=-9.0, hip=-9.0))

@@ -28,7 +28,9 @@ from toolkit.robot.model import RobotModel
 SIDES = 16
 _CUTS = 12  # most rounds of cutting planes; each reduces the distance outside the spheres several times
 _TOLERANCE = 1e-7
-_TIE = 1e-3  # price of a metre between the CoM and the middle of the contacts, in units of the margin
+# Price of a metre between the CoM and the middle of the contacts, in units of the margin, for a body of the usual size
+# (`toolkit.robot.scale`).
+_TIE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ def statically_balanced(
         return _solved(cost, upper, bound, equality, right, limits, np.asarray(com, float), None)
     centers, radii, floor = _reach(robot, contacts)
     # Of equal margins, the CoM nearest to the middle at home height wins: a metre costs a thousandth of the margin.
-    cost[count + 1 : count + 4] = _TIE
+    cost[count + 1 : count + 4] = _TIE / robot.scale.length
     deviation = np.zeros((6, columns))
     deviation[:, count + 1 : count + 4] = -np.concatenate([np.eye(3), np.eye(3)])
     deviation[:, -3:] = np.concatenate([np.eye(3), -np.eye(3)])

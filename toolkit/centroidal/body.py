@@ -7,7 +7,8 @@ between its two contacts, and its hip must stay within a leg's length of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -35,6 +36,10 @@ class BodyMargins(ReachMargins):
     ankle: float = 0.0
     height: float = 0.0
     torque: float = 1.0
+
+    def scaled(self, factor: float) -> Self:
+        """The same with its lengths multiplied by a factor."""
+        return replace(self, length=factor * self.length, height=factor * self.height)
 
 
 @dataclass(frozen=True)

@@ -94,7 +94,7 @@ def transition_problem(
     if not (timing.shift > 0.0 and timing.swing > 0.0):
         raise InputError(f"transition timing must be positive, got shift {timing.shift} s and swing {timing.swing} s")
     before, after = stance.contacts, transition.apply(stance).contacts
-    lift, swing = config.steps_of(timing.shift), config.steps_of(timing.swing)
+    lift, swing = (config.steps_of(time / robot.scale.time) for time in (timing.shift, timing.swing))
     n = lift + swing
     dt = np.empty(n)
     dt[:lift], dt[lift:] = timing.shift / lift, timing.swing / swing
@@ -134,7 +134,7 @@ def sequence_problem(
     last = phases[-1].contacts
     if [contact.limb for contact in last[:2]] != list(FEET):
         raise InputError("a schedule must end with both feet in contact: give it a final rest longer than 0 s")
-    counts = [config.steps_of(phase.duration) for phase in phases]
+    counts = [config.steps_of(phase.duration / robot.scale.time) for phase in phases]
     total = sum(counts)
     dt, yaw = np.empty(total), np.empty(total + 1)
     arrays = _contact_arrays(total)
@@ -234,7 +234,7 @@ def _problem(
         final_half_size=scale * np.array(box, float),
         final_at_rest=final_at_rest,
         weights=config.weights.scaled(robot.scale),
-        margins=config.margins,
+        margins=config.margins.scaled(scale),
         landing_limb=-1 if landing is None else int(landing.limb),
         landing_position=None if landing is None else landing.pose.position,
         landing_rotation=None if landing is None else landing.pose.rotation,

@@ -73,6 +73,10 @@ class Margins:
     cop: tuple[float, float] = (0.0, 0.0)
     yaw: float = 1.0
 
+    def scaled(self, factor: float) -> Margins:
+        """The same with its lengths multiplied by a factor."""
+        return replace(self, cop=(factor * self.cop[0], factor * self.cop[1]))
+
     def within(self, half_size: np.ndarray) -> np.ndarray:
         """(..., 2) m; the half extents of patches with the CoP margin taken off, at most half of each."""
         return half_size - np.minimum(self.cop, half_size / 2)

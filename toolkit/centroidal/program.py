@@ -8,7 +8,7 @@ variables and their units.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,10 +32,13 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z, steepness
 from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins
 from toolkit.robot.model import LegGeometry, RobotModel
+from toolkit.robot.scale import USUAL, Scale
 
-# Margins that plans keep unless nothing else is feasible: without them, slides and tilts cannot be corrected.
+# Margins that plans of a body of the usual size (`toolkit.robot.scale`) keep unless nothing else is feasible: without
+# them, slides and tilts cannot be corrected.
 LEAST = Margins(friction=0.96, cop=(0.01, 0.01), yaw=0.95)
 SCALE = 1e-2  # factor on the objective inside the program
+BRIEF = 0.02  # s for a body of the usual size; shorter steps have the price of jerk of this one
 # Where a foot at rest already uses more of its friction than the wanted margin leaves, it may use `RESERVE` more than
 # at rest, at most `FULL`. Otherwise the motion would lean and run to spare friction, which is less safe.
 RESERVE, FULL = 0.1, 0.9
@@ -49,6 +52,8 @@ NARROW, STIFF = 1e-6, 1e12  # m and its price; a landing point with less room al
 @dataclass(frozen=True)
 class Regularisers:
     """Small terms beside the paper's objective that make a plan easy to execute; each an integral like the objective's.
+
+    The numbers are those for a body of the usual size (`toolkit.robot.scale`).
 
     Attributes:
         jerk: Weight of (change of CoM acceleration from step to step / dt)^2.
@@ -79,6 +84,24 @@ class Regularisers:
     landing: float = 300.0
     slack: float = 3000.0
     excess: float = 60.0
+
+    def scaled(self, scale: Scale) -> Regularisers:
+        """The terms with which a body of another size moves alike.
+
+        The objective is an integral over time, and so longer for a larger body; what is no integral follows it.
+        """
+        if scale == USUAL:
+            return self
+        area = scale.length**2
+        return replace(
+            self,
+            jerk=self.jerk * scale.length,
+            height=self.height / area,
+            final_center=self.final_center * scale.time / area,
+            final_acceleration=self.final_acceleration * scale.time,
+            final_spin=self.final_spin * scale.time / (area * scale.length),
+            landing=self.landing * scale.time / area,
+        )
 
 
 @dataclass(frozen=True)
@@ -190,8 +213,8 @@ class Program:
     Args:
         problem: The problem, with the wanted margins.
         robot: The robot, for the limits of the body.
-        body: Wanted margins of the body.
-        regularisers: Weights of the regularisers.
+        body: Wanted margins of the body, which are scaled with the robot.
+        regularisers: Weights of the regularisers, which are too.
         landings: Where contacts may move; None where they stay.
 
     Attributes:
@@ -209,7 +232,8 @@ class Program:
         regularisers: Regularisers,
         landings: Sequence[Landing] | None = None,
     ):
-        self.problem, self.robot, self._body, self._regularisers = problem, robot, body, regularisers
+        self.problem, self.robot, self._scale = problem, robot, robot.scale
+        self._body, self._regularisers = body.scaled(self._scale.length), regularisers.scaled(self._scale)
         self._landings = list(landings or ())
         self.layout = Layout.of(problem.active, None if landings is None else [item.step for item in landings])
         self._heading = rotation_about_z(problem.yaw)
@@ -240,7 +264,8 @@ class Program:
         duration = p.dt / 0.2
         momenta = w.linear_momentum, w.linear_momentum_rate, w.angular_momentum, w.angular_momentum_rate
         squares = [weight * p.mass**2 * duration for weight in momenta]
-        squares = np.stack([*squares, reg.jerk / (0.2 * np.maximum(p.dt, 0.02)), reg.height * duration], 1)
+        jerk = reg.jerk / (0.2 * np.maximum(p.dt, self._scale.time * BRIEF))
+        squares = np.stack([*squares, jerk, reg.height * duration], 1)
         squares[0, 4] *= not np.any(p.com_velocity)  # the acceleration before a start in motion is unknown
         height = mean_feet(p)[:, 2] + p.home_heights
         return Steps(
@@ -298,7 +323,7 @@ class Program:
         friction[foot] = wanted_friction(p, step[foot], limb[foot])
         yaw = np.full(len(step), p.margins.yaw)
         wanted = np.column_stack([friction, cop, yaw])
-        least = np.tile([LEAST.friction, *LEAST.cop, LEAST.yaw], (len(step), 1))
+        least = np.tile([LEAST.friction, *LEAST.scaled(self._scale.length).cop, LEAST.yaw], (len(step), 1))
         least[:, 1:3] = np.minimum(least[:, 1:3], cop)
         least[:, 0] = np.maximum(LEAST.friction, p.margins.friction)
         least[:, 3] = np.maximum(LEAST.yaw, yaw)

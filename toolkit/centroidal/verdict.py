@@ -39,7 +39,8 @@ def judged(motion: CentroidalMotion, robot: RobotModel, slack: np.ndarray) -> Ce
     body = body_residuals(verdict, robot)
     if verdict.feasible and body.largest <= BODY_TOLERANCE:
         return verdict
-    return replace(verdict, feasible=False, status=motion.status, failure=_failure(verdict, body, slack))
+    failure = _failure(verdict, body, slack, robot.scale.length)
+    return replace(verdict, feasible=False, status=motion.status, failure=failure)
 
 
 def _wider(motion: CentroidalMotion) -> list[Margins]:
@@ -66,8 +67,8 @@ def _wider(motion: CentroidalMotion) -> list[Margins]:
     return offers
 
 
-def _failure(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) -> Failure:
-    """The constraint that is violated most, by how much, and where."""
+def _failure(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray, scale: float) -> Failure:
+    """The constraint that is violated most, by how much, and where; `scale` is the factor on lengths."""
     times = motion.problem.times
     step = int(np.argmax(slack[:-1, 0]))
     excess = slack[step, 0]
@@ -82,7 +83,8 @@ def _failure(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray) -
     local = np.einsum("lji,lj->li", p.rotation[step], motion.force[step]) / (p.mass * -GRAVITY[2])
     friction = np.hypot(local[:, 0], local[:, 1]) - p.friction[step] * local[:, 2]
     edge = (np.abs(motion.cop[step]) - p.half_size).max(-1) * local[:, 2]
-    beyond = np.where(p.active[step], np.stack([friction, 5 * edge]), -np.inf)  # a sole is a fifth of a metre
+    beyond = np.stack([friction, 5 / scale * edge])  # a sole is a fifth of a metre
+    beyond = np.where(p.active[step], beyond, -np.inf)
     kind, worst = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
     what = ("friction", "centre of pressure")[kind] if beyond[kind, worst] > 0.0 else "yaw moment"
     limb = Limb(int(worst))

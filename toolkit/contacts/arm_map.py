@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 
 SAMPLES = 2**17  # joint angles of a map
 MARGIN = 0.15  # rad; distance from both ends of each joint's range, at most a fifth of the range
-NEAR = (0.05, 0.25)  # m and rad; how far a palm may be from a sample, since the trunk can lean
+# How far a palm may be from a sample, since the trunk can lean: m for a body of the usual size (`toolkit.robot.scale`),
+# and rad.
+NEAR = (0.05, 0.25)
 
 
 @dataclass(frozen=True)
@@ -34,11 +36,13 @@ class ArmMap:
         positions: (n, 3) Patches relative to the shoulder in the axes of the upright base, in m.
         normals: (n, 3) Unit z axes of the patches: the outward normals of the surfaces that they rest on.
         angles: (n, k) Angles of the joints from the trunk to the palm, in rad.
+        near: How far a palm may be from a sample, in m.
     """
 
     positions: np.ndarray
     normals: np.ndarray
     angles: np.ndarray
+    near: float
 
     @staticmethod
     def of(robot: RobotModel, limb: Limb) -> ArmMap:
@@ -67,7 +71,7 @@ class ArmMap:
             axis, anchor = data.xaxis[joint], data.xanchor[joint]
             positions = anchor + _rotated(positions - anchor, axis, turned[:, row])
             normals = _rotated(normals, axis, turned[:, row])
-        return ArmMap((positions - shoulder) @ base, normals @ base, angles)
+        return ArmMap((positions - shoulder) @ base, normals @ base, angles, robot.scale.length * NEAR[0])
 
     def serves(self, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(n,) bool; whether the arm can hold palms.
@@ -92,7 +96,7 @@ class ArmMap:
         return cKDTree(self._scaled(self.positions, self.normals))
 
     def _scaled(self, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        return np.hstack([positions / NEAR[0], normals / NEAR[1]])
+        return np.hstack([positions / self.near, normals / NEAR[1]])
 
 
 def _flipped(robot: RobotModel, data: mujoco.MjData, limb: Limb, joints: list[int]) -> np.ndarray:

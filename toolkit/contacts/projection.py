@@ -13,7 +13,7 @@ and no boundary edge meets the rectangle. That is exact for regions that are not
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import mujoco
 import numpy as np
@@ -28,7 +28,7 @@ from toolkit.world.surface import Surface
 
 @dataclass(frozen=True)
 class ProjectionConfig:
-    """Settings of the projection.
+    """Settings of the projection, for a body of the usual size (`toolkit.robot.scale`).
 
     Attributes:
         margin: Margin around a sole that must also lie in the surface, in m.
@@ -43,6 +43,10 @@ class ProjectionConfig:
     shift: float = 0.06
     shift_step: float = 0.02
     block_tolerance: float = 0.01
+
+    def scaled(self, factor: float) -> ProjectionConfig:
+        """The same with all lengths multiplied by a factor."""
+        return ProjectionConfig(*(factor * length for length in astuple(self)))
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,10 @@ class Projector:
         robot: The robot, for the sizes of its patches.
         surfaces: Surfaces of the world.
         model: The compiled world, for blocked rays.
-        config: Settings.
+        config: Settings; they are scaled with the robot.
+
+    Attributes:
+        config: The settings for this robot.
     """
 
     def __init__(
@@ -104,7 +111,7 @@ class Projector:
         model: mujoco.MjModel,
         config: ProjectionConfig | None = None,
     ):
-        self.config = config or ProjectionConfig()
+        self.config = (config or ProjectionConfig()).scaled(robot.scale.length)
         self.half_sizes = robot.half_sizes + self.config.margin
         self.half_sizes[list(PALMS)] = robot.half_sizes[list(PALMS)] + self.config.palm_margin
         self.table = surface_table(surfaces, reach=float(np.linalg.norm(self.half_sizes[list(FEET)], axis=1).max()))

@@ -49,7 +49,7 @@ LEG_POSTURE = 0.005  # factor on the posture's weight for joints that carry a fo
 ARM_POSTURE = 0.01  # the same for an arm whose palm is in contact, and not quite where it was planned to be
 MOMENTUM_SCALE = 10.0  # kg m^2/s per unit of the task of angular momentum, for a body of the usual size
 FORCE, MOMENT = 1e-5, 2e-4  # weights on squared N and N m of deviation from the planned wrenches: they break ties
-ACCELERATION = 1e-4  # weight on squared joint accelerations: keeps the Hessian definite
+ACCELERATION = 1e-4  # weight on squared accelerations of joints and base: keeps the Hessian definite
 NESTING = 0.5  # where the controller's margins lie between the plan's (1) and the simulation's (0)
 DIVERGENCE = 0.01  # m; divergence of the CoM that halves the weights of angular momentum and base orientation...
 URGENT_NESTING = 0.05  # ... and beyond which this replaces NESTING for the CoP, which may then come nearer to the edge
@@ -154,7 +154,9 @@ class Controller:
         self._posture_weight = np.where(legs, LEG_POSTURE, 1.0) * self._gains.posture.weight
         self._arms = {limb: robot.arm_joints(limb) for limb in self.limbs if not limb.is_foot}
         self._posture = self._posture_weight.copy()
-        self._diagonal = np.full(nv + 18, ACCELERATION)
+        self._acceleration = ACCELERATION * scale.length**2
+        self._diagonal = np.full(nv + 18, self._acceleration)
+        self._diagonal[:3] = ACCELERATION
         self._diagonal[3:6] += self._gains.base.weight
         self._diagonal[6:nv] += self._posture_weight
         self._diagonal[nv:] = self._force_weight
@@ -246,12 +248,12 @@ class Controller:
         squared = (x * x + y * y) / self._divergence**2
         self._calm = 1.0 / (1.0 + squared)
         self._urgent = squared > (0.25 if self._urgent else 1.0)
-        self._diagonal[3:6] = ACCELERATION + self._gains.base.weight * self._calm
+        self._diagonal[3:6] = self._acceleration + self._gains.base.weight * self._calm
         np.multiply(self._posture_weight, self._calm, out=self._posture)
         for limb, joints in self._arms.items():
             if self.tracker.in_contact[limb] and self.tracker.current[limb] is not None:
                 self._posture[joints] *= ARM_POSTURE  # a palm of the start is where it was planned to be
-        np.add(self._posture, ACCELERATION, out=self._diagonal[6 : dynamics.nv])
+        np.add(self._posture, self._acceleration, out=self._diagonal[6 : dynamics.nv])
 
     def _pursue_limb(self, limb: Limb, rows: int) -> int:
         """Append a limb's task rows after the first `rows` and return their new number."""

@@ -11,6 +11,7 @@ from toolkit.physics.wrench import foot_rows, friction_rows
 
 UNBOUNDED = 1e30
 FORCE_UNIT = 100.0  # N or N m per unit of the solver's variables, for a body of the usual size
+TOLERANCE = 1e-4  # units; largest violation of a constraint, far below what matters in the simulation
 
 
 class ContactQP:
@@ -150,7 +151,7 @@ class ContactQP:
     def _holds(self, x: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> bool:
         """Whether x satisfies the constraints, by its residuals: the solver's flags are not enough."""
         values = self.rows @ x
-        tolerance, size = 1e-2, self.size  # N m and N; far below what matters in the simulation
+        tolerance, size = TOLERANCE * self._unit, self.size
         return bool(
             np.isfinite(values).all()
             and (x <= upper[:size] + tolerance).all()

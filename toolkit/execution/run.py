@@ -27,7 +27,9 @@ from toolkit.wholebody.plan import WholeBodyPlan
 Observer = Callable[[float, str], None]
 """Receives progress: the share of the run that is done, and a short text."""
 
+# Time and length are those of a body of the usual size (`toolkit.robot.scale`).
 EXTRA_REST = 0.5  # s; time on the last stance after the plan's own rest, in which an unstable robot would topple
+_UNDERFOOT = 0.02  # m; geoms so near to a patch are what it stands on
 _DEFAULT = ExecutionConfig()
 
 
@@ -62,9 +64,11 @@ def execute(
     index = SceneIndex(scene, robot)
     _check_plan(plan)
     qpos0, qvel0 = trajectory.qpos[0].copy(), trajectory.qvel[0].copy()
-    config.disturbance.disturb_model(scene, index.robot_geom, _touched(scene, index, qpos0), rng)
+    config.disturbance.disturb_model(
+        scene, index.robot_geom, _touched(scene, index, qpos0, robot.scale.length * _UNDERFOOT), rng
+    )
     period = config.control_period
-    ticks = int(np.ceil((plan.schedule.duration + EXTRA_REST) / period - 1e-9))
+    ticks = int(np.ceil((plan.schedule.duration + robot.scale.time * EXTRA_REST) / period - 1e-9))
     reference = sample_reference(period * np.arange(ticks), plan)
     margins, replanner = plan.motion.solved.margins, None
     if config.replanning and margins.friction <= MAX_FRICTION:
@@ -136,13 +140,13 @@ def _check_plan(plan: WholeBodyPlan) -> None:
         raise ExecutionError("the plan has values that are not finite; it cannot be executed")
 
 
-def _touched(scene: mujoco.MjModel, index: SceneIndex, qpos: np.ndarray) -> np.ndarray:
-    """Which static geoms (ngeom,) are within 2 cm of the robot's patches in a state."""
+def _touched(scene: mujoco.MjModel, index: SceneIndex, qpos: np.ndarray, within: float) -> np.ndarray:
+    """Which static geoms (ngeom,) are within so many m of the robot's patches in a state."""
     data = mujoco.MjData(scene)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(scene, data)
     near = np.zeros(scene.ngeom, bool)
     for patch in np.flatnonzero(index.patch_limb >= 0):
         for geom in np.flatnonzero(~index.robot_geom):
-            near[geom] |= mujoco.mj_geomDistance(scene, data, int(patch), int(geom), 0.02, None) < 0.02
+            near[geom] |= mujoco.mj_geomDistance(scene, data, int(patch), int(geom), within, None) < within
     return near

@@ -15,8 +15,8 @@ and v[2], and a rotation has components r[i, j]. Each component is a number, an 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -39,6 +39,10 @@ class ReachMargins:
     length: float = 0.0
     ankle: float = 0.1
     hip: float = 0.0
+
+    def scaled(self, factor: float) -> Self:
+        """The same with its lengths multiplied by a factor."""
+        return replace(self, length=factor * self.length)
 
 
 class LegLimit(NamedTuple):

@@ -8,6 +8,7 @@ from toolkit.centroidal.sequence import SequenceConfig
 from toolkit.contacts.room import RoomConfig
 from toolkit.execution.config import ExecutionConfig
 from toolkit.refine.local_search import RefineConfig
+from toolkit.robot.scale import Scale
 from toolkit.search.costs.edge_cost import CostConfig
 
 
@@ -24,8 +25,8 @@ class PipelineConfig:
         candidates: Most contact sequences to test after the optimiser before giving up. At most half of them use palms;
             after those, only sequences for the feet alone are searched.
         until: Last stage that tests a sequence: "dynamics" for the plan alone, "wholebody", or "execution".
-        initial_rest: s; at rest before the first transition.
-        final_rest: s; at rest after the last transition.
+        initial_rest: s for a body of the usual size (`toolkit.robot.scale`); at rest before the first transition.
+        final_rest: s for the same; at rest after the last transition.
         landing: How far feet may land from where the search put them, where margins are short; None for not at all.
         refine: Settings of the local search on the true cost; None for none.
         cost: Weights of the true cost, by which plans are judged; see `toolkit.search.costs.plan_cost`.
@@ -45,3 +46,7 @@ class PipelineConfig:
     cost: CostConfig = field(default_factory=CostConfig)
     sequence: SequenceConfig = field(default_factory=SequenceConfig)
     execution: ExecutionConfig = field(default_factory=ExecutionConfig)
+
+    def rests(self, scale: Scale) -> dict[str, float]:
+        """Seconds of a robot of some size at rest: `initial_rest` and `final_rest` by name."""
+        return {"initial_rest": scale.time * self.initial_rest, "final_rest": scale.time * self.final_rest}

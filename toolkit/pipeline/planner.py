@@ -88,7 +88,6 @@ def _networks(robot: RobotModel, stand_in: OptimiserEvaluator) -> NetworkEvaluat
 def _objective(robot: RobotModel, world: World, surroundings: BodyRoom, sequence: ContactSequence) -> float | Failure:
     """Objective of a sequence's motion as a run plans it by default, or why there is none."""
     run = PipelineConfig()
-    rests = {"initial_rest": run.initial_rest, "final_rest": run.final_rest}
     settings = {"landing": run.landing, "config": run.sequence, "surroundings": surroundings}
-    motion = plan_motion(robot, world, sequence, **rests, **settings).motion
+    motion = plan_motion(robot, world, sequence, **run.rests(robot.scale), **settings).motion
     return motion.objective if motion.feasible else motion.failure or Failure(motion.outcome)

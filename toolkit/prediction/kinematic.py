@@ -24,7 +24,7 @@ _LENGTH_MARGIN = 0.01  # m; the CoM is low enough for legs this much shorter tha
 class KinematicConfig:
     """Settings, for a body of the usual size (`toolkit.robot.scale`).
 
-    The objective replaces the dynamics objective and has its order of magnitude.
+    The objective replaces the dynamics objective and has its order of magnitude, so it is an integral over time too.
 
     Attributes:
         friction: The part of the friction coefficient that a sole at rest may need; steeper surfaces hold no foot.
@@ -58,7 +58,7 @@ class KinematicEvaluator(TransitionEvaluator):
     ) -> TransitionBatch:
         """Judge transitions; see `TransitionEvaluator`."""
         config, rows, n = self._config, TransitionRows.of(transitions), len(transitions)
-        scale = self._robot.scale.length
+        scale, pace = self._robot.scale.length, self._robot.scale.time
         feet = [stance[limb] for limb in FEET]
         position = np.tile([foot.pose.position for foot in feet], (n, 1, 1))
         rotation = np.tile([foot.pose.rotation for foot in feet], (n, 1, 1, 1))
@@ -86,7 +86,7 @@ class KinematicEvaluator(TransitionEvaluator):
             + config.spread * (((lateral - self._home_width) / (scale * 0.1)) ** 2 + (turn / 0.3) ** 2)
         )
         relief = config.palm_relief ** len(stance.palms)
-        objective = np.where(rows.limb < len(FEET), objective * relief, 1.0)
+        objective = pace * np.where(rows.limb < len(FEET), objective * relief, 1.0)
         return TransitionBatch(feasible, objective, self._com(position, rotation, mean, yaw), np.zeros((n, 3)))
 
     def _com(self, position: np.ndarray, rotation: np.ndarray, mean: np.ndarray, yaw: np.ndarray) -> np.ndarray:

@@ -15,7 +15,8 @@ from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 
 SLACK = 0.01
-"""m; about the error of networks in the CoM. A CoM that violates a bound by more is out of reach."""
+"""m for a body of the usual size (`toolkit.robot.scale`); about the error of networks in the CoM. A CoM that violates a
+bound by more is out of reach."""
 _INSIDE = 1e-6  # m by which a moved CoM is within reach
 _ROUNDS = 20
 
@@ -23,7 +24,7 @@ _ROUNDS = 20
 def within_reach(robot: RobotModel, stance: Stance, com: np.ndarray, config: ProblemConfig | None = None) -> np.ndarray:
     """CoMs (n, 3) m, world, moved by little so that every limb reaches its contact and none is too low.
 
-    Rows that violate nothing, violate a bound by more than `SLACK` m or find no such place stay unchanged. The settings
+    Rows that violate nothing, violate a bound by more than `SLACK` or find no such place stay unchanged. The settings
     `config` of the problems say how low a CoM may be.
     """
     com = np.asarray(com, float)
@@ -48,7 +49,7 @@ def within_reach(robot: RobotModel, stance: Stance, com: np.ndarray, config: Pro
         return np.maximum(distances.max(1), least - points[:, 2])
 
     before = violation(com)
-    rows = np.flatnonzero((before > 0.0) & (before <= SLACK))
+    rows = np.flatnonzero((before > 0.0) & (before <= robot.scale.length * SLACK))
     if not len(rows):
         return com
     moved = com[rows]

@@ -148,7 +148,7 @@ class LocalSearch:
         self, sequence: ContactSequence, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen, *, all_kinds: bool
     ) -> Iterator[ContactSequence]:
         """Variants that pass the screens, those that are guessed to be the cheapest first."""
-        guess = Foresight(plan.sequence, cost, self._cost, plan.world.goal)
+        guess = Foresight(plan.sequence, cost, self._cost, plan.world.goal, plan.robot.scale)
         fewer = {each.identity: each for each in (*without_palms(sequence, screen), *left_out(sequence, screen))}
         groups = chain(relinked(sequence, screen), ([each] for each in swapped(sequence, screen))) if all_kinds else ()
         most = cost.total * (1.0 + self._config.prospect)
@@ -234,4 +234,4 @@ def _arrives(sequence: ContactSequence, base: MotionPlan) -> bool:
     def distance(each: ContactSequence) -> float:
         return float(np.hypot(*(each.stances[-1].mean_feet.position - goal.position)[:2]))
 
-    return distance(sequence) <= max(arrival_radius(goal), distance(base.sequence))
+    return distance(sequence) <= max(arrival_radius(goal, base.robot.scale), distance(base.sequence))

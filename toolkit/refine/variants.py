@@ -16,7 +16,8 @@ _WINDOW = 7  # most transitions that are replaced together
 _LESS, _MORE = 3, 2  # most by which their number falls or rises
 _STEPS = 5  # most transitions that replace them
 _BEAM = 4  # most places that are tried for a new contact in between
-_TURN = 0.1  # m of distance that 1 rad of turning counts as, to compare places
+# m of distance that 1 rad of turning counts as for a body of the usual size (`toolkit.robot.scale`), to compare places
+_TURN = 0.1
 
 
 def left_out(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[ContactSequence]:
@@ -123,7 +124,7 @@ def _chains(
             beam = [
                 (step.apply(stance), (*chain, step))
                 for stance, chain in beam
-                for step in _nearest(screen.steps(stance, limb, timing), start, end, limb, share)
+                for step in _nearest(screen.steps(stance, limb, timing), start, end, limb, share, screen.scale.length)
             ]
         for _, chain in beam:
             ends = tuple(ContactTransition(limb, end[limb], timing) for limb in limbs[free:])
@@ -136,9 +137,9 @@ def _moved(start: Stance, end: Stance, foot: Limb) -> bool:
 
 
 def _nearest(
-    steps: list[ContactTransition], start: Stance, end: Stance, foot: Limb, share: float
+    steps: list[ContactTransition], start: Stance, end: Stance, foot: Limb, share: float, scale: float
 ) -> list[ContactTransition]:
-    """The steps nearest to a share of the straight way of a foot between two stances."""
+    """The steps nearest to a share of the straight way of a foot between two stances; `scale` is that of lengths."""
     first, last = start[foot].pose, end[foot].pose
     place = first.position + share * (last.position - first.position)
     yaw = first.yaw + share * wrapped(last.yaw - first.yaw)
@@ -147,6 +148,6 @@ def _nearest(
         assert step.contact is not None
         pose = step.contact.pose
         away = pose.position - place
-        return float((away @ away) ** 0.5 + _TURN * abs(wrapped(pose.yaw - yaw)))
+        return float((away @ away) ** 0.5 + scale * _TURN * abs(wrapped(pose.yaw - yaw)))
 
     return sorted(steps, key=miss)[:_BEAM]

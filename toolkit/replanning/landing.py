@@ -15,10 +15,11 @@ from toolkit.robot.scale import USUAL, Scale
 from toolkit.world.surface import Surface
 
 CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-# Lengths and speeds are those of a body of the usual size (`toolkit.robot.scale`).
+# Lengths, speeds and times are those of a body of the usual size (`toolkit.robot.scale`).
 MAX_SHIFT = 0.15  # m; largest shift of a landing point along each axis of its plane
 MARGIN = 0.01  # m; distance of the sole from the edge of its surface, for errors of the swing's tracking
 GAP = 0.02  # m; between a landing sole and the other one
+SETTLING = 0.05  # s; a landing point no longer moves so long before the end of the swing
 SLEW = 0.8  # m/s; how far a landing point may still move per second that is left: a foot is not faster sideways
 
 
@@ -82,7 +83,7 @@ class Landings:
         reach = np.full(4, scale.length * MAX_SHIFT)
         if event in situation.moving:
             moved = contact.pose.rotation[:, :2].T @ situation.moving[event]
-            left = scale.speed * SLEW * max(end - situation.time - 0.05, 0.0)
+            left = scale.speed * SLEW * max(end - situation.time - scale.time * SETTLING, 0.0)
             reach = np.minimum(reach, np.maximum(axes @ moved + left, 0.0))
         rows, bounds = [region, axes], [room, reach]
         other = situation.standing.get(swing.limb.mirrored)

@@ -17,7 +17,10 @@ from toolkit.replanning.situation import HorizonContacts
 from toolkit.robot.model import RobotModel
 
 BODY = BodyMargins(length=0.007, ankle=0.05, hip=0.025, height=0.01, torque=0.92)
-"""Margins kept inside the body's limits. They are smaller than the plan's, so that a correction has some room."""
+"""Margins kept inside the body's limits, for a body of the usual size (`toolkit.robot.scale`).
+
+They are smaller than the plan's, so that a correction has some room.
+"""
 _LEG_ANKLE, _TORQUE_ANKLE, _TORQUE_SOLE = slice(3, 6), slice(4, 7), slice(18, 21)  # among the parameters of the rows
 _TANGENTS = 10  # first parameter of a distance that says how its tip follows displacements
 

@@ -25,7 +25,8 @@ DEADBAND = 0.01  # m; divergence that the controller's gains settle, where every
 # Landing points stay where they are planned while the divergence left when the next foot lands is at most SETTLED m
 # and the body's limits exceeded on the way cost at most EXCESS: the controller's gains suffice for that.
 SETTLED, EXCESS = 0.01, 0.02
-# Swings end early only where the objective exceeds EARLY_OBJECTIVE and falls by EARLY_GAIN; 1 s earlier costs EARLY.
+# Swings end early only where the objective exceeds EARLY_OBJECTIVE and falls by EARLY_GAIN; 1 s earlier costs a body of
+# the usual size EARLY.
 EARLY_OBJECTIVE, EARLY_GAIN, EARLY = 0.3, 0.3, 3.0
 
 
@@ -123,6 +124,7 @@ class ReplanProblem:
         times, off = window.times, y[:, :9] - program.track.states
         rate = PENDULUM_RATE / nominal.scale.time
         rates = np.diff(off, axis=0) / window.dt[:, None]
+        hastened = sum(nominal.swings[event].end - end for event, end in early.items()) / nominal.scale.time
         return Replan(
             times=times,
             com=off[:, :3],
@@ -133,7 +135,7 @@ class ReplanProblem:
             wrench=wrench,
             landing=dict(zip(events, shifts, strict=True)),
             ends=early,
-            objective=objective + EARLY * sum(nominal.swings[event].end - end for event, end in early.items()),
+            objective=objective + EARLY * hastened,
             excess=program.excess(y),
             divergence=np.linalg.norm(off[:, :3] + off[:, 3:6] / rate, axis=1),
             next_landing=int(np.searchsorted(times, next_end) if next_end < times[-1] else window.steps),

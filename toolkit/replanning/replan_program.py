@@ -23,7 +23,9 @@ from toolkit.replanning.situation import HorizonContacts
 from toolkit.replanning.tracking import SPIN_RATE, Tracking
 from toolkit.replanning.window import Window
 
-SLACK = 2.0  # price per s of taking back the body's margins: a small excess is better than a fall
+# Price per s, for a body of the usual size (`toolkit.robot.scale`), of taking back the body's margins: a small excess
+# is better than a fall.
+SLACK = 2.0
 CONES = 5000.0  # price of leaving the controller's cones, in multiples of `SLACK`
 MOST = 3.0  # weights; largest normal force
 OPTIONS = Options(False, iterations=25, tolerance=1e-2, feasible=1e-3, gap=1e-2, least=1e-5, small=0.1, linear=True)
@@ -94,7 +96,7 @@ class ReplanProgram:
     @property
     def _price(self) -> np.ndarray:
         """(N,) prices of slacks in the steps."""
-        return SLACK * self.window.dt
+        return SLACK * self.track.usual_dt
 
     def _guess(self) -> np.ndarray:
         """The plan (N + 1, m); slacks start where their prices balance the barrier."""
@@ -116,7 +118,7 @@ class ReplanProgram:
         contacts, layout, dt = self.contacts, self.layout, self.window.dt
         step, limb = np.nonzero(contacts.active)
         weights = np.zeros((len(dt), 6))
-        weights[:, ANGULAR_RATE] = SPIN_RATE * dt
+        weights[:, ANGULAR_RATE] = SPIN_RATE * self.track.usual_dt / self.track.scale.length**2
         return Steps(
             dt=dt,
             first=np.searchsorted(step, np.arange(len(dt) + 1)),

@@ -24,6 +24,8 @@ PERIOD = 0.04  # s; time between replans. The following are those of a body of t
 PACE = 1.9  # largest pace, relative to the plan, of a swing whose contact is needed earlier
 PACE_RATE = 12.0  # 1/s; rate at which the pace changes
 SHORTEST = 0.3  # s; least duration of a whole swing at that pace
+SOONEST = 0.02  # s; a swing under way that ends earlier ends so much after the time that its fastest pace needs
+SETTLED_BEFORE, LEAST_LEFT = 0.03, 0.05  # s before a foot comes down, when it is where it lands, and least time left
 KEPT_FROM = 0.75  # part of the swing after which the landing point is kept, because the foot comes down
 
 
@@ -66,7 +68,7 @@ class Replanner:
         self._weight = self._mass * STANDARD_GRAVITY
         scale = plan.robot.scale
         self._rate, self._deadband = PENDULUM_RATE / scale.time, scale.length * DEADBAND
-        self._pace_rate, self._shortest = PACE_RATE / scale.time, scale.time * SHORTEST
+        self._time, self._pace_rate, self._shortest = scale.time, PACE_RATE / scale.time, scale.time * SHORTEST
         self._due = 0.0
         self._plan: Replan | None = None
         self._made: dict[Limb, int] = {}
@@ -177,7 +179,7 @@ class Replanner:
             lead = float(tracker.lead[limb])
             over = (time + lead - swing.start) / (swing.end - swing.start)
             if tracker.state[limb] is LimbState.SWING and limb.is_foot:
-                earliest[index] = time + (swing.end - time - lead) / self._most(swing) + 0.02
+                earliest[index] = time + (swing.end - time - lead) / self._most(swing) + self._time * SOONEST
                 landing[index] = min(max(self._ends.get(index, np.inf), earliest[index]), swing.end - lead)
             if tracker.state[limb] is not LimbState.SWING or over > KEPT_FROM:
                 fixed[index] = self._goal.get(index, np.zeros(3))
@@ -231,12 +233,14 @@ class Replanner:
                 continue
             event = self._nominal.swings.index(swing)
             end = self._ends.get(event, swing.end)
-            pace = (swing.end - time - tracker.lead[foot]) / max(end - time, 0.02) if end < swing.end else 1.0
+            left = max(end - time, self._time * SOONEST)
+            pace = (swing.end - time - tracker.lead[foot]) / left if end < swing.end else 1.0
             pace = min(max(pace, 1.0), self._most(swing))
             change = self._pace_rate * period
             tracker.pace[foot] += min(max(pace - tracker.pace[foot], -change), change)
             goal = self._goal.get(event, self._shift[foot])
-            left = max(min(end, swing.start + 0.9 * (swing.end - swing.start)) - 0.03 - time, 0.05)
+            last = min(end, swing.start + 0.9 * (swing.end - swing.start)) - self._time * SETTLED_BEFORE
+            left = max(last - time, self._time * LEAST_LEFT)
             pull = 6.0 * (goal - self._shift[foot]) / left**2 - 4.0 * self._shift_rate[foot] / left
             self._shift_rate[foot] += period * pull
             self._shift[foot] += period * self._shift_rate[foot]

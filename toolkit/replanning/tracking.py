@@ -15,6 +15,7 @@ from toolkit.replanning.landing import FreeLandings
 from toolkit.replanning.situation import HorizonContacts
 from toolkit.robot.scale import Scale
 
+# All are those of a body of the usual size (`toolkit.robot.scale`).
 # Weights of the CoM per m^2 s, and of its velocity per m^2/s, horizontal and vertical (no landing point helps there).
 COM, VELOCITY, CLIMB = 100.0, 2.5, 20.0
 # Weights of the angular momentum per mass, per (m^2/s)^2 s, and of its rate, which arms and trunk must follow.
@@ -51,19 +52,26 @@ class Tracking:
     free: FreeLandings
     scale: Scale
 
+    @property
+    def usual_dt(self) -> np.ndarray:
+        """(N,) s; what the steps would last for a body of the usual size."""
+        return self.dt / self.scale.time
+
     def prices(self) -> Prices:
         """Prices of single variables."""
         n, (step, limb) = len(self.dt), np.nonzero(self.contacts.active)
-        weight = self.dt[:, None] * np.array([COM] * 3 + [VELOCITY, VELOCITY, CLIMB] + [SPIN] * 3)
+        area, speed, spin = self.scale.length**2, self.scale.speed**2, self.scale.length**3
+        com, velocity, climb = COM / area, VELOCITY / speed, CLIMB / speed
+        weight = self.usual_dt[:, None] * np.array([com] * 3 + [velocity, velocity, climb] + [SPIN / spin] * 3)
         if self.free.items:
             weight[:, :3] = 0.0  # see `squares`
-        weight[-1, 6:] += FINAL_SPIN
+        weight[-1, 6:] += FINAL_SPIN / spin
         wanted = self.states[1:].copy()
         wanted[:, :3] += self._led()
-        moment = np.where(limb < len(FEET), MOMENT, PALM_MOMENT)
-        pull = self.dt[step, None] * np.column_stack([np.full((len(step), 3), FORCE), np.tile(moment, (3, 1)).T])
+        moment = np.where(limb < len(FEET), MOMENT, PALM_MOMENT) / area
+        pull = self.usual_dt[step, None] * np.column_stack([np.full((len(step), 3), FORCE), np.tile(moment, (3, 1)).T])
         at = np.repeat([item.step for item in self.free.items], 2).astype(int)
-        total = LANDING + LANDING_CHANGE
+        total, change = (LANDING + LANDING_CHANGE) / area, LANDING_CHANGE / area
         parts = [
             (np.repeat(np.arange(1, n + 1), 9), np.tile(np.arange(9), n), weight, wanted),
             (np.repeat(step, 6), indices(self.layout.wrench[step, limb], WRENCH), pull, self.wrench),
@@ -71,7 +79,7 @@ class Tracking:
                 at,
                 indices(self.layout.landing[at[::2]], 2),
                 np.full(len(at), total),
-                LANDING_CHANGE / total * self.free.goal,
+                change / total * self.free.goal,
             ),
         ]
         stage, variable, quadratic, wanted = (
@@ -94,7 +102,7 @@ class Tracking:
             factors[-1, :, 2:] = factors[-2, :, 2:]
         wanted = self.states[knot, :3] + self._led()[knot - 1]
         wanted[-1] += self.states[-1, 3:6] / rate
-        weight = np.append(COM * self.dt[knot[:-1] - 1], FINAL)
+        weight = np.append(COM * self.usual_dt[knot[:-1] - 1], FINAL) / self.scale.length**2
         width = variables.shape[2]
         return Squares(
             stage=np.repeat(knot, 3),

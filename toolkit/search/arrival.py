@@ -20,7 +20,7 @@ from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import is_pending
 
 _WINDOWS = (1, 3, 6)  # transitions that are optimised together, in the order in which they are tried
-_REST = 0.6  # s on the final stance that are optimised with them
+_REST = 0.6  # s for a body of the usual size (`toolkit.robot.scale`), on the final stance that are optimised with them
 
 Finish = Callable[[ContactSequence], float | Failure]
 """Objective of the motion of a whole sequence from rest to rest, or why there is no such motion."""
@@ -82,8 +82,8 @@ class Arrival:
         if self._screen.evaluate(*self._reader.origin(passed[-1]), transitions[-1:]).feasible[0]:
             return True
         windows = [count for count in _WINDOWS if count <= len(transitions)]
-        starts = [self._reader.origin(passed[-count]) for count in windows]
+        starts, rest = [self._reader.origin(passed[-count]) for count in windows], self._reader.scale.time * _REST
         return any(
-            self._screen.halt(*start, transitions[-count:], _REST) is not None
+            self._screen.halt(*start, transitions[-count:], rest) is not None
             for count, start in zip(windows, starts, strict=True)
         )

@@ -12,7 +12,7 @@ from toolkit.search.moves.candidates import Candidates
 from toolkit.search.moves.reach_check import ReachCheck
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.states.reader import StateReader
-from toolkit.search.states.state import COM, CONTACTS, VELOCITY, origin_of
+from toolkit.search.states.state import CONTACTS, origin_of
 
 
 @dataclass
@@ -52,7 +52,7 @@ class Judging:
         Returns:
             The judgement, and codes (n,), 0 where the limbs reach as well; None where there is no time left.
         """
-        contacts, com, velocity = origin_of(row)[CONTACTS], row[COM] / 1000.0, row[VELOCITY] / 1000.0
+        contacts, (com, velocity) = origin_of(row)[CONTACTS], self._reader.motion(row)
         transitions = self._reader.transitions(candidates.limb, candidates.number, candidates.timing)
         began = time.perf_counter()
         if began + self._pace * len(transitions) > self._deadline:

@@ -115,11 +115,12 @@ class ContactPlanner:
         heuristic_seconds = time.perf_counter() - began
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
         tally, timings = Tally(), self.timings(calmer, slides=way.slides)
-        strategy = strategy_of(self.config, self._suited(start, com, timings, tally), way.length, slides=way.slides)
-        blame = Blame(exclusions, _STRIKES)
+        suited, scale = self._suited(start, com, timings, tally), self.robot.scale.length
+        strategy = strategy_of(self.config, suited, way.length, slides=way.slides, scale=scale)
+        blame = Blame(exclusions, _STRIKES, scale=scale)
         parts = self._parts(way, strategy, timings, tally, blame.exclusions, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
-        unit, may_yield = parts.cost.per_metre, self.timings(calmer + 1, slides=way.slides) != timings
+        unit, may_yield = parts.cost.unit, self.timings(calmer + 1, slides=way.slides) != timings
         patient = replace(strategy.patient, unit=unit)
         if may_yield or way.slides:  # a calmer search follows, or the strategy has extended the limit
             patient = replace(patient, persistence=1)
@@ -176,15 +177,14 @@ class ContactPlanner:
         table, palms = moves.table, palms and self.config.palms and moves.has_palm_surfaces
         limbs = [limb for limb in PALMS if palms and limb in self.robot.arms]
         candidates = CandidateGenerator(moves, limbs, timings, exclusions, tally.rejected)
-        reader, reach = StateReader(table, timings), ReachCheck(moves, limbs, timings)
+        scale = self.robot.scale
+        reader, reach = StateReader(table, timings, scale), ReachCheck(moves, limbs, timings)
         mass = 0.0 if self._finish is None else self.robot.mass
-        cost = EdgeCost(
-            strategy.cost, table, timings, self.world.goal, way.distance, way.longest, mass, self.robot.scale
-        )
+        cost = EdgeCost(strategy.cost, table, timings, self.world.goal, way.distance, way.longest, mass, scale)
         haste = None
         if strategy.hasty is not None:
-            haste = Haste(table, self.robot.com_height, way.forced, cost.per_metre)
-        delay = Delay(Drift(self.robot, table, timings), haste, cost.per_metre)
+            haste = Haste(table, self.robot.com_height, way.forced, cost.per_metre, scale.length)
+        delay = Delay(Drift(self.robot, table, timings), haste, cost.per_metre, scale.length)
         at_once, waiting = (
             None if judge is None else Judging(judge, reader, reach, tally, deadline)
             for judge in (strategy.at_once, strategy.waiting)

@@ -22,21 +22,19 @@ from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import (
-    COM,
     CONTACTS,
     LAST,
     SIZE,
     TIMING,
-    VELOCITY,
     is_pending,
     origin_of,
-    pack,
     pack_pending,
+    speed_of,
     unpack,
     unpack_all,
 )
 
-_CROWD, _PACE = 0.1, 0.25  # m, m/s; states of a crowd differ by less
+_CROWD, _PACE = 0.1, 0.25  # m, m/s for a body of the usual size (`toolkit.robot.scale`); states of a crowd differ less
 
 
 @dataclass(frozen=True)
@@ -93,10 +91,10 @@ class ContactProblem:
         return judged & self._parts.cost.at_goal(self._seen(states)[1])
 
     def crowd(self, states: Sequence[bytes]) -> list[tuple]:
-        """See `SearchProblem`: states of similar speed with the mean of the feet in the same square of 0.1 m."""
+        """See `SearchProblem`: states of similar speed with the mean of the feet in the same small square."""
         rows, centre, _ = self._seen(states)
-        place = np.floor(centre[:, :2] / _CROWD)
-        speed = np.floor(np.hypot(*rows[:, VELOCITY][:, :2].T) / (1000.0 * _PACE))
+        place = np.floor(centre[:, :2] / (self._parts.reader.scale.length * _CROWD))
+        speed = np.floor(speed_of(rows) / _PACE)
         kind = [is_pending(state) for state in states]
         return list(map(tuple, np.column_stack([place, speed, kind]).astype(int).tolist()))
 
@@ -146,14 +144,14 @@ class ContactProblem:
         cost = self._parts.cost.dynamics * objective
         if not pending:
             cost = cost + self._parts.cost.known(candidates)
-        states = pack(candidates.contacts, candidates.limb, com, velocity)
+        states = self._parts.reader.states(candidates.contacts, candidates.limb, com, velocity)
         payloads = zip(objective.tolist(), candidates.timing.tolist(), strict=True)
         delay = self._parts.delay.of_states(candidates.contacts, com, velocity)
         return [Edge(*item) for item in zip(states, cost.tolist(), payloads, delay.tolist(), strict=True)]
 
     def _postponed(self, row: np.ndarray, candidates: Candidates, *, doubted: bool) -> list[Edge[bytes]]:
         """Edges to pending states, which cost the known part."""
-        com, velocity = row[COM] / 1000.0, row[VELOCITY] / 1000.0
+        com, velocity = self._parts.reader.motion(row)
         states = pack_pending(row, candidates.contacts, candidates.limb, candidates.timing)
         cost = self._parts.cost.known(candidates)
         delay = self._parts.delay.of_waiting(row[CONTACTS], com, velocity, candidates, doubted=doubted)

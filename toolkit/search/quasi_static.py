@@ -25,7 +25,7 @@ from toolkit.geometry.pose import rotation_about_z, steepness
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.legs import legs_of, reach
-from toolkit.search.moves.moves import MARGINS
+from toolkit.search.moves.limits import margins
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.world.surface import Surface
@@ -44,7 +44,7 @@ class QuasiStaticEvaluator(TransitionEvaluator):
     rejection = "no statically balanced posture at take-off or touch-down"
 
     def __init__(self, robot: RobotModel):
-        self._robot, self._legs = robot, legs_of(robot, MARGINS)
+        self._robot, self._legs = robot, legs_of(robot, margins(robot))
         self._programs: dict[bytes, np.ndarray | None] = {}
 
     def evaluate(

@@ -11,7 +11,7 @@ from toolkit.search.anytime.graph import Path
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.search.states.reader import StateReader
-from toolkit.search.states.state import COM, CONTACTS, VELOCITY, is_pending, unpack
+from toolkit.search.states.state import CONTACTS, is_pending, unpack
 
 
 @dataclass(frozen=True)
@@ -46,13 +46,14 @@ class Solution:
         rows = unpack(states)
         transitions = tuple(reader.transition(*step) for step in zip(states[1:], payloads, strict=True))
         corrections = sum(sum(payload[2:]) for payload in payloads)
+        com, velocity = reader.motion(rows)
         return cls(
             sequence=ContactSequence(reader.stance(rows[0, CONTACTS]), transitions),
             cost=path.cost,
             bound=path.bound,
             seconds=path.seconds,
-            com=rows[:, COM] / 1000.0,
-            com_velocity=rows[:, VELOCITY] / 1000.0,
+            com=com,
+            com_velocity=velocity,
             objective=np.array([payload[0] for payload in payloads]),
             predicted=path.cost - corrections,
         )

@@ -17,7 +17,9 @@ from toolkit.search.moves.reasons import Reason
 from toolkit.world.timing import Timing
 
 _KEPT = 100_000  # screens that are remembered
-_AT = 0.01  # m; a ray to a palm's contact hits the palm's surface no farther from it than this
+# m for a body of the usual size (`toolkit.robot.scale`); a ray to a palm's contact hits the palm's surface no farther
+# from it than this
+_AT = 0.01
 
 
 class SequenceScreen:
@@ -26,10 +28,15 @@ class SequenceScreen:
     Args:
         moves: The moves of the search.
         palms: The palms that it may use.
+
+    Attributes:
+        scale: The robot's size.
     """
 
     def __init__(self, moves: MoveGenerator, palms: Sequence[Limb]):
         self._moves, self._palms = moves, palms
+        self.scale = moves.robot.scale
+        self._speed, self._at = self.scale.speed * SWING_SPEED, self.scale.length * _AT
         self._known: dict[tuple, int] = {}
         self._numbers: dict[int, tuple[Contact, int]] = {}  # by the contact's id, which stays its own while it is kept
 
@@ -84,7 +91,7 @@ class SequenceScreen:
         table, standing = moves.table, int(before[limb.mirrored])
         place = table.position[row], table.rotation[row], table.yaw[row]
         code = int(moves.screen(limb, table.surface[row], *place, standing)[0])
-        return code or int(moves.swings(limb, row, int(before[limb]), standing, SWING_SPEED * timing.swing)[0])
+        return code or int(moves.swings(limb, row, int(before[limb]), standing, self._speed * timing.swing)[0])
 
     def _palm(self, before: np.ndarray, limb: Limb, number: int, timing: Timing) -> int:
         if number < 0:
@@ -95,7 +102,7 @@ class SequenceScreen:
         place = moves.table.position[number]
         ray = place - moves.shoulder(limb, left, right)
         palms, codes = moves.aimed(limb, left, right, ray[None] / np.linalg.norm(ray))
-        if codes[0] == 0 and np.linalg.norm(palms.position[0] - place) > _AT:
+        if codes[0] == 0 and np.linalg.norm(palms.position[0] - place) > self._at:
             return Reason.NO_WALL
         return int(codes[0])
 
@@ -124,6 +131,6 @@ class SequenceScreen:
         found = self._moves.steps(limb, standing).numbers
         if not len(found):
             return []
-        codes = self._moves.swings(limb, found, int(numbers[limb]), standing, SWING_SPEED * timing.swing)
+        codes = self._moves.swings(limb, found, int(numbers[limb]), standing, self._speed * timing.swing)
         table = self._moves.table
         return [ContactTransition(limb, table.contact(int(number)), timing) for number in found[codes == 0]]

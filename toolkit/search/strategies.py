@@ -10,7 +10,8 @@ from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.planner_config import PlannerConfig
 
-_LAYER = 0.13  # m of way; random expansions are as likely at every distance from the goal
+_SHORTEST = 1.0  # m for a body of the usual size (`toolkit.robot.scale`); shorter ways are taken to be as long
+_LAYER = 0.13  # units; random expansions are as likely at every distance from the goal
 
 
 @dataclass(frozen=True)
@@ -35,11 +36,14 @@ class Strategy:
     hasty: AnaStarConfig | None = None
 
 
-def strategy_of(config: PlannerConfig, evaluator: TransitionEvaluator, length: float, *, slides: bool) -> Strategy:
+def strategy_of(
+    config: PlannerConfig, evaluator: TransitionEvaluator, length: float, *, slides: bool, scale: float = 1.0
+) -> Strategy:
     """The strategy that suits a judge, the length of the way in m and its ground.
 
-    `slides` says whether no way leads over resting ground alone.
+    `slides` says whether no way leads over resting ground alone; `scale` is the factor on the robot's lengths.
     """
+    length = max(length, scale * _SHORTEST)
     config = replace(config, cost=config.cost.on_ground(slides=slides))
     if slides:
         evaluator = evaluator.sliding or evaluator
@@ -96,4 +100,4 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
 def _acceptable(config: PlannerConfig, length: float) -> float:
     """The assumed cost of a solution before there is one; that of the settings, unless they leave it open."""
     given = config.search.initial_cost
-    return config.acceptable_cost * max(length, 1.0) if given == math.inf else given
+    return config.acceptable_cost * length if given == math.inf else given

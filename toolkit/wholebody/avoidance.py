@@ -22,6 +22,7 @@ import numpy as np
 
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
+from toolkit.robot.scale import Scale
 from toolkit.wholebody.collision import body_pair
 
 MAX_ROWS = 24  # most dampers at a time, of the nearest pairs: each costs solver time, and few are active
@@ -29,7 +30,7 @@ MAX_ROWS = 24  # most dampers at a time, of the nearest pairs: each costs solver
 
 @dataclass(frozen=True)
 class Damper:
-    """How a kind of pair is kept apart.
+    """How a kind of pair is kept apart, with the numbers for a body of the usual size (`toolkit.robot.scale`).
 
     Attributes:
         safe_world, safe_self: m; wanted distance from the world and from the rest of the robot.
@@ -43,6 +44,16 @@ class Damper:
     room: float
     time: float
     weight: float
+
+    def scaled(self, scale: Scale) -> Damper:
+        """The damper for a body of another size."""
+        return Damper(
+            safe_world=scale.length * self.safe_world,
+            safe_self=scale.length * self.safe_self,
+            room=scale.length * self.room,
+            time=scale.time * self.time,
+            weight=self.weight / scale.length**2,
+        )
 
     @property
     def notice(self) -> float:
@@ -91,7 +102,7 @@ class Avoidance:
 
     def __init__(self, robot: RobotModel, scene: mujoco.MjModel, others: Damper = BODY):
         """Prepare a copy of the scene, robot and world in one model; `others` is for pairs without a link of an arm."""
-        self.others = others
+        self.arms, self.others = ARM.scaled(robot.scale), others.scaled(robot.scale)
         self.model = copy.copy(scene)
         self.data = mujoco.MjData(self.model)
         model = self.model
@@ -101,7 +112,7 @@ class Avoidance:
         self.of = {limb: model.geom_bodyid == body for limb, body in self.body.items()}
         self.base = int(model.body(robot.base).id)
         model.geom_gap[:] = 0.0
-        model.geom_margin[:] = np.where(self.static, 0.0, np.where(self.arm, ARM.notice, self.others.notice))
+        model.geom_margin[:] = np.where(self.static, 0.0, np.where(self.arm, self.arms.notice, self.others.notice))
         model.body_margin[:] = 0.0
         np.maximum.at(model.body_margin, model.geom_bodyid, model.geom_margin)  # where collisions are looked for at all
         self.box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
@@ -135,12 +146,12 @@ class Avoidance:
         found = found[:MAX_ROWS]
         matrix, bound = np.zeros((len(found), self.model.nv - 6)), np.zeros(len(found))
         for row, (room, pair, damper) in enumerate(found):
-            rate, known = self._rate(pair, self.base if damper is ARM else stand, drift)
+            rate, known = self._rate(pair, self.base if damper is self.arms else stand, drift)
             matrix[row], bound[row] = -rate, room * tick / damper.time + known
         return Dampers(matrix, bound, np.array([damper.weight for _, _, damper in found]))
 
     def _damper(self, pair: _Pair) -> Damper:
-        return ARM if self.arm[pair.first] or self.arm[pair.second] else self.others
+        return self.arms if self.arm[pair.first] or self.arm[pair.second] else self.others
 
     def _of_world(self, pair: _Pair) -> bool:
         return bool(self.static[pair.first] or self.static[pair.second])
@@ -199,7 +210,7 @@ class Avoidance:
         """The same for pairs of boxes; MuJoCo's collision function finds those apart only if two faces are opposite."""
         model, data, ends = self.model, self.data, np.zeros(6)
         first, second = self.box_pairs.T
-        notice = np.where(self.arm[first] | self.arm[second], ARM.notice, self.others.notice)
+        notice = np.where(self.arm[first] | self.arm[second], self.arms.notice, self.others.notice)
         apart = np.linalg.norm(data.geom_xpos[first] - data.geom_xpos[second], axis=1)
         near = apart < notice + model.geom_rbound[first] + model.geom_rbound[second]
         near &= ~self._left(first, second, free)

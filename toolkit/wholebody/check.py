@@ -14,7 +14,7 @@ from toolkit.wholebody.collision import first_collision
 from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.motion_dynamics import inverse_dynamics, velocities
 
-# Largest deviation of a whole-body motion from its plan.
+# Largest deviation of a whole-body motion from its plan, for a body of the usual size (`toolkit.robot.scale`).
 COM_ERROR = 0.02  # m; of the CoM
 FOOT_ERROR, PALM_ERROR = 0.005, 0.01  # m; of a patch in contact
 SWING_ERROR = 0.02  # m; of a foot in the air
@@ -80,13 +80,13 @@ def _tracking(
             worst[thing, unit] = (error, limit, time)
         return error
 
-    position = orientation = 0.0
+    position, orientation, scale = 0.0, 0.0, robot.scale.length
     for time, state in zip(times, qpos, strict=True):
         data.qpos[:] = state
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         error = float(np.linalg.norm(data.subtree_com[0] - motion.sample(time)[0]))
-        position = max(position, note("the CoM", "m", error, COM_ERROR, time))
+        position = max(position, note("the CoM", "m", error, scale * COM_ERROR, time))
         for limb, item in robot.limbs.items():
             sample = paths.sample(limb, time)
             if sample.pose is None or not (limb.is_foot or sample.in_contact):
@@ -94,10 +94,10 @@ def _tracking(
             site = data.site(item.site)
             error = float(np.linalg.norm(site.xpos - sample.pose.position))
             if not sample.in_contact:
-                note(f"{limb.label} in the air", "m", error, SWING_ERROR, time)
+                note(f"{limb.label} in the air", "m", error, scale * SWING_ERROR, time)
                 continue
             turn = _angle(item, site.xmat.reshape(3, 3), sample.pose.rotation)
-            limit = FOOT_ERROR if limb.is_foot else PALM_ERROR
+            limit = scale * (FOOT_ERROR if limb.is_foot else PALM_ERROR)
             position = max(position, note(limb.label, "m", error, limit, time))
             orientation = max(orientation, note(limb.label, "rad", turn, ORIENTATION_ERROR, time))
     findings = [

@@ -8,6 +8,7 @@ import numpy as np
 from toolkit.contacts.failure import Failure
 from toolkit.robot.model import RobotModel
 
+# Rates and lengths are those of a body of the usual size (`toolkit.robot.scale`).
 RATE = 25.0  # Hz; at most this many postures per second are checked: at 1 m/s a limb moves 4 cm between two
 PATCH_DEPTH = 4e-3  # m; allowed depth of a limb's last link in the world, as it makes the planned contacts
 BODY_DEPTH = 1e-3  # m; allowed depth of any other link in the world
@@ -23,7 +24,8 @@ def first_collision(robot: RobotModel, scene: mujoco.MjModel, times: np.ndarray,
     static = model.body_weldid[model.geom_bodyid] == 0
     patch = np.isin(model.geom_bodyid, [model.body(limb.body).id for limb in robot.limbs.values()])
     resting = _touching_at_home(model, data, static, robot.home)
-    stride = max(int(np.floor(1.0 / (RATE * (times[1] - times[0])) + 1e-9)), 1)
+    length, rate = robot.scale.length, RATE / robot.scale.time
+    stride = max(int(np.floor(1.0 / (rate * (times[1] - times[0])) + 1e-9)), 1)
     for index in [*range(0, len(times) - 1, stride), len(times) - 1]:
         data.qpos[:] = qpos[index]
         mujoco.mj_kinematics(model, data)
@@ -33,9 +35,9 @@ def first_collision(robot: RobotModel, scene: mujoco.MjModel, times: np.ndarray,
         for (first, second), depth in zip(data.contact.geom, -data.contact.dist, strict=True):
             if static[first] or static[second]:
                 link = second if static[first] else first
-                allowed = PATCH_DEPTH if patch[link] else BODY_DEPTH
+                allowed = length * (PATCH_DEPTH if patch[link] else BODY_DEPTH)
             else:
-                allowed = np.inf if body_pair(model, first, second) in resting else SELF_DEPTH
+                allowed = np.inf if body_pair(model, first, second) in resting else length * SELF_DEPTH
             if depth > allowed:
                 return Failure(
                     f"{_label(model, first)} and {_label(model, second)} collide at {times[index]:.2f} s, "

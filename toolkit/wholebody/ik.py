@@ -35,6 +35,7 @@ class WholeBodyIK:
     def __init__(self, robot: RobotModel, tick: float, avoidance: Avoidance | None = None, lean: Lean | None = None):
         """Set up the tasks for a tick in s; `avoidance` keeps all links clear, and `lean` turns the base."""
         self.robot, self.tick, self.avoidance, self.lean = robot, tick, avoidance, lean
+        self.pace, self.per_area = robot.scale.time, 1.0 / robot.scale.length**2
         self.wrapper = placo_wrapper(robot)
         self.order = pinocchio_map(robot, self.wrapper.model)
         self.solver = self.wrapper.make_solver()
@@ -62,11 +63,12 @@ class WholeBodyIK:
     def _add_tasks(self) -> None:
         robot, solver = self.robot, self.solver
         self.com = solver.add_com_task(np.zeros(3))
-        self.com.configure("com", "soft", weights.COM)
+        self.com.configure("com", "soft", self.per_area * weights.COM)
         self.feet, self.palms, self.offsets = {}, {}, {}
         for foot in FEET:
             task = solver.add_frame_task(robot.limbs[foot].site, np.eye(4))
-            task.configure(foot.label, "soft", weights.FOOT_POSITION, weights.FOOT_ORIENTATION)
+            position = self.per_area * weights.FOOT_POSITION
+            task.configure(foot.label, "soft", position, weights.FOOT_ORIENTATION)
             if robot.limbs[foot].rolls:
                 task.orientation().mask.set_axises("yz", "local")
             self.feet[foot] = task
@@ -189,7 +191,7 @@ class WholeBodyIK:
 
     @property
     def _ease(self) -> float:
-        return min(self.tick / weights.POSTURE_TIME, 1.0)
+        return min(self.tick / (self.pace * weights.POSTURE_TIME), 1.0)
 
     def _solve(self, time: float) -> np.ndarray:
         try:
@@ -208,7 +210,7 @@ class WholeBodyIK:
             assert pose is not None
             task.T_world_frame = pose.matrix
             air = self._air(foot, time, paths)
-            position = weights.FOOT_POSITION * (weights.AIR_POSITION / weights.FOOT_POSITION) ** air
+            position = self.per_area * weights.FOOT_POSITION * (weights.AIR_POSITION / weights.FOOT_POSITION) ** air
             orientation = weights.FOOT_ORIENTATION * (weights.AIR_ORIENTATION / weights.FOOT_ORIENTATION) ** air
             task.configure(foot.label, "soft", position, orientation)
             feet.append(pose)
@@ -279,12 +281,12 @@ class WholeBodyIK:
         They are narrow for arms that hang free: the momentum task alone would swing them wider than people do.
         """
         lower, upper = self.lower.copy(), self.upper.copy()
-        share = np.full(len(angles), min(weights.RANGE_RATE * self.tick, 1.0))
+        share = np.full(len(angles), min(weights.RANGE_RATE * self.tick / self.pace, 1.0))
         for joints in (self.arm_joints[arm] for arm in free):
             home, swing = self.robot.home[7:][joints], weights.ARM_SWING
             lower[joints] = np.maximum(lower[joints], np.minimum(home - swing, angles[joints]))
             upper[joints] = np.minimum(upper[joints], np.maximum(home + swing, angles[joints]))
-            share[joints] = min(weights.SWING_RATE * self.tick, 1.0)
+            share[joints] = min(weights.SWING_RATE * self.tick / self.pace, 1.0)
         lower = np.minimum(angles + share * (lower - angles), angles)
         upper = np.maximum(angles + share * (upper - angles), angles)
         for name, low, high in zip(self.robot.joint_names, lower.tolist(), upper.tolist(), strict=True):
@@ -301,7 +303,7 @@ class WholeBodyIK:
             twist.R_world_frame = pose.rotation
         # Weights span many orders of magnitude, so they grow geometrically with the authority.
         share = 10.0 ** (-7.0 * (1.0 - authority)) if authority > 0.0 else 0.0
-        position.configure(f"{palm.label}_position", "soft", share * weights.PALM_POSITION)
+        position.configure(f"{palm.label}_position", "soft", share * self.per_area * weights.PALM_POSITION)
         normal.configure(f"{palm.label}_normal", "soft", share * weights.PALM_NORMAL)
         twist.configure(f"{palm.label}_twist", "soft", share * weights.PALM_TWIST)
 

@@ -1,4 +1,7 @@
-"""Weights and settings of the whole-body inverse kinematics; they suit humanoids of any size."""
+"""Weights and settings of the whole-body inverse kinematics, for a body of the usual size (`toolkit.robot.scale`).
+
+Weights per squared m go with the inverse square of the lengths, times with the robot's, and all else suits any size.
+"""
 
 from __future__ import annotations
 

@@ -14,7 +14,9 @@ import numpy as np
 from toolkit.geometry.pose import Pose, rotation_vector
 from toolkit.wholebody.limb_paths import LimbPaths
 
-AROUND = 0.25  # s; before and after a moment, of the greatest turn that counts, and again of the smoothing
+# s for a body of the usual size (`toolkit.robot.scale`), before and after a moment, of the greatest turn that counts,
+# and again of the smoothing
+AROUND = 0.25
 WORTH = 0.03  # rad; a base that turns by less leans enough
 
 
@@ -35,16 +37,16 @@ class Lean:
         return np.array([np.interp(time, self.times, component) for component in self.turn.T])
 
 
-def lean_ahead(paths: LimbPaths, times: np.ndarray, qpos: np.ndarray) -> Lean | None:
+def lean_ahead(paths: LimbPaths, times: np.ndarray, qpos: np.ndarray, pace: float = 1.0) -> Lean | None:
     """The lean that anticipates the turns of the base in a motion (T, 7 + n) at uniform times (T,) in s.
 
-    None where the base hardly turns.
+    None where the base hardly turns. `pace` is the factor on the robot's times.
     """
     turn = np.array([_turn(paths, time, state) for time, state in zip(times, qpos, strict=True)])
     size = np.linalg.norm(turn, axis=1)
     if not size.max() > WORTH:
         return None
-    span = max(int(round(AROUND / (times[1] - times[0]))), 1)
+    span = max(int(round(pace * AROUND / (times[1] - times[0]))), 1)
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(size, span, mode="edge"), 2 * span + 1)
     farthest = np.clip(np.argmax(windows, axis=1) + np.arange(len(turn)) - span, 0, len(turn) - 1)
     weight = np.hanning(2 * span + 3)[1:-1]

@@ -26,7 +26,7 @@ from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
 from toolkit.wholebody.swing_task import LIFT
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
-RATE = 50.0  # Hz; samples of the trajectory
+RATE = 50.0  # Hz for a body of the usual size (`toolkit.robot.scale`); samples of the trajectory
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class WholeBodyPlan(MotionPlan):
 
 @dataclass(frozen=True)
 class Clearance:
-    """How far limbs stay away from the world.
+    """How far limbs of a body of the usual size (`toolkit.robot.scale`) stay away from the world.
 
     Attributes:
         foot_lift: m; guarded motion of feet along the surface normal.
@@ -74,8 +74,8 @@ def whole_body(plan: MotionPlan, scene: mujoco.MjModel, clearance: Clearance | N
         The plan with paths and trajectory; `trajectory.feasible` says whether every check passed.
     """
     begin, clearance = perf_counter(), clearance or Clearance()
-    duration = plan.schedule.duration
-    times = np.linspace(0.0, duration, max(int(round(duration * RATE)), 2) + 1)
+    duration, rate = plan.schedule.duration, RATE / plan.robot.scale.time
+    times = np.linspace(0.0, duration, max(int(round(duration * rate)), 2) + 1)
     paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, clearance.foot_lift)
     if plan.motion.feasible:
         trajectory = _trajectory(plan, scene, paths, times, clearance.links)
@@ -176,7 +176,7 @@ def _checked(
         found.append((qpos, check(robot, scene, paths, motion, times, qpos)))
         if not found[-1][1].findings:
             return found[-1]
-        lean, before = lean_ahead(paths, times, qpos), links
+        lean, before = lean_ahead(paths, times, qpos, robot.scale.time), links
     return found[0]
 
 

@@ -52,7 +52,7 @@ class AnaStarConfig:
         max_expansions: Limit on the expansions; None: no limit.
         persistence: Multiple of that limit up to which a search without solution goes on where no other one follows.
         first_only: Whether the first solution ends the search.
-        unit: A cost that matters little beside that of a whole path, such as the least cost of 1 m of way.
+        unit: A cost that matters little beside that of a whole path, such as the least cost of a step's way.
     """
 
     epsilon: float = 0.1

@@ -23,7 +23,8 @@ from toolkit.search.moves.candidates import Candidates
 from toolkit.search.moves.drift import Drift
 from toolkit.search.states.contact_table import ContactTable
 
-# All weights are in the h of 1 m of way. Those of haste:
+# All weights are in the h of 1 m of way, those that are not per m in that of a body of the usual size
+# (`toolkit.robot.scale`). Those of haste:
 _CAPTURE = 1.0  # per m that the capture point lies ahead of the foremost foot
 _EARLY = 0.7  # per m of v^2 / 2 a; with 1 or more nothing would be gained by going on
 _TURN = 0.5  # per rad between the feet's headings
@@ -40,12 +41,13 @@ class Haste:
         com_height: Height in m of the CoM above the feet, for the pendulum.
         forced: The acceleration a in m/s^2.
         per_metre: The search's h of 1 m of way.
+        scale: Factor on lengths.
     """
 
-    def __init__(self, table: ContactTable, com_height: float, forced: float, per_metre: float):
+    def __init__(self, table: ContactTable, com_height: float, forced: float, per_metre: float, scale: float = 1.0):
         self._table = table
         self._capture = _CAPTURE * per_metre
-        self._turn = _TURN * per_metre
+        self._turn = scale * _TURN * per_metre
         self._energy = _EARLY * per_metre / (2.0 * forced) if forced > 0.0 else 0.0
         self._time = float(np.sqrt(-com_height / GRAVITY[2]))
 
@@ -68,10 +70,11 @@ class Delay:
         drift: Drift of the CoM.
         haste: Delays of motions that run ahead of their feet; None: these do not wait.
         per_metre: The search's h of 1 m of way.
+        scale: Factor on lengths.
     """
 
-    def __init__(self, drift: Drift, haste: Haste | None, per_metre: float):
-        self._drift, self._haste, self._per_metre = drift, haste, per_metre
+    def __init__(self, drift: Drift, haste: Haste | None, per_metre: float, scale: float = 1.0):
+        self._drift, self._haste, self._per_metre, self._scale = drift, haste, per_metre, scale
 
     def of_states(self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """(n,) delays of states with contact numbers (n, 4), CoM (n, 3) m and velocity (n, 3) m/s."""
@@ -85,6 +88,6 @@ class Delay:
         The n candidates lead out of contact numbers (4,) with the CoM (3,) m and its velocity (3,) m/s.
         """
         miss = self._drift.miss(contacts, com, velocity, candidates)
-        doubt = _DOUBT if doubted else 0.0
+        doubt = self._scale * _DOUBT if doubted else 0.0
         waits = self._per_metre * (doubt + _MISS * miss)
         return waits + self.of_states(contacts[None], com[None], velocity[None])

@@ -24,13 +24,13 @@ from toolkit.world.world import Goal
 _LEAST_RESERVE = 0.15  # part of the friction; a contact that leaves less costs no more than one that leaves so much
 _SURE = 0.98  # part of the least momentum's cost that is counted: the objective takes it at the ends of steps
 _LEAN = 0.3  # m for a body of the usual size; by so much less than the mean of the feet the CoM may move
-_RESTS = 1.4  # s; at both ends of a plan, in which it may move too
-_ARRIVAL = 0.01  # m; plans end this far inside the goal, as robots land a little beside their plans
+_RESTS = 1.4  # s for the same; at both ends of a plan, in which it may move too
+_ARRIVAL = 0.01  # m for the same; plans end this far inside the goal, as robots land a little beside their plans
 
 
 @dataclass(frozen=True)
 class CostConfig:
-    """Weights of the terms of the edge cost.
+    """Weights of the terms of the edge cost, for a body of the usual size (`toolkit.robot.scale`).
 
     Attributes:
         step: Weight w_s of the paper.
@@ -54,10 +54,27 @@ class CostConfig:
         """The weights on ground over which no way leads on resting contacts alone (`slides`), or on other ground."""
         return replace(self, steep=0.0) if slides else self
 
+    def scaled(self, scale: Scale) -> CostConfig:
+        """The weights with which a body of another size chooses the same plan in a world to scale.
 
-def arrival_radius(goal: Goal) -> float:
+        The cost of a way remains its length in m, so the others' go with the length. The objective is an integral over
+        time, and the stagger is a length itself.
+        """
+        if scale == USUAL:
+            return self
+        per_second = scale.length / scale.time
+        return replace(
+            self,
+            step=scale.length * self.step,
+            dynamics=per_second * self.dynamics,
+            time=per_second * self.time,
+            steep=scale.length * self.steep,
+        )
+
+
+def arrival_radius(goal: Goal, scale: Scale = USUAL) -> float:
     """Distance in m from the middle of the goal within which the mean of the feet has to be in the end."""
-    return max(goal.radius - _ARRIVAL, 0.5 * goal.radius)
+    return max(goal.radius - scale.length * _ARRIVAL, 0.5 * goal.radius)
 
 
 class Terms(NamedTuple):
@@ -78,16 +95,25 @@ class TransitionCost:
         table: Contacts.
         timings: The timings to choose from.
         goal: The goal.
+        scale: The size of the robot.
 
     Attributes:
         dynamics: Cost of a dynamics objective of 1.
         time: Cost per s.
     """
 
-    def __init__(self, config: CostConfig, table: ContactTable, timings: tuple[Timing, ...], goal: Goal):
+    def __init__(
+        self,
+        config: CostConfig,
+        table: ContactTable,
+        timings: tuple[Timing, ...],
+        goal: Goal,
+        scale: Scale = USUAL,
+    ):
+        config = config.scaled(scale)
         self._config, self._table, self._goal = config, table, goal
         self._durations = np.array([timing.shift + timing.swing for timing in timings])
-        self._radius = arrival_radius(goal)
+        self._radius = arrival_radius(goal, scale)
         self.dynamics, self.time = config.dynamics, config.time
 
     def terms(self, candidates: Candidates) -> Terms:
@@ -137,7 +163,7 @@ class EdgeCost(TransitionCost):
         distance: Distance to the goal.
         longest: The farthest, in m, that the mean of the feet moves in one transition.
         mass: kg; of the robot whose motions the objectives are of. 0 where they are not those of motions.
-        scale: The size of that robot.
+        scale: The size of the robot.
     """
 
     def __init__(
@@ -151,12 +177,13 @@ class EdgeCost(TransitionCost):
         mass: float = 0.0,
         scale: Scale = USUAL,
     ):
-        super().__init__(config, table, timings, goal)
+        super().__init__(config, table, timings, goal, scale)
         self._distance, self._longest, self._lean = distance, longest, scale.length * _LEAN
+        self._length, self._rests = scale.length, scale.time * _RESTS
         self._momentum = _SURE * self.dynamics * CALM.scaled(scale).linear_momentum / 0.2 * mass**2
         self._slowest = float(self._durations.max())
         # Of one transition, as long as the slowest and as cheap as the shortest one.
-        self._step = config.step + self.time * float(self._durations.min())
+        self._step = self._config.step + self.time * float(self._durations.min())
 
     def to_go(self, centre: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """(n,) least cost to the goal for the mean of the feet (n, 3) m with headings (n,) rad.
@@ -173,13 +200,18 @@ class EdgeCost(TransitionCost):
     @property
     def per_metre(self) -> float:
         """Increase of `to_go` per m of a long way."""
-        near, far = self._least(np.array([10.0, 20.0]), np.ones(2, bool))
-        return (far - near) / 10.0
+        near, far = self._least(self._length * np.array([10.0, 20.0]), np.ones(2, bool))
+        return (far - near) / (10.0 * self._length)
+
+    @property
+    def unit(self) -> float:
+        """The same for 1 m of way of a body of the usual size, to scale."""
+        return self._length * self.per_metre
 
     def _least(self, distance: np.ndarray, away: np.ndarray) -> np.ndarray:
         """(n,) least cost of ways (n,) in m; `away` (n,) says where at least one transition is missing."""
         count = np.maximum(distance / self._longest, away)
         moved = np.maximum(distance - self._lean, 0.0)
-        slack = _RESTS + self._slowest * count
+        slack = self._rests + self._slowest * count
         time = np.maximum(slack, moved * np.sqrt(self._momentum * self._slowest / max(self._step, 1e-9)))
         return distance + self._step * (count + (time - slack) / self._slowest) + self._momentum * moved**2 / time

@@ -138,15 +138,18 @@ def link_nodes(nodes, low, levels, cell, climb, body, start, end, weight):
 
 
 @compiled
-def _cell_value(height, distance, i, j, z, layer, span):
-    """Least distance of a cell over the `span` yaw layers on either side of one, at the level nearest to a height."""
+def _cell_value(height, distance, i, j, z, layer, span, near):
+    """Least distance of a cell over the `span` yaw layers on either side of one, at the level nearest to a height.
+
+    The level is within `near` m of the height.
+    """
     if i < 0 or j < 0 or i >= height.shape[0] or j >= height.shape[1]:
         return np.inf
     level = 0
     for m in range(1, height.shape[2]):
         if abs(height[i, j, m] - z) < abs(height[i, j, level] - z):
             level = m
-    if not abs(height[i, j, level] - z) < 0.5:
+    if not abs(height[i, j, level] - z) < near:
         return np.inf
     best = np.inf
     for k in range(-span, span + 1):
@@ -155,8 +158,11 @@ def _cell_value(height, distance, i, j, z, layer, span):
 
 
 @compiled(kept=True)
-def query(position, yaw, corner, cell, height, distance, result):
-    """Fill distances (n,) in m, interpolated between the four cells around; where these are blocked, others near by."""
+def query(position, yaw, corner, cell, height, distance, near, result):
+    """Fill distances (n,) in m, interpolated between the four cells around; where these are blocked, others near by.
+
+    Places are on levels within `near` m of their heights.
+    """
     yaws = distance.shape[3]
     for row in range(len(position)):
         x, y = (position[row, 0] - corner[0]) / cell, (position[row, 1] - corner[1]) / cell
@@ -167,7 +173,7 @@ def query(position, yaw, corner, cell, height, distance, result):
         total, weights = 0.0, 0.0
         for di in range(2):
             for dj in range(2):
-                value = _cell_value(height, distance, i + di, j + dj, z, layer, 1)
+                value = _cell_value(height, distance, i + di, j + dj, z, layer, 1, near)
                 weight = (fx if di else 1.0 - fx) * (fy if dj else 1.0 - fy)
                 if value < np.inf and weight > 0.0:
                     total += weight * value
@@ -178,7 +184,7 @@ def query(position, yaw, corner, cell, height, distance, result):
         result[row] = np.inf
         for di in range(-2, 4):
             for dj in range(-2, 4):
-                value = _cell_value(height, distance, i + di, j + dj, z, layer, 2)
+                value = _cell_value(height, distance, i + di, j + dj, z, layer, 2, near)
                 if value < np.inf:
                     away = cell * np.sqrt((di - fx) ** 2 + (dj - fy) ** 2)
                     result[row] = min(result[row], value + away)

@@ -67,15 +67,17 @@ class Mesh:
         cell: Edge of a cell in m.
         yaws: Layers of yaw over half a turn; a box is the same both ways.
         merge: Heights in one cell that differ by less m are one.
+        near: A place is on a level that is less than so many m above or below it.
     """
 
     cell: float
     yaws: int
     merge: float = 0.3
+    near: float = 0.5
 
     def scaled(self, factor: float) -> Mesh:
         """The same with its lengths multiplied by a factor."""
-        return Mesh(factor * self.cell, self.yaws, factor * self.merge)
+        return Mesh(factor * self.cell, self.yaws, factor * self.merge, factor * self.near)
 
 
 class GridDistance:
@@ -99,7 +101,7 @@ class GridDistance:
         climb: float,
         footholds: Footholds,
     ):
-        self._goal, self._merge = goal, mesh.merge
+        self._goal, self._merge, self._near = goal, mesh.merge, mesh.near
         extent = np.array(bounds[2:]) - bounds[:2]
         self._cell = cell = max(mesh.cell, float(np.sqrt(extent.prod() * mesh.yaws / _MAX_NODES)))
         shape = np.ceil(extent / cell).astype(np.int64) + 1
@@ -184,6 +186,6 @@ class GridDistance:
         """See `Distance`; at least the straight line."""
         position, yaw = np.ascontiguousarray(position, dtype=float), np.ascontiguousarray(yaw, dtype=float)
         grid = np.empty(len(position))
-        query(position, yaw, self._corner, self._cell, self._height, self._distance, grid)
+        query(position, yaw, self._corner, self._cell, self._height, self._distance, self._near, grid)
         straight = np.hypot(*(position[:, :2] - self._goal.position[:2]).T) - self._goal.radius
         return np.maximum(np.maximum(grid * _OCTILE - 0.5 * self._cell, straight), 0.0)

@@ -34,6 +34,7 @@ from toolkit.search.moves.shanks import shanks_of
 from toolkit.world.surface import Surface
 from toolkit.world.world import World
 
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _CELL, _MAX_CELLS = 0.03, 60_000  # m; larger where the world would need more cells in XY
 _LEVELS = 14  # heights of a cell
 _MERGE = 0.02, 0.1  # m; heights that differ by less are not told apart; tried in turn where there are too many
@@ -43,6 +44,8 @@ _BESIDE = 0.05  # m; the trunk may be so far beside the line from one foot to th
 _SINK = 0.35  # part of its height at home by which the CoM may be lower; plans keep 0.7 of it
 _STEEP = 0.2  # least vertical part of a normal of ground
 _START, _UNEVEN = 0.25, 0.4  # m around the start, and above and below it, where its feet are
+_HALF_STEP = 0.01  # m; half the spacing of the heights at which the trunk is tried
+_AROUND = 0.5  # m around the grid and the trunk in which the world counts
 
 
 class Trunk(NamedTuple):
@@ -65,12 +68,14 @@ class Trunk(NamedTuple):
     @classmethod
     def of(cls, robot: RobotModel, cell: float) -> Trunk:
         """The trunk of a robot, for grids whose errors add up to a part of the cells' edges `cell` m in XY."""
-        box, leg = BodyBox.of(robot), robot.legs[Limb.LEFT_FOOT]
+        box, leg, scale = BodyBox.of(robot), robot.legs[Limb.LEFT_FOOT], robot.scale.length
+        margin, slack = scale * MARGIN, scale * _HALF_STEP
         hips = robot.com_height + leg.hip_in_com[2]
         ankle = leg.ankle_in_sole[2]
         sink, rise = min(hips - ankle - leg.min_length, _SINK * robot.com_height), ankle + leg.max_length - hips
-        radius = _PART * (box.half_depth - MARGIN) - np.sqrt(0.5) * cell
-        return cls(float(radius), float(hips - shanks_of(robot)[0]), box.top - MARGIN, float(sink), float(rise), 0.01)
+        radius = _PART * (box.half_depth - margin) - np.sqrt(0.5) * cell
+        bottom = hips - shanks_of(robot).radius[0]
+        return cls(float(radius), float(bottom), box.top - margin, float(sink), float(rise), slack)
 
 
 class Proof:
@@ -96,18 +101,19 @@ class Proof:
     ):
         from scipy.ndimage import binary_dilation  # here, since it takes long to import
 
-        self._world, self._beyond = world, np.array(beyond)
+        self._world, self._beyond, self._scale = world, np.array(beyond), robot.scale.length
         low, high = np.array(bounds[:2]), np.array(bounds[2:])
-        self._cell = max(_CELL, float(np.sqrt((high - low).prod() / _MAX_CELLS)))
+        self._cell = max(self._scale * _CELL, float(np.sqrt((high - low).prod() / _MAX_CELLS)))
         self._corner, self._shape = low, np.ceil((high - low) / self._cell).astype(int) + 1
         stride = longest / self._cell + 2 * np.sqrt(2.0)
         around = np.insert(disc(stride / 2), 0, 0, axis=0)
         half, between = float(robot.half_sizes[Limb.LEFT_FOOT].min()), None
-        for self._merge in _MERGE:
+        for merge in _MERGE:
+            self._merge = self._scale * merge
             ground = self._ground(surfaces, half)
             if between is None:
                 between = mark_between(ground.max(2) > -np.inf, stride, self._beyond)
-                between = binary_dilation(between, iterations=int(np.ceil(_BESIDE / self._cell)))
+                between = binary_dilation(between, iterations=int(np.ceil(self._scale * _BESIDE / self._cell)))
             self._levels = np.full(ground.shape, -np.inf)
             collect_heights(ground, between, around, self._merge, self._levels)
             self._known = bool((np.stack([ground, self._levels])[..., -1] == -np.inf).all())
@@ -123,13 +129,13 @@ class Proof:
 
     def _ground(self, surfaces: Sequence[Surface], half: float) -> np.ndarray:
         """(nx, ny, L) m; heights at which the centre of a sole may be in a cell, -inf where there is none."""
-        levels = np.full((*self._shape, _LEVELS), -np.inf)
+        levels, inside_by = np.full((*self._shape, _LEVELS), -np.inf), self._scale * _INSIDE
         for surface in surfaces:
             normal, origin = surface.normal, surface.pose.position
             if not surface.serves_foot or normal[2] < _STEEP:
                 continue
-            near = surface.region.buffer(_INSIDE - half)
-            near = near.buffer(_INSIDE + np.sqrt(0.5) * self._cell / normal[2])
+            near = surface.region.buffer(inside_by - half)
+            near = near.buffer(inside_by + np.sqrt(0.5) * self._cell / normal[2])
             if near.is_empty:
                 continue
             flat = shapely.get_coordinates(near)
@@ -147,8 +153,9 @@ class Proof:
     def _mark(self, robot: RobotModel) -> None:
         """Find out where the trunk has room."""
         heights, trunk = self._levels[self._levels > -np.inf], Trunk.of(robot, 0.0)
-        low = np.array([*(self._corner - 0.5), heights.min() + trunk.bottom - trunk.sink - 0.5])
-        high = np.array([*(self._corner + self._cell * self._shape + 0.5), heights.max() + trunk.top + 0.5])
+        around, far = self._scale * _AROUND, self._corner + self._cell * self._shape
+        low = np.array([*(self._corner - around), heights.min() + trunk.bottom - trunk.sink - around])
+        high = np.array([*(far + around), heights.max() + trunk.top + around])
         occupancy = Occupancy.of(self._world.mujoco_model, low, high, self._cell / 2)
         trunk = Trunk.of(robot, self._cell + occupancy.cell)
         if trunk.radius <= 0.0:
@@ -170,8 +177,8 @@ class Proof:
 
     def _split(self, start: Pose, free: np.ndarray) -> np.ndarray | None:
         """(2,) m; where free ground leads from start and goal come nearest to each other; None where they meet."""
-        near = np.abs(self._levels - start.position[2]) <= _UNEVEN
-        at_start = self._within(start.position[:2], _START)[..., None] & near & free
+        near = np.abs(self._levels - start.position[2]) <= self._scale * _UNEVEN
+        at_start = self._within(start.position[:2], self._scale * _START)[..., None] & near & free
         from_goal, from_start = (self._flooded(places, free) for places in (self._goal & free, at_start))
         if (from_goal & from_start).any():
             return None

@@ -14,6 +14,7 @@ from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.projection import Projected
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
+from toolkit.robot.scale import USUAL, Scale
 from toolkit.search.costs.edge_cost import CostConfig, TransitionCost
 from toolkit.search.moves.candidates import Candidates
 from toolkit.search.states.contact_table import ContactTable
@@ -63,7 +64,7 @@ def plan_cost(plan: MotionPlan, config: CostConfig) -> PlanCost:
         plan: Contacts, times and motion; its contacts count where the optimiser has put them.
         config: Weights, on the ground that the plan crosses (`CostConfig.on_ground`).
     """
-    cost, candidates = _transitions(plan.sequence, plan.world.goal, config)
+    cost, candidates = _transitions(plan.sequence, plan.world.goal, config, plan.robot.scale)
     way, step, time, steep, stagger = (float(term.sum()) for term in cost.terms(candidates))
     rest = plan.schedule.duration - plan.sequence.duration
     feasible = plan.motion.feasible
@@ -79,18 +80,20 @@ def plan_cost(plan: MotionPlan, config: CostConfig) -> PlanCost:
     )
 
 
-def known_cost(sequence: ContactSequence, goal: Goal, config: CostConfig) -> float:
+def known_cost(sequence: ContactSequence, goal: Goal, config: CostConfig, scale: Scale = USUAL) -> float:
     """Sum over the transitions of a sequence of the terms that are known without the motion; no rests."""
-    cost, candidates = _transitions(sequence, goal, config)
+    cost, candidates = _transitions(sequence, goal, config, scale)
     return float(cost.known(candidates).sum())
 
 
-def _transitions(sequence: ContactSequence, goal: Goal, config: CostConfig) -> tuple[TransitionCost, Candidates]:
+def _transitions(
+    sequence: ContactSequence, goal: Goal, config: CostConfig, scale: Scale
+) -> tuple[TransitionCost, Candidates]:
     """The transitions of a sequence as the search has them, and their cost."""
     made = [transition.contact for transition in sequence.transitions if transition.contact is not None]
     contacts = [*sequence.start.contacts, *made]
     # Each contact stands for a surface of its own, so that none is rounded to another and each keeps its friction.
-    table = ContactTable(np.array([contact.friction for contact in contacts]))
+    table = ContactTable(np.array([contact.friction for contact in contacts]), scale.length)
     numbers = [_entered(table, contact, index) for index, contact in enumerate(contacts)]
     stances = np.full((len(sequence.transitions) + 1, 4), -1)
     for contact, number in zip(sequence.start.contacts, numbers, strict=False):
@@ -102,7 +105,7 @@ def _transitions(sequence: ContactSequence, goal: Goal, config: CostConfig) -> t
     timing = [timings.setdefault(transition.timing, len(timings)) for transition in sequence.transitions]
     limb = np.array([transition.limb for transition in sequence.transitions], int)
     candidates = Candidates.of(table, stances[:-1], limb, stances[1:], np.array(timing, int))
-    return TransitionCost(config, table, tuple(timings), goal), candidates
+    return TransitionCost(config, table, tuple(timings), goal, scale), candidates
 
 
 def _entered(table: ContactTable, contact: Contact, surface: int) -> int:

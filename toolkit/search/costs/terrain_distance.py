@@ -22,6 +22,7 @@ from toolkit.world.world import World
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _DETOURS = (2.0, 8.0)  # m around start and goal that the grid covers; the larger where the smaller has no way
 _BENT = 0.3  # m by which a m of way with bent knees seems longer
+_AROUND, _BEYOND = 0.3, 0.5  # m around start, goal and ground that the grid covers; beyond it, what a body may hit
 _TURN = 1e-4  # m; cost of one layer of yaw, only there to prefer straight ways
 _WIDE, _CELL = Mesh(cell=0.1, yaws=8), 0.05  # and the edge in m of the cells that a body may hit
 # Where no way is wide enough for these: narrow places that bodies pass sideways. A quarter turn takes about six steps,
@@ -66,24 +67,25 @@ class TerrainDistance:
         lower = np.minimum.reduceat(points, first)[table.foot]
         upper = np.maximum.reduceat(points, first)[table.foot]
         self._ground = lower, upper  # corners of the boxes around foot surfaces
-        self._bounds = [self._around(detour) for detour in _DETOURS]
+        self._bounds = [self._around(self._scale * detour) for detour in _DETOURS]
         self._detour, self._cell = 0, self._scale * _CELL
         self.occupancy = self._occupy(self._bounds[0], self._cell)
 
     def _around(self, detour: float) -> tuple[float, float, float, float]:
         """Bounds in XY around start and goal, no larger than the ground."""
         ends = np.stack([self._world.start.position[:2], self._world.goal.position[:2]])
-        lower, upper = self._ground
-        low = np.maximum(ends.min(0) - detour, np.minimum(lower[:, :2].min(0), ends.min(0)) - 0.3)
-        high = np.minimum(ends.max(0) + detour, np.maximum(upper[:, :2].max(0), ends.max(0)) + 0.3)
+        (lower, upper), around = self._ground, self._scale * _AROUND
+        low = np.maximum(ends.min(0) - detour, np.minimum(lower[:, :2].min(0), ends.min(0)) - around)
+        high = np.minimum(ends.max(0) + detour, np.maximum(upper[:, :2].max(0), ends.max(0)) + around)
         return (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
 
     def _occupy(self, bounds: tuple[float, float, float, float], cell: float) -> Occupancy:
-        low, high = np.array(bounds[:2]) - 0.5, np.array(bounds[2:]) + 0.5
+        around, beyond = self._scale * _AROUND, self._scale * _BEYOND
+        low, high = np.array(bounds[:2]) - beyond, np.array(bounds[2:]) + beyond
         lower, upper = self._ground
         near = (upper[:, :2] >= low).all(1) & (lower[:, :2] <= high).all(1)
         heights = np.append(np.concatenate([lower[near, 2], upper[near, 2]]), self._world.start.position[2])
-        bottom, top = heights.min() + self.box.bottom - 0.3, heights.max() + self.box.top + 0.3
+        bottom, top = heights.min() + self.box.bottom - around, heights.max() + self.box.top + around
         return Occupancy.of(self._world.mujoco_model, np.array([*low, bottom]), np.array([*high, top]), cell)
 
     def distance(self, start: Pose, stride: float, *, narrow: bool = False) -> GridDistance | None:
@@ -104,7 +106,7 @@ class TerrainDistance:
         return None
 
     def _grid(self, occupancy: Occupancy, stride: float) -> GridDistance:
-        body = GridBody(self.box, self._drops, _TURN, 0.0, _BENT)
+        body = GridBody(self.box, self._drops, self._scale * _TURN, 0.0, _BENT)
         return self._distance(occupancy, body, _WIDE.scaled(self._scale), stride)
 
     def _narrow(self, stride: float) -> GridDistance:

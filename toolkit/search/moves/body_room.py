@@ -12,9 +12,9 @@ from toolkit.contacts.stance import Stance
 from toolkit.geometry.limb import FEET
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.legs import Legs, legs_of, reach
-from toolkit.search.moves.limits import MARGINS, drops
+from toolkit.search.moves.limits import drops, margins
 from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
-from toolkit.search.moves.shanks import leg_free, shanks_of
+from toolkit.search.moves.shanks import Shanks, leg_free, shanks_of
 from toolkit.world.world import World
 
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
@@ -38,7 +38,7 @@ class _Walker(NamedTuple):
     """
 
     legs: Legs
-    shanks: np.ndarray
+    shanks: Shanks
     box: BodyBox
     com_height: float
     deepest: float
@@ -57,7 +57,7 @@ class BodyRoom:
         self._world = world
         box = BodyBox.of(robot)
         self._walker = _Walker(
-            legs_of(robot, MARGINS),
+            legs_of(robot, margins(robot)),
             shanks_of(robot),
             box,
             robot.com_height,

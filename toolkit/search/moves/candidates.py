@@ -16,7 +16,7 @@ from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
 
 SWING_SPEED = 4.0
-"""Highest mean speed of a foot in m/s."""
+"""Highest mean speed of a foot in m/s, for a body of the usual size (`toolkit.robot.scale`)."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class CandidateGenerator:
     ):
         self._moves, self._table, self._palms = moves, moves.table, palms
         self._exclusions, self._rejected = exclusions, rejected
-        self._ways = SWING_SPEED * np.array([timing.swing for timing in timings])
+        self._ways = moves.robot.scale.speed * SWING_SPEED * np.array([timing.swing for timing in timings])
 
     def out_of(self, contacts: np.ndarray, last: int) -> Candidates | None:
         """Candidates out of contact numbers (4,) whose limb `last` moved last; None where there are none."""

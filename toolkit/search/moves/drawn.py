@@ -18,7 +18,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.legs import legs_of, stances_violated
-from toolkit.search.moves.limits import MARGINS, drops
+from toolkit.search.moves.limits import drops, margins
 from toolkit.search.moves.shanks import shanks_of
 
 _ADVANCE = 0.1  # m for a leg of 0.8 m; landing places of the table that lead farther are enough
@@ -88,6 +88,6 @@ def longest_step(robot: RobotModel) -> float:
     left = np.column_stack([along, np.full(len(along), beside), np.zeros(len(along))])
     right, turn = np.zeros_like(left), np.tile(np.eye(3), (len(along), 1, 1))
     com = left / 2 + [0.0, 0.0, robot.com_height]
-    legs, shanks = legs_of(robot, MARGINS), shanks_of(robot)
+    legs, shanks = legs_of(robot, margins(robot)), shanks_of(robot)
     codes = stances_violated(legs, shanks, com, drops(robot), np.zeros(len(along)), left, turn, right, turn)
     return float(along[codes == 0].max(initial=0.0))

@@ -11,6 +11,7 @@ from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.geometry.limb import Limb
 
+# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _RADIUS = 0.03  # m; contacts no farther apart count as the same
 _PLACE = 0.06  # m; where a transition was excluded and one no farther off fails, this far around it all are excluded
 
@@ -32,13 +33,13 @@ class Exclusion:
     radius: float = _RADIUS
 
     @classmethod
-    def of(cls, stance: Stance, transition: ContactTransition) -> Exclusion:
-        """The exclusion of a transition out of a stance."""
+    def of(cls, stance: Stance, transition: ContactTransition, radius: float = _RADIUS) -> Exclusion:
+        """The exclusion of a transition out of a stance; `radius` as above."""
         before = np.full((4, 3), np.nan)
         for contact in stance.contacts:
             before[contact.limb] = contact.pose.position
         target = np.full(3, np.nan) if transition.contact is None else transition.contact.pose.position
-        return cls(transition.limb, before, target)
+        return cls(transition.limb, before, target, radius)
 
     def covers(self, other: Exclusion, radius: float | None = None) -> bool:
         """Whether it stands for another transition as well; `radius` in m takes the place of its own."""
@@ -71,14 +72,16 @@ class Blame:
     Args:
         exclusions: Transitions that are avoided from the beginning.
         strikes: Failures of a transition, and those like it, after which it is avoided.
+        scale: Factor on lengths.
 
     Attributes:
         exclusions: The transitions to avoid; it grows.
     """
 
-    def __init__(self, exclusions: Sequence[Exclusion] = (), strikes: int = 1):
+    def __init__(self, exclusions: Sequence[Exclusion] = (), strikes: int = 1, scale: float = 1.0):
         self.exclusions: list[Exclusion] = list(exclusions)
         self._strikes, self._failed = strikes, []
+        self._radius, self._place = scale * _RADIUS, scale * _PLACE
 
     def add(self, sequence: ContactSequence, index: int | None) -> None:
         """Enter a failure in a transition; None: where it happened is unknown, and nothing is blamed.
@@ -88,11 +91,11 @@ class Blame:
         if index is None or not sequence.transitions:
             return
         index = min(index, len(sequence.transitions) - 1)
-        failed = Exclusion.of(sequence.stances[index], sequence.transitions[index])
+        failed = Exclusion.of(sequence.stances[index], sequence.transitions[index], self._radius)
         self._failed.append(failed)
         if sum(failed.covers(each) for each in self._failed) >= self._strikes:
-            again = any(failed.covers(each, _PLACE) for each in self.exclusions)
-            self.exclusions.append(replace(failed, radius=_PLACE if again else _RADIUS))
+            again = any(failed.covers(each, self._place) for each in self.exclusions)
+            self.exclusions.append(replace(failed, radius=self._place) if again else failed)
 
     def first_in(self, sequence: ContactSequence, since: int = 0) -> int | None:
         """Number of the first transition of a sequence that is avoided; None where there is none.

@@ -92,7 +92,7 @@ def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, 
     """(n,) int; why the legs cannot take each of n stances with the first drop, 0 where they can with some drop.
 
     The CoMs com (n, 3) m may be lower by any of the drops (k,) m; yaw (n,) rad is the heading of the base. The centres
-    left and right (n, 3) m of the soles come with their rotations (n, 3, 3); shanks (2,) m: see `Body`.
+    left and right (n, 3) m of the soles come with their rotations (n, 3, 3); shanks: see `Body`.
     """
     result = np.zeros(len(com), np.int64)
     for row in range(len(com)):

@@ -9,10 +9,15 @@ from toolkit.physics.leg import ReachMargins
 from toolkit.robot.model import RobotModel
 
 _DROP = 0.25  # part of its height at home by which the CoM may be lower
-MARGINS = ReachMargins(length=0.005, ankle=0.05, hip=-0.1)
-"""Margins of the legs; the hips' is negative, as the base, which the closed form keeps upright, may help them."""
-
+# Margins of the legs of a body of the usual size (`toolkit.robot.scale`). The hips' is negative, as the base, which the
+# closed form keeps upright, may help them.
+_MARGINS = ReachMargins(length=0.005, ankle=0.05, hip=-0.1)
 _CLIMB = 0.55  # part of thigh and shin together by which the heights of two soles may differ
+
+
+def margins(robot: RobotModel) -> ReachMargins:
+    """Margins of the legs."""
+    return _MARGINS.scaled(robot.scale.length)
 
 
 def climb(robot: RobotModel) -> float:

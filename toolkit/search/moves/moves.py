@@ -20,7 +20,7 @@ from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.drawn import DrawnSteps
 from toolkit.search.moves.legs import legs_of, stances_violated
-from toolkit.search.moves.limits import MARGINS, climb, drops
+from toolkit.search.moves.limits import climb, drops, margins
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.screen import (
@@ -74,7 +74,7 @@ class MoveGenerator:
     Attributes:
         table: The table in which contacts are entered, empty at first.
         legs: Both legs with the margins of the search.
-        shanks: (2,) m; see `Body`.
+        shanks: See `Body`.
         has_palm_surfaces: Whether the world has surfaces for palms.
     """
 
@@ -89,10 +89,10 @@ class MoveGenerator:
         drawn: DrawnSteps | None = None,
     ):
         self._drawn = drawn
-        self.robot, self.arms, self.table = robot, arms, ContactTable(projector.table.friction)
+        self.robot, self.arms, self.table = robot, arms, ContactTable(projector.table.friction, robot.scale.length)
         self._projector, self._model = projector, model
         self._climb, self._scale = climb(robot), robot.scale.length
-        self.legs, self.shanks = legs_of(robot, MARGINS), shanks_of(robot)
+        self.legs, self.shanks = legs_of(robot, margins(robot)), shanks_of(robot)
         self.has_palm_surfaces = bool(projector.table.palm.any())
         self._body = Body(self.legs, self.shanks, box, occupancy)
         self._limits = StepLimits(

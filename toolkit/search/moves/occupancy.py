@@ -15,7 +15,8 @@ from toolkit.search.moves.obstacles import world_triangles
 
 _MAX_CELLS = 20_000_000
 MARGIN = 0.02
-"""m around the body."""
+"""m around a body of the usual size (`toolkit.robot.scale`)."""
+_ABOVE_KNEES = 0.05  # m for the same; shapes that do not rise so far above the knees belong to the shins
 
 
 class BodyBox(NamedTuple):
@@ -42,7 +43,7 @@ class BodyBox(NamedTuple):
         data = mujoco.MjData(model)
         data.qpos[:] = robot.home
         mujoco.mj_kinematics(model, data)
-        leg = robot.legs[Limb.LEFT_FOOT]
+        leg, margin = robot.legs[Limb.LEFT_FOOT], robot.scale.length * MARGIN
         bottom = -leg.ankle_in_sole[2] if leg.ankle_in_sole[2] < 0 else leg.ankle_in_sole[2]
         bottom += leg.shin
         in_arm = np.isin(robot.in_arms(model), list(robot.arms))
@@ -53,7 +54,7 @@ class BodyBox(NamedTuple):
             centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
             rotation = data.geom_xmat[geom].reshape(3, 3)
             middle, extent = data.geom_xpos[geom] + rotation @ centre, np.abs(rotation) @ half
-            if middle[2] + extent[2] < bottom + 0.05:
+            if middle[2] + extent[2] < bottom + robot.scale.length * _ABOVE_KNEES:
                 continue
             low, high = np.minimum(low, middle - extent), np.maximum(high, middle + extent)
         if not np.isfinite(high).all():
@@ -63,7 +64,7 @@ class BodyBox(NamedTuple):
         width = max(-low[1], high[1])
         for limb, arm in robot.arms.items():
             width = max(width, abs(arm.shoulder_in_com[1]) + 1.5 * float(robot.half_sizes[limb].min()))
-        return cls(max(-low[0], high[0]) + MARGIN, width + MARGIN, bottom, float(high[2]) + MARGIN)
+        return cls(max(-low[0], high[0]) + margin, width + margin, bottom, float(high[2]) + margin)
 
 
 class Occupancy(NamedTuple):

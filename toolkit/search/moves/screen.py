@@ -14,7 +14,7 @@ from toolkit.geometry.heading import mean_heading, wrapped
 from toolkit.search.moves.legs import Legs, reach
 from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free, lowest_drop
 from toolkit.search.moves.reasons import Reason
-from toolkit.search.moves.shanks import leg_free, legs_apart
+from toolkit.search.moves.shanks import Shanks, leg_free, legs_apart
 
 _SHIFTS = (0.0, -0.25, 0.25)  # parts of the way from one sole to the other, from their middle, where the CoM may be
 
@@ -48,13 +48,13 @@ class Body(NamedTuple):
 
     Attributes:
         legs: Both legs.
-        shanks: (2,) m; radius of the capsules inside thighs and shins.
+        shanks: The capsules inside thighs and shins.
         box: The body from the knees up, standing straight.
         occupancy: Occupied cells of the world.
     """
 
     legs: Legs
-    shanks: np.ndarray
+    shanks: Shanks
     box: BodyBox
     occupancy: Occupancy
 

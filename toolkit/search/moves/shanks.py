@@ -7,6 +7,8 @@ counts as occupied that is only touched; inverse kinematics checks it exactly.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 
@@ -16,12 +18,24 @@ from toolkit.physics.leg import distance
 from toolkit.robot.model import RobotModel
 
 _FREE = (0.6, 0.75)  # part of thigh and shin, from the knee on, that is checked
-_SLACK = 0.01  # m by which legs may overlap, since the base may turn to help
+_SLACK = 0.01  # m for a body of the usual size (`toolkit.robot.scale`); see `Shanks`
 
 
-def shanks_of(robot: RobotModel) -> np.ndarray:
-    """(2,) m; radius of the capsules inside thighs and shins: half the thinner side of the thickest long geom there."""
-    return np.min([_radii(robot, limb) for limb in FEET], axis=0)
+class Shanks(NamedTuple):
+    """Capsules inside the legs.
+
+    Attributes:
+        radius: (2,) m; of thighs and shins: half the thinner side of the thickest long geom there.
+        slack: m by which the legs may overlap, since the base may turn to help.
+    """
+
+    radius: np.ndarray
+    slack: float
+
+
+def shanks_of(robot: RobotModel) -> Shanks:
+    """The capsules inside a robot's legs."""
+    return Shanks(np.min([_radii(robot, limb) for limb in FEET], axis=0), robot.scale.length * _SLACK)
 
 
 def _radii(robot: RobotModel, limb: Limb) -> np.ndarray:
@@ -76,7 +90,7 @@ def leg_free(occupancy, shanks, points):
         balls = int(np.ceil(distance(end, knee) * _FREE[link] / occupancy.cell)) + 1
         for b in range(balls):
             x, y, z = _between(knee, end, _FREE[link] * b / (balls - 1))
-            if not ball_free(occupancy, x, y, z, shanks[link]):
+            if not ball_free(occupancy, x, y, z, shanks.radius[link]):
                 return False
     return True
 
@@ -108,7 +122,7 @@ def legs_apart(shanks, left, right):
     ends_right = (_between(right[1], right[0], _FREE[0]), right[2])
     for i in range(2):
         for j in range(2):
-            least = shanks[i] + shanks[j] - _SLACK
+            least = shanks.radius[i] + shanks.radius[j] - shanks.slack
             if segment_distance(left[1], ends_left[i], right[1], ends_right[j]) < least:
                 return False
     return True

@@ -15,10 +15,11 @@ _LIMBS = tuple(Limb)
 
 
 class ContactTable:
-    """Contacts by number. Two contacts within the same rounding (1 mm, 0.1 deg) are the same.
+    """Contacts by number. Two contacts within the same rounding (1 mm for a usual body, 0.1 deg) are the same.
 
     Args:
         friction: (S,) coefficient of each surface of the world.
+        scale: Factor on the rounding, for bodies of other sizes (`toolkit.robot.scale`).
 
     Attributes:
         position: (capacity, 3) m; world.
@@ -28,8 +29,8 @@ class ContactTable:
         limb: (capacity,) int; the limb in contact.
     """
 
-    def __init__(self, friction: np.ndarray):
-        self._friction = friction
+    def __init__(self, friction: np.ndarray, scale: float = 1.0):
+        self._friction, self._per_metre = friction, 1000 / scale
         self._number: dict[bytes, int] = {}
         self._objects: dict[int, Contact] = {}
         self.position = np.zeros((256, 3))
@@ -47,7 +48,7 @@ class ContactTable:
         yaw = np.asarray(yaw_of(patches.rotation), float).reshape(n)
         rounded = np.empty((n, 6), np.int32)
         rounded[:, 0], rounded[:, 1] = limb, patches.surface
-        rounded[:, 2:5] = np.round(patches.position * 1000)
+        rounded[:, 2:5] = np.round(patches.position * self._per_metre)
         rounded[:, 5] = np.round(yaw * (1800 / np.pi)) % 3600
         data, size = rounded.tobytes(), rounded.itemsize * 6
         while len(self._number) + n > len(self.yaw):

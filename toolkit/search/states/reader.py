@@ -8,18 +8,23 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.geometry.limb import Limb
+from toolkit.robot.scale import USUAL, Scale
 from toolkit.search.states.contact_table import ContactTable
-from toolkit.search.states.state import COM, CONTACTS, LAST, VELOCITY, origin_of, pack, unpack
+from toolkit.search.states.state import CONTACTS, LAST, motion_of, origin_of, pack, unpack
 from toolkit.world.timing import Timing
 
 _LIMBS = tuple(Limb)
 
 
 class StateReader:
-    """Reads the states of one search, which name the contacts of `table` by number and `timings` by index."""
+    """Reads the states of one search, which name the contacts of `table` by number and `timings` by index.
 
-    def __init__(self, table: ContactTable, timings: tuple[Timing, ...]):
-        self._table, self._timings = table, timings
+    Attributes:
+        scale: The robot's size, which gives the units of the CoM and of its velocity.
+    """
+
+    def __init__(self, table: ContactTable, timings: tuple[Timing, ...], scale: Scale = USUAL):
+        self._table, self._timings, self.scale = table, timings, scale
         self._shifts, self._swings = np.array([(item.shift, item.swing) for item in timings]).T
 
     def at_rest(self, stance: Stance, com: np.ndarray) -> bytes:
@@ -27,7 +32,15 @@ class StateReader:
         numbers = np.full((1, 4), -1)
         for contact in stance.contacts:
             numbers[0, contact.limb] = self._table.add_contact(contact)
-        return pack(numbers, np.array([-1]), com[None], np.zeros((1, 3)))[0]
+        return self.states(numbers, np.array([-1]), com[None], np.zeros((1, 3)))[0]
+
+    def states(self, contacts: np.ndarray, last: np.ndarray, com: np.ndarray, velocity: np.ndarray) -> list[bytes]:
+        """States; see `state.pack`."""
+        return pack(contacts, last, com, velocity, self.scale)
+
+    def motion(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(..., 3) CoM in m and velocity in m/s of rows (..., 11 or more)."""
+        return motion_of(rows, self.scale)
 
     def stance(self, contacts: np.ndarray) -> Stance:
         """Stance of contact numbers (4,)."""
@@ -36,7 +49,7 @@ class StateReader:
     def origin(self, state: bytes) -> tuple[Stance, np.ndarray, np.ndarray]:
         """Stance, CoM (3,) m and velocity (3,) m/s of a state, or of the one that a pending state comes from."""
         row = unpack([state])[0]
-        return self.stance(origin_of(row)[CONTACTS]), row[COM] / 1000.0, row[VELOCITY] / 1000.0
+        return self.stance(origin_of(row)[CONTACTS]), *self.motion(row)
 
     def transition(self, state: bytes, payload: tuple[float, int]) -> ContactTransition:
         """The transition that led to a state over an edge with this payload (objective, index of the timing)."""

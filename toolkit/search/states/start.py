@@ -13,7 +13,7 @@ from toolkit.geometry.pose import Pose
 from toolkit.robot.model import RobotModel
 from toolkit.world.world import World
 
-_BELOW, _ABOVE = 0.3, 0.15  # m below and above the start site between which the ground is looked for
+_BELOW, _ABOVE = 0.3, 0.15  # m below and above the start site between which the ground is looked for, as by worlds
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _SEARCH, _STEP = 0.16, 0.02  # m; farthest from its place that a foot may start, and the grid's step
 

@@ -2,7 +2,7 @@
 
 A state (44 bytes) is the numbers of its contacts (-1 where a palm has none), the limb that moved last (-1 at the
 start; it may not move again at once), the CoM in mm and its velocity in mm/s. Rounding to 1 mm is the paper's
-identification of states; contacts are rounded in the contact table.
+identification of states; contacts are rounded in the contact table. Bodies of other sizes have these units to scale.
 
 A pending state (52 bytes) stands for a transition that is still to be judged. Its contacts and limb are those after the
 transition, its CoM and velocity those before it. The old contact of the limb and the transition's timing follow.
@@ -14,18 +14,33 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from toolkit.robot.scale import USUAL, Scale
+
 SIZE, PENDING = 11, 13  # int32 each
 CONTACTS, LAST, COM, VELOCITY = slice(0, 4), 4, slice(5, 8), slice(8, 11)
 OLD, TIMING = 11, 12
+_UNITS = 1000.0  # in a m and in a m/s, for a body of the usual size (`toolkit.robot.scale`)
 
 
-def pack(contacts: np.ndarray, last: np.ndarray, com: np.ndarray, velocity: np.ndarray) -> list[bytes]:
+def pack(
+    contacts: np.ndarray, last: np.ndarray, com: np.ndarray, velocity: np.ndarray, scale: Scale = USUAL
+) -> list[bytes]:
     """States of contact numbers (n, 4), limbs (n,) that moved last, CoMs (n, 3) m and velocities (n, 3) m/s."""
     rows = np.empty((len(contacts), SIZE), np.int32)
     rows[:, CONTACTS], rows[:, LAST] = contacts, last
-    rows[:, COM] = np.round(com * 1000)
-    rows[:, VELOCITY] = np.round(velocity * 1000)
+    rows[:, COM] = np.round(com * (_UNITS / scale.length))
+    rows[:, VELOCITY] = np.round(velocity * (_UNITS / scale.speed))
     return _split(rows)
+
+
+def motion_of(rows: np.ndarray, scale: Scale = USUAL) -> tuple[np.ndarray, np.ndarray]:
+    """(..., 3) CoM in m and velocity in m/s of rows (..., 11 or more)."""
+    return rows[..., COM] / (_UNITS / scale.length), rows[..., VELOCITY] / (_UNITS / scale.speed)
+
+
+def speed_of(rows: np.ndarray) -> np.ndarray:
+    """(n,) horizontal speed of rows (n, 11 or more), in m/s of a body of the usual size."""
+    return np.hypot(*rows[:, VELOCITY][:, :2].T) / _UNITS
 
 
 def pack_pending(before: np.ndarray, contacts: np.ndarray, limb: np.ndarray, timing: np.ndarray) -> list[bytes]:
