@@ -35,11 +35,11 @@ FLAT = """
 
 
 class Plan:
-    """A plan and what it was made of."""
+    """A plan and what it was made of; `pace` is a factor on the times at rest."""
 
-    def __init__(self, robot, world, sequence):
+    def __init__(self, robot, world, sequence, pace=1.0):
         self.robot, self.world, self.sequence = robot, world, sequence
-        self.schedule = ContactSchedule.of(sequence, initial_rest=0.1, final_rest=0.4)
+        self.schedule = ContactSchedule.of(sequence, initial_rest=pace * 0.1, final_rest=pace * 0.4)
         self.motion = optimise(robot, self.schedule, initial_com(robot, sequence.start), np.zeros(3))
         assert self.motion.feasible, self.motion.outcome
         plan = MotionPlan(robot, world, sequence, self.schedule, self.motion)

@@ -12,10 +12,9 @@ import numpy as np
 
 from toolkit import pipeline
 from toolkit.errors import ToolkitError
-from toolkit.execution.config import ExecutionConfig
+from toolkit.execution.config import SCUFF_LIMIT, ExecutionConfig
 from toolkit.execution.replay import replay_controls
 from toolkit.execution.result import Execution
-from toolkit.execution.verdict import SCUFF_LIMIT
 from toolkit.geometry.limb import PALMS
 from toolkit.report.files import REPORT, RunFolder
 from toolkit.report.run import RunOptions, write_run

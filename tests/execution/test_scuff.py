@@ -8,11 +8,11 @@ import pytest
 from tests.conftest import FLAT, FRICTION, Plan, walk
 from tests.fuzz.verdict_oracle import replayed
 from toolkit.execution.check import Result
+from toolkit.execution.config import SCUFF_LIMIT
 from toolkit.execution.replay import difference, replay_run
 from toolkit.execution.run import execute
 from toolkit.execution.scuff import scuffs
 from toolkit.execution.standard import Move
-from toolkit.execution.verdict import SCUFF_LIMIT
 from toolkit.geometry.limb import Limb
 from toolkit.world.loader import load_world
 from toolkit.world.scene import compose_scene

@@ -17,10 +17,10 @@ from tests.fuzz.verdict_oracle import replayed
 from tests.shipped_robots import OWN
 from toolkit import pipeline
 from toolkit.errors import ToolkitError, WorldError
-from toolkit.execution.config import ExecutionConfig
+from toolkit.execution.config import SCUFF_LIMIT, ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
 from toolkit.execution.recorder import MAX_TILT, MIN_HEIGHT
-from toolkit.execution.verdict import RANGE_TOLERANCE, SCUFF_LIMIT
+from toolkit.execution.verdict import RANGE_TOLERANCE
 from toolkit.robot.loader import load_robot
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.planner import PlannerConfig

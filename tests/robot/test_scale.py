@@ -4,9 +4,13 @@ import pytest
 
 from tests.robot.samples import write_scaled
 from tests.shipped_robots import EVERY, OWN, loaded
-from toolkit.centroidal.problem import Weights
+from toolkit.centroidal.body import BodyMargins
+from toolkit.centroidal.problem import Margins, Weights
+from toolkit.centroidal.program import Regularisers
+from toolkit.physics.leg import ReachMargins
 from toolkit.robot.loader import load_robot
 from toolkit.robot.scale import USUAL, Scale
+from toolkit.wholebody.avoidance import BODY, Damper
 
 
 def test_the_usual_body_has_factors_of_exactly_one():
@@ -36,6 +40,31 @@ def test_the_same_motion_to_scale_has_the_same_price():
     assert small.torque * scale.moment**2 == pytest.approx(usual.torque)
     assert (small.force, small.lateral_force, small.cop) == (usual.force, usual.lateral_force, usual.cop)
     assert usual.scaled(USUAL) is usual
+
+
+def test_what_makes_a_plan_easy_to_execute_follows_the_objective():
+    """A motion to scale lasts longer by the factor on times, and so do the integrals of which the objective consists."""
+    scale, usual = Scale(0.25, 0.1), Regularisers()
+    small = usual.scaled(scale)
+    lasts = scale.time
+    jerk = 1.0 / scale.time  # accelerations are the same
+    assert small.jerk * jerk**2 * lasts == pytest.approx(usual.jerk * lasts)
+    assert small.height * scale.length**2 * lasts == pytest.approx(usual.height * lasts)
+    assert small.final_center * scale.length**2 == pytest.approx(usual.final_center * lasts)
+    assert small.final_acceleration == pytest.approx(usual.final_acceleration * lasts)
+    assert small.final_spin * (scale.length * scale.speed) ** 2 == pytest.approx(usual.final_spin * lasts)
+    assert small.landing * scale.length**2 == pytest.approx(usual.landing * lasts)
+    relative = ("load", "palm", "palm_force", "cop", "slack", "excess")
+    assert all(getattr(small, name) == getattr(usual, name) for name in relative)
+    assert usual.scaled(USUAL) is usual
+
+
+def test_margins_and_dampers_scale_their_lengths_and_times_alone():
+    assert Margins(0.7, (0.05, 0.04), 0.6).scaled(0.5) == Margins(0.7, (0.025, 0.02), 0.6)
+    assert ReachMargins(0.01, 0.1, 0.05).scaled(0.5) == ReachMargins(0.005, 0.1, 0.05)
+    assert BodyMargins(0.01, 0.1, 0.05, 0.02, 0.8).scaled(0.5) == BodyMargins(0.005, 0.1, 0.05, 0.01, 0.8)
+    assert Damper(0.04, 0.02, 0.08, 0.1, 10.0).scaled(Scale(0.25, 0.1)) == Damper(0.01, 0.005, 0.02, 0.05, 160.0)
+    assert BODY.scaled(USUAL) == BODY
 
 
 @pytest.mark.parametrize("name", EVERY)

@@ -100,8 +100,8 @@ def test_a_body_does_not_pass_through_a_wall_between_two_stances(robot):
         assert codes.tolist() == [expected]
 
 
-def walk_problem(robot, x, y=0.0, yaw=0.0, steps=4, length=0.2):
-    """The problem of a few steps from x on, with a heading; y is the middle of the feet."""
+def walk_problem(robot, x, y=0.0, yaw=0.0, steps=4, length=0.2, pace=1.0):
+    """The problem of a few steps from x on, with a heading; y is the middle of the feet, `pace` a factor on times."""
 
     def contact(limb, along):
         side = robot.legs[limb].hip_in_com[1]
@@ -110,8 +110,10 @@ def walk_problem(robot, x, y=0.0, yaw=0.0, steps=4, length=0.2):
 
     start = Stance(tuple(contact(limb, 0.0) for limb in FEET))
     moves = [(Limb(k % 2), min(k + 1, steps - 1) * length) for k in range(steps)]
-    transitions = tuple(ContactTransition(limb, contact(limb, along), Timing(0.6, 0.8)) for limb, along in moves)
-    schedule = ContactSchedule.of(ContactSequence(start, transitions), initial_rest=0.3, final_rest=0.6)
+    transitions = tuple(
+        ContactTransition(limb, contact(limb, along), Timing(pace * 0.6, pace * 0.8)) for limb, along in moves
+    )
+    schedule = ContactSchedule.of(ContactSequence(start, transitions), initial_rest=pace * 0.3, final_rest=pace * 0.6)
     return sequence_problem(robot, schedule, initial_com(robot, start), np.zeros(3))
 
 

@@ -13,7 +13,7 @@ from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.execution.scuff import Scuff, scuffs
 from toolkit.execution.slip import SETTLE_TIME, ContactInterval, bearing_force, contact_intervals
 from toolkit.execution.standard import Move, Standard
-from toolkit.execution.verdict import SCUFF_LIMIT, execution_checks, failure_reason, is_too_fast
+from toolkit.execution.verdict import execution_checks, failure_reason, is_too_fast
 from toolkit.replanning.replanner import ReplanCounts
 
 
@@ -146,7 +146,7 @@ def _failure_time(
     if recorder.meter.unplanned_time is not None:
         return recorder.meter.unplanned_time
     worst_scuff = max(scuffed, key=lambda each: each.impulse, default=None)
-    if worst_scuff is not None and worst_scuff.impulse > SCUFF_LIMIT * recorder.mass:
+    if worst_scuff is not None and worst_scuff.impulse > standard.scuff_limit * recorder.mass:
         return worst_scuff.time
     if slip and max(slip) > standard.slip_limit:
         worst = int(np.argmax(slip))

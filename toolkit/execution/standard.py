@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.control.sampled_plan import Swing
-from toolkit.execution.config import ExecutionConfig
+from toolkit.execution.config import SCUFF_LIMIT, ExecutionConfig
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import LimbModel, RobotModel, half_sizes_of
 from toolkit.wholebody.plan import WholeBodyPlan
@@ -77,6 +77,7 @@ class Standard:
         ticks: Control ticks of a run that is completed.
         slip_limit, com_rms_limit: Limits of the verdict in m.
         moves: The planned move of each transition.
+        scuff_limit: Limit of the verdict in m/s.
     """
 
     robot: Subject
@@ -87,10 +88,12 @@ class Standard:
     slip_limit: float
     com_rms_limit: float
     moves: tuple[Move, ...]
+    scuff_limit: float = SCUFF_LIMIT
 
     @classmethod
     def of(cls, plan: WholeBodyPlan, config: ExecutionConfig, swings: tuple[Swing, ...], ticks: int) -> Standard:
         """What the run of a plan over `ticks` control ticks is held against."""
+        scale = plan.robot.scale
         moves = tuple(
             Move(each.limb, each.start, each.end, None if each.contact is None else each.contact.pose.position)
             for each in swings
@@ -102,8 +105,9 @@ class Standard:
             config.control_decimation,
             ticks,
             config.slip_limit,
-            config.com_rms_limit,
+            scale.length * config.com_rms_limit,
             moves,
+            scale.speed * config.scuff_limit,
         )
 
     @property

@@ -7,10 +7,6 @@ from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.standard import Standard
 
 RANGE_TOLERANCE = 1e-3  # rad; excess over joint ranges, because limits of the simulation are soft
-SCUFF_LIMIT = 0.05
-"""Largest change of the CoM's velocity, in m/s, that the touches of one swing may make: their impulse over the robot's
-mass, 5 ms of its weight. At the height of a humanoid's CoM that moves the capture point by some 15 mm, which a sole
-takes up as it does the 20 mm of the other limits; what is more is a stumble."""
 
 OF_PACE = ("torque_ratio", "joint_range", "velocity_ratio")
 """Checks of the joints' limits: where one of them decides, a calmer pace may help."""
@@ -33,7 +29,7 @@ def execution_checks(
         "goal_distance": (goal_radius, "m"),
         "unplanned_contacts": (0.0, ""),
         "friction": (0.0, ""),
-        "scuff": (SCUFF_LIMIT, "m/s"),
+        "scuff": (config.scuff_limit, "m/s"),
         "slip": (config.slip_limit, "m"),
         "com_rms_error": (config.com_rms_limit, "m"),
         "torque_ratio": (1.0, ""),

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from toolkit.execution.config import SCUFF_LIMIT
 from toolkit.execution.standard import Move, Standard, Subject
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.report.files import plain
 from toolkit.robot.model import LimbModel
 from toolkit.world.world import Goal
 
-_NAMES = ("timestep", "decimation", "ticks", "slip_limit", "com_rms_limit")
+_NAMES = ("timestep", "decimation", "ticks", "slip_limit", "com_rms_limit", "scuff_limit")
 _JOINTS = ("lower", "upper", "velocity_limit", "torque_limit")
 MOST_TICKS = 10**7
 """More control ticks than any run has: hours."""
@@ -71,6 +72,7 @@ def read_standard(entry: dict[str, Any]) -> Standard:
         _number(entry["slip_limit"]),
         _number(entry["com_rms_limit"]),
         tuple(_read_move(move) for move in entry["moves"]),
+        _number(entry.get("scuff_limit", SCUFF_LIMIT)),
     )
 
 
