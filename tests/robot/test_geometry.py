@@ -12,8 +12,10 @@ from tests.robot.samples import TOML, biped_mjcf, write_robot
 from tests.shipped_robots import OWN
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.robot.geometry import foot_outline
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
+from toolkit.search.moves.limits import sole_room
 
 LEFT = Limb.LEFT_FOOT
 
@@ -194,3 +196,18 @@ def test_hips_without_three_directions_are_refused(tmp_path: Path) -> None:
     model = biped_mjcf().replace('hip_yaw" axis="0 0 1"', 'hip_yaw" axis="0 1 0.3"')
     with pytest.raises(RobotError, match="the leg must be hip yaw, roll and pitch in any order"):
         load_robot(str(write_robot(tmp_path / "twice", model)))
+
+
+def test_a_foot_that_is_wider_than_its_sole_keeps_its_room(tmp_path: Path) -> None:
+    sole = '<geom type="box" size="0.1 0.05 0.01" pos="0.02 0 -0.07" mass="1"/>'
+    shoe = '<body pos="0.03 -0.01 -0.02"><geom type="box" size="0.11 0.06 0.02"/></body>'
+    robots = [
+        load_robot(str(write_robot(tmp_path / name, biped_mjcf().replace(sole, sole + more))))
+        for name, more in (("plain", ""), ("shoe", shoe))
+    ]
+    outlines = [foot_outline(robot.mujoco_model, LEFT) for robot in robots]
+    np.testing.assert_allclose(outlines, [[0.1, 0.05], [0.12, 0.07]], atol=1e-6)
+    plain, wide = (sole_room(robot) for robot in robots)
+    spare = robots[0].scale.length * 0.01
+    np.testing.assert_allclose(plain, [0.1 + spare, 0.05 + spare], atol=1e-6)
+    np.testing.assert_allclose(wide, [0.119, 0.069], atol=1e-6)

@@ -56,7 +56,7 @@ def test_lengths_follow_the_legs(kind):
 def test_tiles_are_no_steeper_than_ankles_follow_unless_asked_for():
     robot = with_legs(load_robot(None), 0.7, 0.262)
     fit = Fit.of(robot)
-    assert fit == Fit(0.7, 9.0)
+    assert (fit.factor, fit.tilt) == (0.7, 9.0)
 
     def steepest(given):
         world = load_world("field.xml", mjcf=fitted(KINDS["rubble_field"], np.random.default_rng(0), fit, given))
@@ -65,6 +65,20 @@ def test_tiles_are_no_steeper_than_ankles_follow_unless_asked_for():
     assert 5.0 < steepest({}) < 9.0 * np.sqrt(2) < 15.0 < steepest({"tilt": 20.0})
     text = fitted(KINDS["rubble_field"], np.random.default_rng(0), fit, {"swing": 1.0})
     assert load_world("field.xml", mjcf=text).timing.swing == 1.0
+
+
+def test_stones_hold_the_soles_of_short_legs_with_long_feet():
+    usual, short = load_robot(None), with_legs(load_robot(None), 0.3, 0.4)
+    assert Fit.of(usual).edge == pytest.approx(0.22 + 0.05) and Fit.of(short).edge == pytest.approx(0.22 + 0.3 * 0.05)
+
+    def widths(robot, given):
+        text = fitted(KINDS["stepping_stones"], np.random.default_rng(0), Fit.of(robot), given)
+        world = load_world("stones.xml", mjcf=text)
+        return [np.ptp(each.boundary[0], axis=0).min() for each in world.surfaces if "stone" in each.geom]
+
+    assert min(widths(usual, {})) == pytest.approx(0.36, abs=1e-3)
+    assert min(widths(short, {})) == pytest.approx(0.235, abs=1e-3)
+    assert min(widths(short, {"stone": 0.36})) == pytest.approx(0.3 * 0.36, abs=1e-3)
 
 
 def test_the_command(tmp_path, capsys):

@@ -14,7 +14,9 @@ from toolkit.robot.model import RobotModel
 from toolkit.world.authoring import numbers
 
 _ANKLE_MARGIN = 0.1  # rad; ankles stay so far inside their range on the steepest tile
+_ROOM = 0.05  # m; least room of a sole on its tile, along its longer side, for legs of the usual length
 _TIMES = ("shift", "swing")  # options of generators that are times
+_EDGES = ("tile", "stone")  # options of generators that are edges of what a single sole stands on
 _LENGTHS = {
     "statistic": ("center", "extent"),
     "light": ("pos",),
@@ -33,24 +35,29 @@ class Fit:
     Attributes:
         factor: Lengths, as a multiple of the generators'.
         tilt: Largest roll and pitch of a tile that the ankles follow, deg.
+        edge: Least edge of a tile that holds a sole, m.
     """
 
     factor: float = 1.0
     tilt: float = 90.0
+    edge: float = 0.0
 
     @classmethod
     def of(cls, robot: RobotModel) -> Fit:
         """The fit to a robot; one of the usual size gets the usual worlds."""
         legs = [robot.legs[foot] for foot in FEET]
         ends = [abs(end) for leg in legs for role in ("ankle_roll", "ankle_pitch") for end in leg.ranges[role]]
-        return cls(robot.scale.length, float(np.floor(np.degrees(max(min(ends) - _ANKLE_MARGIN, 0.0)))))
+        tilt = float(np.floor(np.degrees(max(min(ends) - _ANKLE_MARGIN, 0.0))))
+        soles = robot.half_sizes[list(FEET)]
+        factor = robot.scale.length
+        return cls(factor, tilt, round(float(2.0 * soles.max() + factor * _ROOM), 3))
 
 
 def fitted(generator: Callable[..., str], rng: np.random.Generator, fit: Fit, given: Mapping[str, float]) -> str:
     """A world of a generator that fits a robot, as MJCF text.
 
-    All lengths are multiplied by the fit's factor. Times are multiplied by its root, as those of a pendulum are, and
-    tiles are no steeper than the robot's ankles follow.
+    All lengths are multiplied by the fit's factor. Times are multiplied by its root, as those of a pendulum are. Tiles
+    are no steeper than the robot's ankles follow, and large enough for its soles.
 
     Args:
         generator: One of `toolkit.world.generators.KINDS`.
@@ -68,6 +75,8 @@ def fitted(generator: Callable[..., str], rng: np.random.Generator, fit: Fit, gi
             options[name] = round(usual * float(np.sqrt(fit.factor)), 3)
         if name == "tilt" and name not in given:
             options[name] = min(usual, fit.tilt)
+        if name in _EDGES and name not in given:
+            options[name] = max(usual, round(fit.edge / fit.factor, 3))
     return scaled(generator(rng, **options), fit.factor)
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.physics.leg import ReachMargins
+from toolkit.robot.geometry import foot_outline
 from toolkit.robot.model import RobotModel
 
 _DROP = 0.25  # part of its height at home by which the CoM may be lower
@@ -13,6 +14,18 @@ _DROP = 0.25  # part of its height at home by which the CoM may be lower
 # closed form keeps upright, may help them.
 _MARGINS = ReachMargins(length=0.005, ankle=0.05, hip=-0.1)
 _CLIMB = 0.55  # part of thigh and shin together by which the heights of two soles may differ
+
+_APART = 0.02  # m; least distance between two soles
+_TOUCH = 0.001  # m; how far the outlines of two feet may reach into each other, less than postures may
+
+
+def sole_room(robot: RobotModel) -> np.ndarray:
+    """Half extents (2,) m of the room of a foot, into which no other foot may step.
+
+    It holds the sole with half the distance between two soles, and all of a foot that is wider than its sole.
+    """
+    outline = np.max([foot_outline(robot.mujoco_model, foot) for foot in FEET], axis=0)
+    return np.maximum(robot.half_sizes[Limb.LEFT_FOOT] + robot.scale.length * _APART / 2, outline - _TOUCH)
 
 
 def margins(robot: RobotModel) -> ReachMargins:

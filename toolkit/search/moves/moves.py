@@ -20,7 +20,7 @@ from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.drawn import DrawnSteps
 from toolkit.search.moves.legs import legs_of, stances_violated
-from toolkit.search.moves.limits import climb, drops, margins
+from toolkit.search.moves.limits import climb, drops, margins, sole_room
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.screen import (
@@ -39,7 +39,6 @@ from toolkit.search.states.contact_table import ContactTable
 _KEPT = 20_000  # entries of each memory
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _WALL = (0.4, 0.6)  # m above the soles; see `StepLimits`
-_APART = 0.02  # m; least distance between two soles
 _PALM_SIDE = 0.15  # m; least distance of a palm to the side of the body's middle
 _PALM_ANGLE = np.radians(65.0)  # largest angle between the arm and the surface's normal
 _PALM_MARGIN = 0.04  # m inside the arm's reach
@@ -96,7 +95,7 @@ class MoveGenerator:
         self.has_palm_surfaces = bool(projector.table.palm.any())
         self._body = Body(self.legs, self.shanks, box, occupancy)
         self._limits = StepLimits(
-            half=robot.half_sizes[Limb.LEFT_FOOT] + self._scale * _APART / 2,
+            half=sole_room(robot),
             climb=self._climb,
             com_height=robot.com_height,
             drops=drops(robot),

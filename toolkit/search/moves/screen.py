@@ -63,7 +63,7 @@ class StepLimits(NamedTuple):
     """Limits on soles and CoM in a step.
 
     Attributes:
-        half: (2,) m; half extents of a sole, with half the distance that must stay between two of them.
+        half: (2,) m; half extents of the room of a foot, into which no other foot may step.
         climb: Largest difference of height in m.
         com_height: Height in m of the CoM above the mean of the soles, standing straight.
         drops: (k,) m by which the CoM may be lower.
