@@ -174,7 +174,7 @@ time.sleep(60)"""
     child = int(process.stdout.readline())
     process.send_signal(signal.SIGTERM)
     assert process.wait(timeout=20) == 143
-    process.communicate()
+    process.communicate(timeout=20)
     with pytest.raises(ProcessLookupError):
         os.kill(child, 0)
 

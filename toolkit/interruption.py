@@ -14,6 +14,7 @@ from types import FrameType
 WORDS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 SIGNALS = tuple(getattr(signal, name) for name in WORDS if hasattr(signal, name))
 PATIENCE = 5.0  # s; what has not been cleared away by then stays
+GRACE = 0.5  # s; a process that was started has as long to end by itself
 
 
 def end_when_stopped() -> None:
@@ -32,10 +33,13 @@ def end_when_stopped() -> None:
         late = threading.Timer(PATIENCE, os._exit, [128 + number])
         late.daemon = True
         late.start()
-        if "multiprocessing" in sys.modules:
-            for child in sys.modules["multiprocessing"].active_children():
-                child.terminate()
+        children = sys.modules["multiprocessing"].active_children() if "multiprocessing" in sys.modules else []
+        for child in children:
+            child.terminate()
         atexit._run_exitfuncs()
+        for child in children:  # one that was being forked may have missed the signal
+            child.join(GRACE)
+            child.kill()
         try:
             os.write(2, f"{WORDS[signal.Signals(number).name]}\n".encode())
         finally:

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from toolkit.contacts.failure import Failure
+from toolkit.execution.balance import unbalance
 from toolkit.execution.recorder import Recorder
 from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.execution.scuff import Scuff, scuffs
@@ -72,6 +73,7 @@ def measure(
         "completed": float(not completed),
         "touchdowns": float(missing),
         "goal_distance": distance,
+        "balance": _unbalance(recorder, standard),
         "unplanned_contacts": float(len(recorder.meter.unplanned)),
         "friction": float(recorder.meter.friction_mismatches),
         "scuff": max((each.impulse for each in scuffed), default=0.0) / recorder.mass,
@@ -129,6 +131,21 @@ def measure(
         replayable=replayable,
         failure=Failure(reason, when, transition, too_fast=is_too_fast(checks, recorder.fall)) if reason else None,
         replanning=replanning,
+    )
+
+
+def _unbalance(recorder: Recorder, standard: Standard) -> float:
+    """By how much the robot is out of balance at the end, m; with nothing that bears it, it stands on its feet."""
+    last, limbs = recorder.count - 1, standard.robot.limbs
+    bears = [limb for limb in limbs if recorder.normal_force[last, limb] > bearing_force(recorder.mass)]
+    bears = bears or [limb for limb in limbs if limb.is_foot]
+    return unbalance(
+        recorder.com[last],
+        recorder.momentum[last, :3] / recorder.mass,
+        recorder.limb_position[last, bears],
+        recorder.limb_rotation[last, bears],
+        np.array([limbs[limb].bearing for limb in bears]),
+        float(np.linalg.norm(recorder.scene.opt.gravity)),
     )
 
 

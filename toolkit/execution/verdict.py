@@ -27,6 +27,7 @@ def execution_checks(
         "completed": (0.0, ""),
         "touchdowns": (0.0, ""),
         "goal_distance": (goal_radius, "m"),
+        "balance": (0.0, "m"),
         "unplanned_contacts": (0.0, ""),
         "friction": (0.0, ""),
         "scuff": (config.scuff_limit, "m/s"),
