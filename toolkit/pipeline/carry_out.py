@@ -20,7 +20,8 @@ from toolkit.search.costs.plan_cost import plan_cost
 from toolkit.search.result import SearchResult, Solution
 from toolkit.world.world import World
 
-NEAR = 0.02  # m for a body of the usual size (`toolkit.robot.scale`); a patch farther from its surface was planned for another world
+# m for a body of the usual size (`toolkit.robot.scale`); a patch farther from its surface was planned for another world
+NEAR = 0.02
 
 
 @warnings_refused("the run", PlanningError)
