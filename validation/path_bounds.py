@@ -65,11 +65,13 @@ class BoundCheck:
         config, ground = planner.config, planner.ground
         way = ground.way(ground.start_stance())
         # The weights do not depend on the judge.
-        self._weights = strategy_of(config, KinematicEvaluator(planner.robot), way.length, slides=way.slides).cost
+        weights = strategy_of(config, KinematicEvaluator(planner.robot), way.length, slides=way.slides).cost
+        self._usual, self._scale = weights, planner.robot.scale
+        self._weights = weights.scaled(self._scale)
         table, timings = ground.moves(way).table, planner.timings(slides=way.slides)
         self._goal = planner.world.goal
         self._cost = EdgeCost(
-            self._weights,
+            weights,
             table,
             timings,
             self._goal,
@@ -102,7 +104,7 @@ class BoundCheck:
         """(n,) what the transitions from each one on cost without their dynamics."""
         stances, transitions = sequence.stances, sequence.transitions
         rests = [ContactSequence(stances[index], transitions[index:]) for index in range(len(transitions))]
-        return np.array([known_cost(rest, self._goal, self._weights) for rest in rests])
+        return np.array([known_cost(rest, self._goal, self._usual, self._scale) for rest in rests])
 
 
 def _from_here(objective: np.ndarray) -> np.ndarray:

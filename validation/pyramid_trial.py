@@ -104,7 +104,7 @@ def motion_under(robot: RobotModel, world: World, sequence: ContactSequence, *, 
     from validation.reference.sequence import solve
 
     config = PipelineConfig()
-    schedule = ContactSchedule.of(sequence, initial_rest=config.initial_rest, final_rest=config.final_rest)
+    schedule = ContactSchedule.of(sequence, **config.rests(robot.scale))
     com = initial_com(robot, sequence.start)
     problem = sequence_problem(robot, schedule, com, np.zeros(3), config=ProblemConfig())
     program = Program(problem, robot, BodyMargins(), Regularisers(), None)

@@ -44,7 +44,7 @@ def solve(
     """
     config = PipelineConfig()
     began = time.process_time()
-    schedule = ContactSchedule.of(sequence, initial_rest=config.initial_rest, final_rest=config.final_rest)
+    schedule = ContactSchedule.of(sequence, **config.rests(robot.scale))
     com = initial_com(robot, sequence.start)
     if by_reference:
         motion = _by_reference(robot, schedule, com, config.sequence, room)

@@ -19,11 +19,11 @@ from toolkit.execution.check import Check
 from toolkit.execution.result import Controls, Execution, Samples
 from toolkit.execution.scuff import Scuff
 from toolkit.execution.standard import Move, Standard, Subject
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, rotation_from_quaternion
 from toolkit.pipeline import Candidate, PipelineConfig, PipelineResult, Source, Trial
 from toolkit.report.run_report import RunReport
-from toolkit.robot.model import LimbModel, RobotModel
+from toolkit.robot.model import LegGeometry, LimbModel, RobotModel
 from toolkit.search.costs.plan_cost import plan_cost
 from toolkit.search.result import SearchResult, Solution
 from toolkit.wholebody.limb_paths import LimbPaths
@@ -56,6 +56,8 @@ GROUND = """
 HALF_SIZE = np.array([0.11, 0.065])
 TIMESTEP = 0.002
 FAILURE = Failure("slip is 0.03 m, the limit is 0.02")
+
+LEG = LegGeometry(np.zeros(3), np.zeros(3), 0.4, 0.4, 0.0, 0.8, {}, {})
 
 
 def mjcf(*parts: str, actuators: str = "") -> str:
@@ -129,7 +131,7 @@ def make_robot() -> RobotModel:
         mass=60.0,
         com_height=0.9,
         limbs={limb: LimbModel(limb, limb.label, limb.label[:-4] + "leg", HALF_SIZE) for limb in list(Limb)[:2]},
-        legs={},
+        legs=dict.fromkeys(FEET, LEG),
         arms={},
         fingerprint="0",
     )

@@ -43,7 +43,7 @@ def test_the_same_motion_to_scale_has_the_same_price():
 
 
 def test_what_makes_a_plan_easy_to_execute_follows_the_objective():
-    """A motion to scale lasts longer by the factor on times, and so do the integrals of the objective."""
+    """A motion to scale lasts longer by the factor on times, and so do the integrals that the objective consists of."""
     scale, usual = Scale(0.25, 0.1), Regularisers()
     small = usual.scaled(scale)
     lasts = scale.time

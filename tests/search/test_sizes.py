@@ -154,11 +154,10 @@ def test_ceilings_and_walls_leave_motions_the_same_room(robot, size, sized):
     low = text(GROUND, box([0.9, 0, body.top - 0.12 + 0.05], [0.4, 2, 0.05]))
     away = body.half_depth + 0.06
     narrow = text(GROUND, *[box([1, side * (away + 0.5), 1.0], [2, 0.5, 1.0]) for side in (-1, 1)])
-    for mjcf, options in ((low, {"steps": 6}), (narrow, {"yaw": np.pi / 2, "length": 0.0, "steps": 2})):
+    for mjcf, yaw, step, steps in ((low, 0.0, 0.2, 6), (narrow, np.pi / 2, 0.0, 2)):
         rooms = []
         for each, factor in ((robot, 1.0), (sized, size[0])):
-            length = factor * options.get("length", 0.2)
-            problem = walk_problem(each, 0.3 * factor, **options | {"length": length}, pace=factor**0.5)
+            problem = walk_problem(each, 0.3 * factor, 0.0, yaw, steps, factor * step, factor**0.5)
             rooms.append(BodyRoom(each, loaded(mjcf, factor)).room(problem))
         usual, other = rooms
         assert usual is not None and other is not None

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from toolkit.geometry.limb import Limb
-from toolkit.robot.model import LimbModel, RobotModel
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.robot.model import LegGeometry, LimbModel, RobotModel
 from toolkit.world.loader import load_world
 
 # Names, options, friction and contact bits are chosen to clash with a world's.
@@ -49,6 +49,8 @@ ROBOT = """
 </mujoco>
 """
 
+LEG = LegGeometry(np.zeros(3), np.zeros(3), 0.4, 0.4, 0.0, 0.8, {}, {})
+
 
 @pytest.fixture
 def stool():
@@ -77,7 +79,7 @@ def stool():
             limb: LimbModel(limb, limb.label, limb.label.replace("foot", "leg"), np.array([0.11, 0.06]))
             for limb in (Limb.LEFT_FOOT, Limb.RIGHT_FOOT)
         },
-        legs={},
+        legs=dict.fromkeys(FEET, LEG),
         arms={},
         fingerprint="",
     )

@@ -8,6 +8,7 @@ import numpy as np
 
 from toolkit.learning.feasible import TransitionProblem, transition_feasible
 
+# Lengths and speeds are those of a body of the usual size (`toolkit.robot.scale`).
 _COM = np.array([0.12, 0.12, 0.08])  # m; deviations of the largest disturbance of the CoM, in the frame of the feet
 _VELOCITY = np.array([0.6, 0.5, 0.25])  # m/s; the same of its velocity
 _CONTACT = np.array([0.3, 0.3, 0.1])  # m; the same of the new contact, in its own frame
@@ -39,13 +40,14 @@ def at_boundary(problem: TransitionProblem, rng: np.random.Generator) -> list[tu
 def _changed(problem: TransitionProblem, moved: np.ndarray, part: float) -> TransitionProblem:
     """The transition with a part of a change: (3, 3) of CoM, velocity and new contact, in standard deviations."""
     turn, transition = problem.stance.mean_feet.rotation, problem.transition
+    scale = problem.robot.scale
     if transition.contact is not None:
         pose = transition.contact.pose
-        pose = replace(pose, position=pose @ (part * moved[2] * _CONTACT))
+        pose = replace(pose, position=pose @ (scale.length * part * moved[2] * _CONTACT))
         transition = replace(transition, contact=replace(transition.contact, pose=pose))
     return replace(
         problem,
-        com=problem.com + turn @ (part * moved[0] * _COM),
-        com_velocity=problem.com_velocity + turn @ (part * moved[1] * _VELOCITY),
+        com=problem.com + turn @ (scale.length * part * moved[0] * _COM),
+        com_velocity=problem.com_velocity + turn @ (scale.speed * part * moved[1] * _VELOCITY),
         transition=transition,
     )

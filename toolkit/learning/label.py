@@ -22,7 +22,8 @@ from toolkit.prediction.features import TARGETS, encode
 from toolkit.robot.model import RobotModel
 
 INITIAL_REST, FINAL_REST = 0.4, 1.0
-"""Rests in s at the start and at the end of a labelled sequence; those of executed plans."""
+"""Rests in s at the start and at the end of a labelled sequence, for a body of the usual size (`toolkit.robot.scale`);
+those of executed plans."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,8 @@ def label(robot: RobotModel, sequence: ContactSequence) -> LabelledSequence | No
     """Optimise the motion of a whole sequence; None where none is feasible, or there are no transitions."""
     if not sequence.transitions:
         return None
-    schedule = ContactSchedule.of(sequence, initial_rest=INITIAL_REST, final_rest=FINAL_REST)
+    pace = robot.scale.time
+    schedule = ContactSchedule.of(sequence, initial_rest=pace * INITIAL_REST, final_rest=pace * FINAL_REST)
     motion = optimise(robot, schedule, initial_com(robot, sequence.start), np.zeros(3))
     return LabelledSequence(robot, sequence, intervals(motion, schedule)) if motion.feasible else None
 

@@ -22,7 +22,9 @@ _ASIDE = 0.15  # share of steps that are replaced
 _EVENTS = 3  # most palm transitions between two steps
 _EVENT = 0.7  # probability of each
 _WANTED = 20.0  # weight of a transition whose category is lacking; that of another is 1
-_ARM_MARGIN = 0.03  # m; palms in between are this far within the arm's reach above the middle of the feet
+# m for a body of the usual size (`toolkit.robot.scale`); palms in between are this far within the arm's reach above the
+# middle of the feet
+_ARM_MARGIN = 0.03
 
 
 def part_of(sequence: ContactSequence, rng: np.random.Generator) -> ContactSequence:
@@ -111,4 +113,5 @@ def _reaches(robot: RobotModel, stance: Stance, palm: Contact | None) -> bool:
     arm = robot.arms[palm.limb]
     shoulder = initial_com(robot, stance) + rotation_about_z(stance.mean_feet.yaw) @ arm.shoulder_in_com
     distance = np.linalg.norm(palm.pose.position - shoulder)
-    return bool(arm.min_reach + _ARM_MARGIN <= distance <= arm.max_reach - _ARM_MARGIN)
+    margin = robot.scale.length * _ARM_MARGIN
+    return bool(arm.min_reach + margin <= distance <= arm.max_reach - margin)

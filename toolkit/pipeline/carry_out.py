@@ -20,7 +20,8 @@ from toolkit.search.costs.plan_cost import plan_cost
 from toolkit.search.result import SearchResult, Solution
 from toolkit.world.world import World
 
-NEAR = 0.02  # m; a patch farther from its surface was planned for another world
+# m for a body of the usual size (`toolkit.robot.scale`); a patch farther from its surface was planned for another world
+NEAR = 0.02
 
 
 @warnings_refused("the run", PlanningError)
@@ -81,7 +82,7 @@ def _check_contact(contact: Contact, where: str, robot: RobotModel, world: World
         raise InputError(f"{where} puts {label} on surface {contact.surface}, and there are {count}: {remedy}")
     surface = world.surfaces[contact.surface]
     distance = float(np.linalg.norm(surface.nearest_point(position) - position))
-    if not distance <= NEAR:
+    if not distance <= robot.scale.length * NEAR:
         raise InputError(f"{where} puts {label} {distance:.2f} m away from surface {contact.surface}: {remedy}")
     if contact.friction > surface.friction + 1e-9:
         raise InputError(

@@ -65,11 +65,12 @@ def contact_graph(planner: ContactPlanner, evaluator: TransitionEvaluator) -> Co
     start = ground.start_stance()
     way = ground.way(start)
     timings, tally = planner.timings(slides=way.slides), Tally()
-    strategy = strategy_of(planner.config, evaluator, way.length, slides=way.slides)
+    scale = robot.scale
+    strategy = strategy_of(planner.config, evaluator, way.length, slides=way.slides, scale=scale.length)
     moves = ground.moves(way)
     limbs = [limb for limb in PALMS if planner.config.palms and moves.has_palm_surfaces and limb in robot.arms]
-    reader, reach = StateReader(moves.table, timings), ReachCheck(moves, limbs, timings)
-    cost = EdgeCost(strategy.cost, moves.table, timings, world.goal, way.distance, way.longest)
+    reader, reach = StateReader(moves.table, timings, scale), ReachCheck(moves, limbs, timings)
+    cost = EdgeCost(strategy.cost, moves.table, timings, world.goal, way.distance, way.longest, scale=scale)
     at_once, waiting = (
         None if judge is None else Judging(judge, reader, reach, tally, math.inf)
         for judge in (strategy.at_once, strategy.waiting)
@@ -81,7 +82,7 @@ def contact_graph(planner: ContactPlanner, evaluator: TransitionEvaluator) -> Co
         at_once=at_once,
         waiting=waiting,
         cost=cost,
-        delay=Delay(Drift(robot, moves.table, timings), None, cost.per_metre),
+        delay=Delay(Drift(robot, moves.table, timings), None, cost.per_metre, scale.length),
         tally=tally,
         screen=SequenceScreen(moves, limbs),
     )

@@ -127,7 +127,7 @@ def footsteps_of(
     return Footsteps(
         start=start,
         goal=world.goal.position[:2],
-        radius=arrival_radius(world.goal) / np.sqrt(2.0),
+        radius=arrival_radius(world.goal, robot.scale) / np.sqrt(2.0),
         regions=tuple(regions),
         heading=heading,
         lower=np.append(table[:, :2].min(0), -rise),
