@@ -91,6 +91,20 @@ def test_a_base_that_looks_back_a_waist_below_the_trunk_and_an_empty_root(tmp_pa
     assert [patch.body for patch in anatomy.feet] == ["left_foot_link", "right_foot_link"]
 
 
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_knee_that_bends_against_the_other_is_named_with_its_range(
+    side: str, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    file = tmp_path / "biped.urdf"
+    before, name, after = solid(biped_urdf()).partition(f'<joint name="{side}_knee"')
+    file.write_text(before + name + after.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 -1 0"/>', 1))
+    assert robots.main(["--inspect", str(file)]) == 1
+    text = capsys.readouterr().out
+    assert f"{side}_knee: about -y, 0.000…2.400 rad" in text and "toes along (1.00, " in text
+    assert f"[limits.position] of '{side}_knee', which bends against the other knee" in text
+    assert "perhaps [-2.4, 0]" in text
+
+
 def test_models_are_found_by_package_and_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nowhere.xml: no such file; give an MJCF or URDF file, or PACKAGE:FILE"):
         locate("nowhere.xml")

@@ -54,6 +54,7 @@ class Anatomy:
         feet: Soles, left one first; empty where no two legs were found.
         palms: Palms, left one first; empty where no two arms of four joints or more were found.
         arms: Joints of the arms in order, left arm first; empty where no two arms of three joints or more were found.
+        backward: The knee whose range lets it bend the other way than that of the other leg, against the toes, if any.
         shared: Joints that both legs hang on, such as a waist below a floating trunk.
         fingers: Joints beyond the hands.
     """
@@ -64,6 +65,7 @@ class Anatomy:
     feet: tuple[FoundPatch, ...]
     palms: tuple[FoundPatch, ...]
     arms: tuple[tuple[str, ...], ...]
+    backward: tuple[str, ...]
     shared: tuple[str, ...]
     fingers: tuple[str, ...]
 
@@ -78,10 +80,15 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
     feet = _feet(model, data, tips)
     if len(feet) != 2:
         others = tuple(model.body(b).name for b in roots if b != base)
-        return Anatomy(model.body(base).name, others, np.array([1.0, 0.0]), (), (), (), (), ())
+        return Anatomy(model.body(base).name, others, np.array([1.0, 0.0]), (), (), (), (), (), ())
     first, second = (joints_to(model, foot) for foot in feet)
     shared = [j for j in first if j in second]
-    forward = _forward(model, data, base, [j for j in first if j not in shared])
+    own = [[j for j in leg if j not in shared] for leg in (first, second)]
+    bends = [_forward(model, data, base, leg) for leg in own]
+    toes = _toes(model, data, feet)
+    agree = bends[0] @ bends[1] > 0.0
+    forward = bends[0] if agree or bends[0] @ toes > 0.0 else bends[1]
+    wrong = [] if agree else [leg[3] for leg, bend in zip(own, bends, strict=True) if bend @ forward < 0.0]
     across = np.array([-forward[1], forward[0], 0.0])
     feet = sorted(feet, key=lambda b: -float(across @ data.xpos[b]))
     legs = {j for foot in feet for j in joints_to(model, foot)}
@@ -97,6 +104,7 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
         feet=tuple(_sole(model, data, foot, forward) for foot in feet),
         palms=tuple(_palm(model, data, hand, legs, forward) for hand in hands),
         arms=tuple(_names(model, joints) for joints, _ in arms),
+        backward=_names(model, wrong),
         shared=_names(model, shared),
         fingers=_names(model, fingers),
     )
@@ -189,6 +197,13 @@ def _forward(model: mujoco.MjModel, data: mujoco.MjData, base: int, leg: list[in
     if np.linalg.norm(ahead) < 0.5:
         ahead = data.xmat[base].reshape(3, 3)[:2, 0]
     return ahead / np.linalg.norm(ahead)
+
+
+def _toes(model: mujoco.MjModel, data: mujoco.MjData, feet: list[int]) -> np.ndarray:
+    """Level direction (2,) from the ankles to the middles of the feet, which reach farther ahead than back."""
+    points = [_points(model, data, _rigid(model, foot)[0]) for foot in feet]
+    ahead = [(p.min(0) + p.max(0)) / 2 - data.xpos[foot] for p, foot in zip(points, feet, strict=True) if len(p)]
+    return np.sum(ahead, axis=0)[:2] if ahead else np.zeros(2)
 
 
 def _sole(model: mujoco.MjModel, data: mujoco.MjData, foot: int, forward: np.ndarray) -> FoundPatch:

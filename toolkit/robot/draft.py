@@ -89,6 +89,12 @@ def _missing_structure(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
     for limb, patch in zip(Limb, [*anatomy.feet, *anatomy.palms], strict=False):
         if not patch.seen:
             missing.append(f"[limbs.{limb.label}]: '{patch.body}' has no shape that can be read")
+    for name in anatomy.backward:
+        low, high = model.joint(name).range
+        missing.append(
+            f"[limits.position] of '{name}', which bends against the other knee and the toes: perhaps "
+            f"[{0.0 - high:.4g}, {0.0 - low:.4g}]"
+        )
     for j in range(model.njnt):
         if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
             missing.append(f"hinges in place of the ball joint '{model.joint(j).name}'")

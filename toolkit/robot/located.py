@@ -11,7 +11,7 @@ from toolkit.errors import InputError, PackageError
 from toolkit.robot.source import file_in_package, file_of_module
 
 _MODULES = "robot_descriptions"
-_MOST = 30  # most models of a package that a message names
+_MOST = 100  # most models of a package that a message names
 
 
 @dataclass(frozen=True)
