@@ -309,14 +309,14 @@ def test_an_error_of_the_program_is_an_outcome():
 
 
 def test_a_tiny_sweep_writes_its_results_and_resumes(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(program, "cells_of", lambda names, **_: [Cell("turn", (0.0,), 0)])
+    monkeypatch.setattr(program, "cells_of", lambda names, **_: [Cell("turn", (180.0,), 0)])
     folders = ["--workers", "0", "--out", str(tmp_path / "out"), "--results", str(tmp_path / "results")]
     command = ["--families", "turn", "--expansions", "1", "--planner", "kinematic", *folders]
     assert program.main(command) == 0  # no hole
     (row,) = result(folders, "map")["table"]
     assert (row["cells"], row["no_sequence"]) == (1, 1)
     assert (tmp_path / "results" / "map" / "turn.png").is_file()
-    assert load_world(tmp_path / "out" / "worlds" / "turn-0-0.xml").surfaces
+    assert load_world(tmp_path / "out" / "worlds" / "turn-180-0.xml").surfaces
     capsys.readouterr()
     assert program.main(command) == 0
     assert "1 of 1 trials known from before" in capsys.readouterr().out

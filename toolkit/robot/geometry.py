@@ -21,6 +21,7 @@ STRAIGHT_ARM_MARGIN = 0.05  # share of the length from shoulder to palm
 _ROLES = ("roll", "pitch", "yaw")
 _ALIGNED = 0.72  # least |cosine| between a joint axis in the home posture and the base axis that defines its role
 _OBLIQUE = 0.6  # the same of hips, where two joints may share what roll and yaw are
+_ACROSS = 0.5  # greatest |cosine| between the axes of these two and that of pitch
 
 
 def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegGeometry:
@@ -248,7 +249,10 @@ def _hip_roles(cosines: np.ndarray) -> list[str]:
     orders = sorted(itertools.permutations(range(3)), key=lambda order: -order[0])
     fits = [round(float(np.prod(cosines[[0, 1, 2], order])), 2) for order in orders]
     order = list(orders[int(np.argmax(fits))])
-    return [_ROLES[k] for k in order] if cosines[[0, 1, 2], order].min() >= _OBLIQUE else []
+    pitch = _ROLES.index("pitch")
+    across = max(cosines[joint, pitch] for joint in range(3) if order[joint] != pitch)
+    fit = cosines[[0, 1, 2], order].min() >= _OBLIQUE and across <= _ACROSS
+    return [_ROLES[k] for k in order] if fit else []
 
 
 def _axes_crossing(data: mujoco.MjData, joints: list[int]) -> np.ndarray:
