@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from tests.robot.samples import TOML, write_robot
 from tests.shipped_robots import OWN
 from toolkit.contacts.transition_model import TransitionModel, palm_rays, running_steps, steps_38, steps_60
 from toolkit.geometry.limb import Limb
@@ -46,3 +47,12 @@ def test_right_limbs_mirror_left_ones_and_soles_stay_apart(name):
     np.testing.assert_array_equal(model.rays_of(Limb.RIGHT_PALM), model.rays_of(Limb.LEFT_PALM) * [1, -1, 1])
     assert model.steps[:, 1].min() >= 2 * robot.half_sizes[Limb.LEFT_FOOT, 1] + 0.04 * robot.scale.length - 1e-12
     assert len(model.rays) == (18 if robot.arms else 0)
+
+
+def test_a_robot_that_stands_wide_steps_wide(tmp_path):
+    hips = "[home]\nflat_soles = true\nleft_hip_roll = 0.35\nright_hip_roll = -0.35"
+    folder = write_robot(tmp_path / "wide", toml=TOML.replace("[home]", hips))
+    robot, plain = load_robot(str(folder)), load_robot(str(write_robot(tmp_path / "plain")))
+    assert plain.stance_width == pytest.approx(0.2) and robot.stance_width > 0.55
+    assert TransitionModel.of(robot, steps_60()).steps[:, 1].min() == pytest.approx(0.6 * robot.stance_width)
+    assert TransitionModel.of(plain, steps_60()).steps[:, 1].min() == pytest.approx(0.2 * plain.scale.length)

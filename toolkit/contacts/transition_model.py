@@ -15,6 +15,11 @@ from toolkit.robot.model import RobotModel
 
 _MIRROR_STEP = np.array([1.0, -1.0, -1.0])
 _MIRROR_RAY = np.array([1.0, -1.0, 1.0])
+_NARROWEST = 0.6
+"""Least width of a step, as a share of the home posture: hips that stand wide hit each other as legs come together.
+
+Robots whose hips have room stand no wider than 1.65 times their narrowest step.
+"""
 
 
 def _foot_steps(yaws_deg: tuple[float, ...]) -> np.ndarray:
@@ -75,13 +80,14 @@ class TransitionModel:
 
     @classmethod
     def of(cls, robot: RobotModel, steps: np.ndarray) -> TransitionModel:
-        """Moves of a robot: steps that are scaled with its legs and wide enough for its soles, and rays if it has arms.
+        """Moves of a robot: steps scaled with its legs, wide enough for its soles and hips, and rays if it has arms.
 
         The paper's numbers fit a body of the usual size (`toolkit.robot.scale`).
         """
         scale = robot.scale.length
         scaled = steps * [scale, scale, 1.0]
-        scaled[:, 1] += max(0.0, soles_apart(robot) - scaled[:, 1].min())
+        narrowest = max(soles_apart(robot), _NARROWEST * robot.stance_width)
+        scaled[:, 1] += max(0.0, narrowest - scaled[:, 1].min())
         return cls(scaled, palm_rays() if robot.arms else np.zeros((0, 3)))
 
     def steps_of(self, limb: Limb) -> np.ndarray:

@@ -242,6 +242,12 @@ class RobotModel:
         return LegMass(float(first), float(second), lines)
 
     @cached_property
+    def stance_width(self) -> float:
+        """Distance in m across between the soles in the home posture."""
+        left, right = (self._at_home.site(self.limbs[foot].site).xpos[1] for foot in FEET)
+        return float(left - right)
+
+    @cached_property
     def turning_torque(self) -> float:
         """N m; what the trunk's motors can turn about the lateral axis, or the shoulders' where the trunk has none."""
         data, lateral = self._at_home, self._at_home.xmat[1].reshape(3, 3)[:, 1]
