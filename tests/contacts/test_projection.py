@@ -8,9 +8,13 @@ import shapely
 from toolkit.contacts.projection import ProjectionConfig, Projector, shifts
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_on_surface, yaw_of
+from toolkit.robot.scale import USUAL
 from toolkit.world.surface import Surface
 
-ROBOT = SimpleNamespace(half_sizes=np.array([[0.11, 0.065], [0.11, 0.065], [0.04, 0.04], [0.04, 0.04]]))
+ROBOT = SimpleNamespace(
+    half_sizes=np.array([[0.11, 0.065], [0.11, 0.065], [0.04, 0.04], [0.04, 0.04]]),
+    scale=USUAL,
+)
 EMPTY = mujoco.MjModel.from_xml_string("<mujoco/>")
 SOLE = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * [0.11, 0.065]
 
