@@ -11,6 +11,7 @@ from toolkit.execution.check import Check
 from toolkit.geometry.limb import Limb
 from toolkit.pipeline import Source, loop, trial
 from toolkit.refine import RefineConfig
+from toolkit.robot.scale import USUAL
 from toolkit.wholebody.plan import WIDE, Clearance
 
 
@@ -122,7 +123,8 @@ class Run:
         monkeypatch.setattr(loop, "Tester", Tester)
         monkeypatch.setattr(loop, "plan_cost", plan_cost)
         config = pipeline.PipelineConfig(**{"candidates": 6} | settings)
-        self.result = pipeline.run(None, None, planner, config)  # pyright: ignore[reportArgumentType]
+        robot = SimpleNamespace(scale=USUAL)
+        self.result = pipeline.run(robot, None, planner, config)  # pyright: ignore[reportArgumentType]
 
 
 FOOT, PALM = Limb.LEFT_FOOT, Limb.RIGHT_PALM

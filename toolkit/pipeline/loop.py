@@ -124,7 +124,7 @@ class _Run:
         self._searches: list[SearchResult] = []
         self._candidates: list[Candidate] = []
         self._trials: list[Trial] = []
-        self._blame = Blame()
+        self._blame = Blame(scale=robot.scale.length)
         self._at_start: Counter[str] = Counter()  # reasons of failures where nothing has moved yet
         self._known: set[bytes] = set()
         self._local: LocalSearch | None = None
