@@ -6,10 +6,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import cast
 
-import coal
 import numpy as np
-import trimesh
-from scipy.spatial import ConvexHull, QhullError
 
 from toolkit.mjcf import one_line
 
@@ -29,6 +26,12 @@ def converted(file: Path) -> bytes | None:
         ValueError: The file holds no solid that can be read.
     """
     ending = file.suffix.lower()
+    if not (ending == ".dae" or (ending == ".stl" and _is_text(file))):
+        return None
+    import coal  # here, as few robots need it
+    import trimesh
+    from scipy.spatial import ConvexHull, QhullError
+
     if ending == ".dae":
         try:
             points = np.asarray(coal.MeshLoader().load(str(file), np.ones(3)).vertices(), float)
@@ -36,10 +39,8 @@ def converted(file: Path) -> bytes | None:
             mesh = trimesh.convex.convex_hull(points)
         except (QhullError, ElementTree.ParseError, ValueError, RuntimeError) as error:
             raise ValueError(f"holds no solid ({one_line(error)[:_SAID]})") from None
-    elif ending == ".stl" and _is_text(file):
-        mesh = trimesh.load_mesh(file, file_type="stl_ascii")
     else:
-        return None
+        mesh = trimesh.load_mesh(file, file_type="stl_ascii")
     return cast(bytes, mesh.export(file_type="stl"))
 
 
