@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
-from tests.robot.samples import TOML, write_robot
+from tests.robot.samples import TOML, biped_mjcf, write_robot
 from tests.shipped_robots import OWN
 from toolkit.contacts.transition_model import TransitionModel, palm_rays, running_steps, steps_38, steps_60
 from toolkit.geometry.limb import Limb
+from toolkit.robot.legroom import legs_touch
 from toolkit.robot.loader import load_robot
 
 
@@ -56,3 +57,21 @@ def test_a_robot_that_stands_wide_steps_wide(tmp_path):
     assert plain.stance_width == pytest.approx(0.2) and robot.stance_width > 0.55
     assert TransitionModel.of(robot, steps_60()).steps[:, 1].min() == pytest.approx(0.6 * robot.stance_width)
     assert TransitionModel.of(plain, steps_60()).steps[:, 1].min() == pytest.approx(0.2 * plain.scale.length)
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_legs_with_room_make_every_step(name):
+    assert len(TransitionModel.of(load_robot(name), steps_60()).steps) == 60
+
+
+def test_steps_that_turn_thick_thighs_into_each_other_are_left_out(tmp_path):
+    thighs = biped_mjcf().replace(
+        'type="capsule" size="0.05" fromto="0 0 -0.08 0 0 -0.28" mass="3"',
+        'type="box" size="0.09 0.05 0.1" pos="0.08 0 -0.2" mass="3"',  # which reach far ahead of the hips
+    )
+    robot = load_robot(str(write_robot(tmp_path / "thick", thighs)))
+    steps = TransitionModel.of(robot, steps_60()).steps
+    narrow = steps[steps[:, 1] < steps[:, 1].min() + 0.01]
+    assert legs_touch(robot, 0.17, np.radians(30)) and not legs_touch(robot, 0.3, np.radians(15))
+    assert not (np.degrees(narrow[:, 2]) < -20).any() and (np.degrees(narrow[:, 2]) > 20).any()
+    assert (np.degrees(steps[:, 2]) < -20).any()  # wider apart there is room

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.geometry.limb import Limb
+from toolkit.robot.legroom import legs_touch
 from toolkit.robot.model import RobotModel
 
 _MIRROR_STEP = np.array([1.0, -1.0, -1.0])
@@ -82,12 +83,17 @@ class TransitionModel:
     def of(cls, robot: RobotModel, steps: np.ndarray) -> TransitionModel:
         """Moves of a robot: steps scaled with its legs, wide enough for its soles and hips, and rays if it has arms.
 
+        Steps that turn the feet so far inwards that the legs would be in each other are left out.
+
         The paper's numbers fit a body of the usual size (`toolkit.robot.scale`).
         """
         scale = robot.scale.length
         scaled = steps * [scale, scale, 1.0]
         narrowest = max(soles_apart(robot), _NARROWEST * robot.stance_width)
         scaled[:, 1] += max(0.0, narrowest - scaled[:, 1].min())
+        inward = {(y, yaw) for _, y, yaw in scaled.tolist() if yaw < 0.0}
+        touching = {step for step in sorted(inward) if legs_touch(robot, step[0], -step[1])}
+        scaled = scaled[[(y, yaw) not in touching for _, y, yaw in scaled.tolist()]]
         return cls(scaled, palm_rays() if robot.arms else np.zeros((0, 3)))
 
     def steps_of(self, limb: Limb) -> np.ndarray:
