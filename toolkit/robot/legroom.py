@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from scipy.optimize import least_squares
 
 from toolkit.geometry.heading import wrapped
 from toolkit.geometry.limb import FEET
@@ -27,6 +26,8 @@ def legs_touch(robot: RobotModel, width: float, turn: float) -> bool:
         width: Distance in m across between the soles.
         turn: Angle in rad by which the feet are turned towards each other.
     """
+    from scipy.optimize import least_squares  # here, since every run imports this module
+
     model, data = robot.mujoco_model, mujoco.MjData(robot.mujoco_model)
     joints = [robot.joints_to(foot) + 1 for foot in FEET]  # joint 0 is the free one
     address = model.jnt_qposadr[np.concatenate(joints)]
