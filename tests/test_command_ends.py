@@ -161,10 +161,14 @@ time.sleep(60)"""
     assert (process.returncode, err) == (143, "terminated\n") and (tmp_path / "done").exists()
 
 
-def test_a_signal_ends_the_processes_that_were_started():
-    body = """
-import multiprocessing
-child = multiprocessing.get_context("fork").Process(target=time.sleep, args=(600,))
+@pytest.mark.parametrize("deaf", ["", "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM])"])
+def test_a_signal_ends_the_processes_that_were_started(deaf):
+    body = f"""
+import multiprocessing, signal
+def work():
+    {deaf}
+    time.sleep(600)
+child = multiprocessing.get_context("fork").Process(target=work)
 child.start()
 print("ready", flush=True)
 print(child.pid, flush=True)

@@ -36,10 +36,10 @@ def end_when_stopped() -> None:
         children = sys.modules["multiprocessing"].active_children() if "multiprocessing" in sys.modules else []
         for child in children:
             child.terminate()
-        atexit._run_exitfuncs()
-        for child in children:  # one that was being forked may have missed the signal
+        for child in children:  # one that was being forked may have missed the signal, and exit functions wait for it
             child.join(GRACE)
             child.kill()
+        atexit._run_exitfuncs()
         try:
             os.write(2, f"{WORDS[signal.Signals(number).name]}\n".encode())
         finally:
