@@ -11,7 +11,8 @@ from toolkit.geometry.pose import Pose, rotation_on_surface, yaw_of
 from toolkit.robot.scale import USUAL
 from toolkit.world.surface import Surface
 
-ROBOT = SimpleNamespace(half_sizes=np.array([[0.11, 0.065], [0.11, 0.065], [0.04, 0.04], [0.04, 0.04]]), scale=USUAL)
+HALF = np.array([[0.11, 0.065], [0.11, 0.065], [0.04, 0.04], [0.04, 0.04]])
+ROBOT = SimpleNamespace(half_sizes=HALF, scale=USUAL, foot_room=lambda margin: HALF[0] + margin)
 EMPTY = mujoco.MjModel.from_xml_string("<mujoco/>")
 SOLE = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * [0.11, 0.065]
 
@@ -149,3 +150,13 @@ def test_shifts_are_sorted_and_symmetric():
     assert (offsets[0] == 0).all() and (np.diff(lengths) >= -1e-12).all() and lengths.max() <= 0.06 + 1e-12
     assert {tuple(np.round(row, 3)) for row in offsets} == {tuple(np.round(row * [1, -1], 3) + 0.0) for row in offsets}
     assert len(shifts(0.0, 0.02)) == 1
+
+
+def test_feet_that_are_wider_than_their_soles_keep_off_edges_where_they_can():
+    wide = SimpleNamespace(half_sizes=HALF, scale=USUAL, foot_room=lambda margin: HALF[0] + margin + 0.03)
+    for half, spare in ((0.2, 0.05), (0.13, 0.01)):  # room for the whole foot, and for the sole alone
+        corners = half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        surface = Surface(0, "stone", Pose(np.eye(3), np.zeros(3)), (corners,), (corners,), 0.5, True, False)
+        projector = Projector(wide, [surface], EMPTY, ProjectionConfig(margin=0.01, shift=0.06, shift_step=0.005))
+        found = projector.project_soles(Limb.LEFT_FOOT, np.array([[spare + 0.03, 0.0, 0.0]]), -1.0, 1.0)
+        assert found.position[0, 0] == pytest.approx(spare, abs=0.0051)

@@ -12,7 +12,6 @@ from tests.robot.samples import TOML, biped_mjcf, write_robot
 from tests.shipped_robots import OWN
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.robot.geometry import foot_outline
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.limits import sole_room
@@ -205,7 +204,7 @@ def test_a_foot_that_is_wider_than_its_sole_keeps_its_room(tmp_path: Path) -> No
         load_robot(str(write_robot(tmp_path / name, biped_mjcf().replace(sole, sole + more))))
         for name, more in (("plain", ""), ("shoe", shoe))
     ]
-    outlines = [foot_outline(robot.mujoco_model, LEFT) for robot in robots]
+    outlines = [robot.foot_outline for robot in robots]
     np.testing.assert_allclose(outlines, [[0.1, 0.05], [0.12, 0.07]], atol=1e-6)
     plain, wide = (sole_room(robot) for robot in robots)
     spare = robots[0].scale.length * 0.01

@@ -28,10 +28,11 @@ class Footholds:
     Args:
         surfaces: The surfaces.
         half_size: (2,) m; half extents of the sole.
-        margin: Margin around it that should also lie in the surface, in m; less where there is no room for it.
+        margin: Margin around it, or (2,) margins along and across, that should also lie in the surface, in m; less
+            where there is no room for it.
     """
 
-    def __init__(self, surfaces: Sequence[Surface], half_size: np.ndarray, margin: float):
+    def __init__(self, surfaces: Sequence[Surface], half_size: np.ndarray, margin: float | np.ndarray):
         self._surfaces, self._half, self._margin = surfaces, half_size, margin
         self._regions: dict[tuple[int, int], shapely.Geometry] = {}
         self._edges: dict[int, float] = {}

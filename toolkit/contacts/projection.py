@@ -20,7 +20,7 @@ import numpy as np
 
 from toolkit.contacts.projection_kernels import project_palms, project_soles
 from toolkit.contacts.surface_table import surface_table
-from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.geometry.limb import PALMS, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.world.source import RAY_GROUPS
 from toolkit.world.surface import Surface
@@ -113,8 +113,9 @@ class Projector:
     ):
         self.config = (config or ProjectionConfig()).scaled(robot.scale.length)
         self.half_sizes = robot.half_sizes + self.config.margin
+        self.room = robot.foot_room(self.config.margin)
         self.half_sizes[list(PALMS)] = robot.half_sizes[list(PALMS)] + self.config.palm_margin
-        self.table = surface_table(surfaces, reach=float(np.linalg.norm(self.half_sizes[list(FEET)], axis=1).max()))
+        self.table = surface_table(surfaces, reach=float(np.linalg.norm(self.room)))
         self.offsets = shifts(self.config.shift, self.config.shift_step)
         self._model = model
         self._data = mujoco.MjData(model)
@@ -125,6 +126,8 @@ class Projector:
         self, limb: Limb, pose: np.ndarray, low: float, high: float, *, shift: bool = True, outward: float = 0.0
     ) -> Projected:
         """Drop soles on the highest surfaces that hold them; z along the surface's normal, x along yaw.
+
+        Where there is no room for a foot that is wider than its sole, what fits is the sole alone.
 
         Args:
             limb: A foot.
@@ -137,8 +140,19 @@ class Projector:
         offsets = self.offsets if shift else self.offsets[:1]
         if outward < 0:
             offsets = offsets * [1.0, -1.0]
-        soles, half = Projected.none(len(pose)), self.half_sizes[limb]
         pose, offsets = np.ascontiguousarray(pose, dtype=float), np.ascontiguousarray(offsets)
+        sole = self.half_sizes[limb]
+        soles = self._soles(pose, low, high, self.room, offsets)
+        missing = np.flatnonzero(~soles.found)
+        if len(missing) and (self.room > sole).any():
+            found = self._soles(pose[missing], low, high, sole, offsets)
+            for name in ("surface", "position", "rotation"):
+                getattr(soles, name)[missing] = getattr(found, name)
+        return soles
+
+    def _soles(self, pose: np.ndarray, low: float, high: float, half: np.ndarray, offsets: np.ndarray) -> Projected:
+        """The soles of `project_soles` with the half extents (2,) m of their room, at poses (n, 3)."""
+        soles = Projected.none(len(pose))
         found = soles.surface, soles.position, soles.rotation
         project_soles(pose, float(low), float(high), half, offsets, self.table, *found)
         return soles

@@ -79,7 +79,9 @@ def landing_room(
         arrived = None
         if goal is not None and final[contact.limb] == index:
             arrived = partial(_arrived, goal, stances[-1].mean_feet.position, contact, config.arrival)
-        room[index] = _inside(box, contact, surfaces[contact.surface], robot.half_sizes[contact.limb], config, arrived)
+        half = robot.half_sizes[contact.limb]
+        margins = (robot.foot_room(config.margin) - half, 0.5 * config.margin, 0.0)
+        room[index] = _inside(box, contact, surfaces[contact.surface], half, margins, config.step, arrived)
     return room
 
 
@@ -116,29 +118,33 @@ def _inside(
     contact: Contact,
     surface: Surface,
     half_size: np.ndarray,
-    config: RoomConfig,
+    margins: Sequence[np.ndarray | float],
+    step: float,
     allowed: Callable[[np.ndarray], bool] | None,
 ) -> np.ndarray:
-    """The part of the box that is allowed and keeps the sole on the surface; it grows evenly from zero."""
+    """The part of the box that is allowed and keeps the sole on the surface with the first margin (m) that it has.
+
+    It grows evenly from zero, in steps of `step` m.
+    """
     region = surface.region
     frame = surface.pose.inverse() @ contact.pose
     shapely.prepare(region)
 
-    def holds(found: np.ndarray, margin: float) -> bool:
+    def holds(found: np.ndarray, margin: np.ndarray | float) -> bool:
         (x0, y0), (x1, y1) = found[0] - half_size - margin, found[1] + half_size + margin
         swept = frame @ np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]])
         return bool(region.covers(shapely.Polygon(swept[:, :2])))
 
     found = np.zeros((2, 2))
-    margin = next((share * config.margin for share in (1.0, 0.5, 0.0) if holds(found, share * config.margin)), None)
+    margin = next((margin for margin in margins if holds(found, margin)), None)
     if margin is None:
         return found
     growing = {(end, axis) for end in range(2) for axis in range(2)}
     while growing:
         for end, axis in sorted(growing):
             wider, limit = found.copy(), box[end, axis]
-            bound, step = (min, config.step) if end else (max, -config.step)
-            wider[end, axis] = bound(found[end, axis] + step, limit)
+            bound, change = (min, step) if end else (max, -step)
+            wider[end, axis] = bound(found[end, axis] + change, limit)
             stuck = wider[end, axis] == found[end, axis] or (allowed is not None and not allowed(wider))
             if stuck or not holds(wider, margin):
                 growing.discard((end, axis))

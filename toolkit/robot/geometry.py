@@ -10,9 +10,8 @@ import numpy as np
 
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.geometry.pose import Pose, rolled_onto
+from toolkit.geometry.pose import rolled_onto
 from toolkit.robot.chain import arm_joints, joints_to
-from toolkit.robot.mend import geom_points
 from toolkit.robot.model import ArmGeometry, LegGeometry
 from toolkit.robot.rolling import rolling_range
 
@@ -128,25 +127,6 @@ def arm_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> ArmG
         min_reach=float(reach.min()),
         max_reach=float((1 - STRAIGHT_ARM_MARGIN) * reach.max()),
     )
-
-
-def foot_outline(model: mujoco.MjModel, foot: Limb) -> np.ndarray:
-    """Half extents (2,) m of all collision shapes of a foot along the axes of its sole, around the centre of that.
-
-    Shoes and round feet are larger than what touches level ground.
-    """
-    site = model.site(foot.label).id
-    body = int(model.site_bodyid[site])
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    rigid = model.body_weldid[model.geom_bodyid] == model.body_weldid[body]
-    shapes = np.flatnonzero(rigid & ((model.geom_contype | model.geom_conaffinity) != 0))
-    sole = Pose(data.site_xmat[site].reshape(3, 3), data.site_xpos[site]).inverse()
-    half = np.zeros(2)
-    for geom, on in zip(shapes.tolist(), model.geom_bodyid[shapes].tolist(), strict=True):
-        points = sole @ (Pose(data.xmat[on].reshape(3, 3), data.xpos[on]) @ geom_points(model, geom))
-        half = np.maximum(half, np.abs(points[:, :2]).max(0))
-    return half
 
 
 def derive_limbs(

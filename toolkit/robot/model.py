@@ -12,11 +12,14 @@ import mujoco
 import numpy as np
 
 from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.geometry.pose import Pose
 from toolkit.robot.chain import arm_joints, bodies_above, joints_to, side_joints
+from toolkit.robot.mend import geom_points
 from toolkit.robot.scale import Scale
 
 _LATERAL = 0.5  # least |cosine| between the axis of a joint that turns about the lateral axis and that axis
 _SHOULDER = 3  # joints of a shoulder
+_CLEAR = 0.003  # m; kept free around a foot that is wider than its sole
 LINE = 0.002
 """m; half the width of the line on which a sole that rolls stands: its edge is round by about as much."""
 
@@ -240,6 +243,35 @@ class RobotModel:
             lines[foot] = line @ base
         first, second = moments / (len(FEET) * self.mass)
         return LegMass(float(first), float(second), lines)
+
+    @cached_property
+    def foot_outline(self) -> np.ndarray:
+        """Half extents (2,) m of all collision shapes of a foot along the axes of its sole, around the centre of that.
+
+        Shoes and round feet are larger than what touches level ground.
+        """
+        model, data, half = self.mujoco_model, self._at_home, np.zeros(2)
+        rigid = model.body_weldid[model.geom_bodyid]
+        collides = (model.geom_contype | model.geom_conaffinity) != 0
+        for foot in FEET:
+            site = model.site(self.limbs[foot].site).id
+            sole = Pose(data.site_xmat[site].reshape(3, 3), data.site_xpos[site]).inverse()
+            for geom in np.flatnonzero(collides & (rigid == model.body_weldid[model.site_bodyid[site]])).tolist():
+                body = int(model.geom_bodyid[geom])
+                points = sole @ (Pose(data.xmat[body].reshape(3, 3), data.xpos[body]) @ geom_points(model, geom))
+                half = np.maximum(half, np.abs(points[:, :2]).max(0))
+        return half
+
+    @cached_property
+    def passing_gap(self) -> float:
+        """Gap in m between the soles at which the legs pass each other (`toolkit.robot.legroom.passing_gap`)."""
+        from toolkit.robot.legroom import passing_gap  # here, since it needs a robot
+
+        return passing_gap(self)
+
+    def foot_room(self, margin: float) -> np.ndarray:
+        """Half extents (2,) m of the place of a foot: its sole with a margin in m, and all of it that is wider."""
+        return np.maximum(self.half_sizes[FEET[0]] + margin, self.foot_outline + self.scale.length * _CLEAR)
 
     @cached_property
     def stance_width(self) -> float:

@@ -52,8 +52,8 @@ class Ground:
     def __init__(self, robot: RobotModel, world: World, config: PlannerConfig):
         self._robot, self._world, self._config = robot, world, config
         self._projector = self._projected(config.rest_friction)
-        half, margin = robot.half_sizes[Limb.LEFT_FOOT], self._projector.config.margin
-        self._footholds = Footholds(world.surfaces, half, margin)
+        half = robot.half_sizes[Limb.LEFT_FOOT]
+        self._footholds = Footholds(world.surfaces, half, self._projector.room - half)
         self._terrain = self._distances(self._projector)
         walls = config.palms and bool(self._projector.table.palm.any())
         self._arms = {limb: ArmMap.of(robot, limb) for limb in robot.arms if walls}

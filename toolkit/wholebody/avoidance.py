@@ -2,12 +2,14 @@
 
 For a pair of geoms at distance d with normal n (from the first to the second) at point p the damper demands, per tick,
 
-    n . (J2(p) - J1(p)) dq >= -(d - d_safe) dt / tau
+    n . (J2(p) - J1(p)) dq >= -v dt,    v = (d - d_safe) / tau
 
-so that a distance shrinks ever more slowly towards d_safe, and grows where it is smaller. The displacements dq are
-those of the joints between a geom and its root, whose own motion is taken from the last tick. Arms keep clear of the
-world as seen from the base; all other links do so as seen from a standing foot, so that the base turns and leans for
-them. The last links of the feet, and of palms that reach, are left to the paths of these limbs.
+so that a distance shrinks ever more slowly towards d_safe, and grows where it is smaller. What comes near an arm is
+noticed earlier, and may come nearer as fast as a steady braking can still stop: `v = sqrt(2 a (d - d_safe))`. The
+displacements dq are those of the joints between a geom and its root, whose own motion is taken from the last tick. Arms
+keep clear of the world as seen from the base, and get out of the way of legs, whose motion is taken from the last tick
+too. All other links keep clear as seen from a standing foot, so that the base turns and leans for them. The last links
+of the feet, and of palms that reach, are left to the paths of these limbs.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.robot.scale import Scale
 from toolkit.wholebody.collision import body_pair
 
-MAX_ROWS = 24  # most dampers at a time, of the nearest pairs: each costs solver time, and few are active
+MAX_ROWS = 24  # most dampers at a time, of the pairs nearest to their bound: each costs solver time, and few are active
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ class Damper:
         room: m; what a pair has beyond the wanted distance when it is noticed.
         time: s; tau above: longer than a tick, shorter than a swing.
         weight: Per squared m by which a pair comes nearer in a tick than it may.
+        braking: m/s^2; a above, 0 for the first law at all distances.
+        firm: m; wanted distances beyond this are comfort: what is missing of them counts as the same share of this one.
     """
 
     safe_world: float
@@ -44,6 +48,21 @@ class Damper:
     room: float
     time: float
     weight: float
+    braking: float = 0.0
+    firm: float = np.inf
+
+    def speed(self, distance: float, safe: float) -> float:
+        """Speed in m/s at which a pair may come nearer, negative where it has to part.
+
+        Args:
+            distance: Of the pair, in m.
+            safe: Its wanted distance in m.
+        """
+        room = distance - safe
+        if room > 0.0:
+            return float(np.sqrt(2.0 * self.braking * room)) if self.braking else room / self.time
+        firm = min(safe, self.firm)
+        return (firm * room / safe if distance > 0.0 else distance - firm) / self.time
 
     def scaled(self, scale: Scale) -> Damper:
         """The damper for a body of another size."""
@@ -53,6 +72,8 @@ class Damper:
             room=scale.length * self.room,
             time=scale.time * self.time,
             weight=self.weight / scale.length**2,
+            braking=self.braking,
+            firm=scale.length * self.firm,
         )
 
     @property
@@ -61,7 +82,7 @@ class Damper:
         return max(self.safe_world, self.safe_self) + self.room
 
 
-ARM = Damper(safe_world=0.06, safe_self=0.012, room=0.06, time=0.15, weight=1e3)
+ARM = Damper(safe_world=0.06, safe_self=0.012, room=0.12, time=0.15, weight=1e3, braking=10.0, firm=0.012)
 """Pairs with a link of an arm, which has much room and moves without need."""
 BODY = Damper(safe_world=0.02, safe_self=0.01, room=0.04, time=0.05, weight=1e4)
 """Other pairs: legs have little room to spare; a foot strays by 1 cm from its path as it lifts off, its leg with it."""
@@ -70,7 +91,7 @@ FAR = replace(BODY, safe_world=0.035)
 CLOSE = replace(BODY, safe_world=0.003, safe_self=0.003, room=0.015)
 """The same for motions that are too fast to keep more than clear."""
 _BELOW = 0.8  # least vertical part of the normal to what is below a link, as the ground is
-_SAFE_SHARE, _NOTICE_SHARE = 0.5, 0.9  # of a pair's distance at home, where it is safe and noticed at no more than that
+_SAFE_SHARE = 0.5  # of a pair's distance at home, where it is safe at no more than that
 
 
 class _Pair(NamedTuple):
@@ -108,6 +129,7 @@ class Avoidance:
         model = self.model
         self.static = model.body_weldid[model.geom_bodyid] == 0
         self.arm = robot.in_arms(model)[model.geom_bodyid] >= 0
+        self.legs = robot.carrying(FEET)
         self.body = {limb: int(model.body(item.body).id) for limb, item in robot.limbs.items()}
         self.of = {limb: model.geom_bodyid == body for limb, body in self.body.items()}
         self.base = int(model.body(robot.base).id)
@@ -140,15 +162,17 @@ class Avoidance:
             damper, at_home = self._damper(pair), self._home_distance(pair)
             wanted = damper.safe_world if self._of_world(pair) else damper.safe_self
             safe = min(wanted, _SAFE_SHARE * at_home)
-            if pair.distance < min(safe + damper.room, _NOTICE_SHARE * at_home):
-                found.append((pair.distance - safe, pair, damper))
-        found.sort(key=lambda item: item[0])
-        found = found[:MAX_ROWS]
-        matrix, bound = np.zeros((len(found), self.model.nv - 6)), np.zeros(len(found))
-        for row, (room, pair, damper) in enumerate(found):
-            rate, known = self._rate(pair, self.base if damper is self.arms else stand, drift)
-            matrix[row], bound[row] = -rate, room * tick / damper.time + known
-        return Dampers(matrix, bound, np.array([damper.weight for _, _, damper in found]))
+            if at_home > 0.0 and pair.distance < safe + damper.room:
+                rate, known = self._rate(pair, self.base if damper is self.arms else stand, drift)
+                if damper is self.arms:  # arms get out of the way of legs, never the other way round
+                    known += float(rate[self.legs] @ drift[6:][self.legs])
+                    rate[self.legs] = 0.0
+                found.append((-rate, damper.speed(pair.distance, safe) * tick + known, damper.weight))
+        matrix = np.array([row for row, _, _ in found]).reshape(len(found), len(drift) - 6)
+        bound, weight = np.array([bound for _, bound, _ in found]), np.array([weight for _, _, weight in found])
+        size = np.maximum(np.linalg.norm(matrix, axis=1), 1e-9)
+        kept = np.argsort((bound - matrix @ drift[6:]) / size, kind="stable")[:MAX_ROWS]
+        return Dampers(matrix[kept], bound[kept], weight[kept])
 
     def _damper(self, pair: _Pair) -> Damper:
         return self.arms if self.arm[pair.first] or self.arm[pair.second] else self.others

@@ -182,7 +182,7 @@ def _swing(
     size, scale = robot.half_sizes[limb], robot.scale
     lift = scale.length * (foot_lift if limb.is_foot else LIFT)
     ends = start, end, size, limb.is_foot, free_start, free_end
-    task = SwingTask(phase.start, phase.duration, *ends, other, leg, lift, scale)
+    task = SwingTask(phase.start, phase.duration, *ends, other, leg, lift, scale, robot.passing_gap)
     return Segment(phase.start, phase.end, phase.transition, None, plan_swing(task, collide), free_start, free_end)
 
 

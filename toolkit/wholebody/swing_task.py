@@ -84,6 +84,7 @@ class SwingTask:
         leg: Keeps the ankle of a foot in its range; None for palms and where no other foot stands.
         lift: m; guarded motion along the surface normal at both ends.
         scale: The robot's size.
+        passing: Gap in m between the soles at which the legs pass each other.
     """
 
     begin: float
@@ -98,6 +99,7 @@ class SwingTask:
     leg: SwingingLeg | None = None
     lift: float = LIFT
     scale: Scale = USUAL
+    passing: float = 0.0
 
     @property
     def margin(self) -> float:
@@ -107,4 +109,4 @@ class SwingTask:
     @property
     def gap(self) -> float:
         """m; kept between the soles of the swinging and the standing foot."""
-        return self.scale.length * GAP
+        return max(self.scale.length * GAP, self.passing)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.geometry.limb import FEET, Limb
+from toolkit.geometry.limb import Limb
 from toolkit.physics.leg import ReachMargins
-from toolkit.robot.geometry import foot_outline
 from toolkit.robot.model import RobotModel
 
 _DROP = 0.25  # part of its height at home by which the CoM may be lower
@@ -24,8 +23,8 @@ def sole_room(robot: RobotModel) -> np.ndarray:
 
     It holds the sole with half the distance between two soles, and all of a foot that is wider than its sole.
     """
-    outline = np.max([foot_outline(robot.mujoco_model, foot) for foot in FEET], axis=0)
-    return np.maximum(robot.half_sizes[Limb.LEFT_FOOT] + robot.scale.length * _APART / 2, outline - _TOUCH)
+    half = robot.half_sizes[Limb.LEFT_FOOT] + robot.scale.length * _APART / 2
+    return np.maximum(half, robot.foot_outline - _TOUCH)
 
 
 def margins(robot: RobotModel) -> ReachMargins:
