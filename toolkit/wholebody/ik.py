@@ -80,6 +80,7 @@ class WholeBodyIK:
             self.palms[palm] = (position, normal, twist)
         self.base = solver.add_orientation_task(robot.base, np.eye(3))
         self.base.configure("base", "soft", weights.BASE)
+        self.steady = solver.add_orientation_task(robot.base, np.eye(3))
         self.postures = []
         for joints, weight in self._groups():
             task = solver.add_joints_task()
@@ -119,6 +120,7 @@ class WholeBodyIK:
         self.solver.enable_velocity_limits(False)
         self._set_targets(0.0, paths, motion)
         self.momentum.configure("momentum", "soft", 0.0)
+        self.steady.configure("steady", "soft", 0.0)
         # At rest, an eased posture task of weight w weighs as much as a plain one of weight w * ease.
         posture = dict(zip(self.robot.joint_names, self._posture(0.0, guess[7:], paths, motion), strict=True))
         for task, names, weight in self.postures:
@@ -152,6 +154,9 @@ class WholeBodyIK:
             for name in names:
                 task.set_joint(name, targets[name])
         before = self.order.qpos_from_q(self.wrapper.state.q)
+        turned = self.wrapper.get_T_world_frame(self.robot.base)[:3, :3] @ rotation_exponential(self.drift[3:6])
+        self.steady.R_world_frame = turned
+        self.steady.configure("steady", "soft", weights.STEADY)
         self._set_dampers(before, angles, time, paths)
         self._solve(time)
         self._spare_motors(time, before, motion)

@@ -13,6 +13,7 @@ PALM_POSITION, PALM_NORMAL, PALM_TWIST = 1e5, 1e4, 0.1  # a palm may turn about 
 AIR_POSITION, AIR_ORIENTATION = 1e4, 30.0
 EFFORT = 1e5  # per squared rad by which a joint's displacement asks its motor for more than its share
 BASE = 10.0
+STEADY = 1e3  # of the base from where the last tick's turn, made again, would take it
 # Per squared rad of a tick's deviation from the planned angular momentum, divided by mass times squared CoM height.
 # A larger weight makes trunk and arms swing wide.
 ANGULAR_MOMENTUM = 5e3
