@@ -77,7 +77,7 @@ def test_it_walks_as_well_as_the_usual_robot(size, sized, walked):
     assert sized.trajectory.feasible, sized.trajectory.reason
     run = sized.run()
     assert {check.name for check in run.checks if check.result is not Result.PASS} == set()
-    assert run.com_rms_error < 1.5 * length * walked.com_rms_error
+    assert run.com_rms_error < max(1.5 * length * walked.com_rms_error, 1e-4)  # m; simulated contacts give by as much
     assert run.max_slip < 1e-4  # m; simulated contacts creep alike under bodies of all sizes
     assert run.max_torque_ratio < 1.5 * walked.max_torque_ratio
     assert run.solver_failures == 0
