@@ -12,7 +12,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.pipeline import Source, loop, trial
 from toolkit.refine import RefineConfig
 from toolkit.robot.scale import USUAL
-from toolkit.wholebody.plan import WIDE, Clearance
+from toolkit.wholebody.plan import LEVEL, WIDE, Manner
 
 
 def solution(name, *limbs, start=(), seconds=0.0):
@@ -282,18 +282,24 @@ def test_a_transition_that_failed_is_not_tested_again(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "check, fell, expected",
-    [("unplanned_contacts", False, 2), ("scuff", False, 2), ("slip", False, 1), ("unplanned_contacts", True, 1)],
+    "check, fell, again",
+    [
+        ("unplanned_contacts", False, [WIDE]),
+        ("scuff", False, [WIDE]),
+        ("slip", False, [LEVEL]),
+        ("goal_distance", False, []),
+        ("unplanned_contacts", True, []),
+    ],
 )
-def test_what_touches_in_execution_is_tried_once_more_with_wide_clearances(monkeypatch, check, fell, expected):
-    clearances = []
+def test_what_touches_or_slips_in_execution_is_tried_once_more_in_another_manner(monkeypatch, check, fell, again):
+    manners = []
 
-    def whole_body(plan, scene, clearance):
-        clearances.append(clearance)
+    def whole_body(plan, scene, manner):
+        manners.append(manner)
         return SimpleNamespace(trajectory=SimpleNamespace(feasible=True, seconds=0.0, reason=""))
 
     def execute(plan, **settings):
-        value = float(len(clearances) == 1)  # the first run fails
+        value = float(len(manners) == 1)  # the first run fails
         failure = Failure(check) if value else None
         return SimpleNamespace(
             checks=(Check(check, 0.0, "", value),), fell=fell, failure=failure, goal_reached=True, scuffs=()
@@ -304,4 +310,4 @@ def test_what_touches_in_execution_is_tried_once_more_with_wide_clearances(monke
     monkeypatch.setattr(trial.Tester, "_scene", None)
     tester = trial.Tester(None, None, pipeline.PipelineConfig(), pipeline.Observer())  # pyright: ignore
     tested = tester.test(SimpleNamespace(plan=None, failure=None))  # pyright: ignore
-    assert clearances == [Clearance(), WIDE][:expected] and tested.passed == (expected == 2)
+    assert manners == [Manner(), *again] and tested.passed == bool(again)

@@ -14,7 +14,7 @@ from toolkit.execution.disturbance import Disturbance
 from toolkit.execution.replay import replay_controls
 from toolkit.execution.run import execute
 from toolkit.geometry.limb import Limb
-from toolkit.wholebody.plan import Clearance, whole_body
+from toolkit.wholebody.plan import Manner, whole_body
 
 
 def failed(execution):
@@ -143,7 +143,7 @@ def test_the_plan_s_scene_stays_as_it_is(walking):
 
 def test_the_controller_tracks_the_paths_of_the_plan(walking, flat):
     """Feet that are planned to swing higher do so in the run: the paths are not planned anew."""
-    plan = whole_body(walking.whole, walking.whole.scene, Clearance(foot_lift=0.09))
+    plan = whole_body(walking.whole, walking.whole.scene, Manner(foot_lift=0.09))
     lift = [execute(each).samples.limb_pose[:, Limb.LEFT_FOOT, 2].max() for each in (walking.whole, plan)]
     assert lift[1] > lift[0] + 0.02
 

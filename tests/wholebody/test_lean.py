@@ -1,15 +1,19 @@
 """Leaning ahead: the base turns early and smoothly to where it had to turn in a hurry."""
 
+import mujoco
 import numpy as np
 import pytest
 
 from toolkit.geometry.pose import Pose, rotation_exponential
 from toolkit.wholebody import plan as wholebody
 from toolkit.wholebody.avoidance import BODY, CLOSE
+from toolkit.wholebody.ik import momentum_at
 from toolkit.wholebody.lean import AROUND, WORTH, lean_ahead
 from toolkit.wholebody.limb_paths import limb_paths
-from toolkit.wholebody.plan import solve_ik, whole_body
+from toolkit.wholebody.plan import LEVEL, Manner, solve_ik, whole_body
 from toolkit.world.scene import compose_scene
+
+USUAL = Manner()
 
 
 @pytest.fixture
@@ -59,9 +63,9 @@ def test_passes_end_with_the_first_that_holds(robot, flat_walk, monkeypatch):
     """A failing check is answered by passes with a lean, and by one that keeps less distance; a passing one is not."""
     scene, passes = compose_scene(robot, flat_walk.world), []
 
-    def solved(robot, paths, motion, times, scene=None, lean=None, links=BODY):
-        passes.append((lean is not None, links))
-        return solve_ik(robot, paths, motion, times, scene, lean, links)
+    def solved(robot, paths, motion, times, scene=None, lean=None, manner=USUAL):
+        passes.append((lean is not None, manner.links))
+        return solve_ik(robot, paths, motion, times, scene, lean, manner)
 
     monkeypatch.setattr(wholebody, "solve_ik", solved)
     assert whole_body(flat_walk, scene).trajectory.feasible and passes == [(False, BODY)]
@@ -74,3 +78,20 @@ def test_passes_end_with_the_first_that_holds(robot, flat_walk, monkeypatch):
     monkeypatch.setattr("toolkit.wholebody.lean.WORTH", np.inf)  # no lean is worth it
     whole_body(flat_walk, scene)
     assert passes == [(False, BODY), (False, CLOSE)]
+
+
+def test_trunk_and_arms_turn_against_the_swinging_leg_where_that_is_wanted(robot, flat_walk, paths):
+    """The angular momentum about the vertical comes nearer to the plan's with a larger weight."""
+    times = np.linspace(0.0, flat_walk.schedule.duration, int(50 * flat_walk.schedule.duration) + 1)
+    model, data, errors = robot.mujoco_model, mujoco.MjData(robot.mujoco_model), []
+    for manner in (USUAL, LEVEL):
+        qpos = solve_ik(robot, paths, flat_walk.motion, times, manner=manner)
+        spin = []
+        for before, after, time in zip(qpos[:-1], qpos[1:], times[1:], strict=True):
+            mujoco.mj_differentiatePos(model, data.qvel, times[1], before, after)
+            data.qpos[:] = after
+            mujoco.mj_forward(model, data)
+            mujoco.mj_subtreeVel(model, data)
+            spin.append(data.subtree_angmom[1, 2] - momentum_at(flat_walk.motion, time)[2])
+        errors.append(np.linalg.norm(spin))
+    assert errors[1] < 0.7 * errors[0]

@@ -22,7 +22,7 @@ from toolkit.pipeline.observer import Observer
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.body_room import BodyRoom
 from toolkit.search.result import Solution
-from toolkit.wholebody.plan import WIDE, Clearance, WholeBodyPlan, whole_body
+from toolkit.wholebody.plan import LEVEL, WIDE, Manner, WholeBodyPlan, whole_body
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 from toolkit.world.scene import compose_scene
 from toolkit.world.world import World
@@ -121,23 +121,24 @@ class Tester:
     def test(self, candidate: Candidate) -> Trial:
         """Put a candidate through the stages after the optimiser; stop at the first that fails.
 
-        Where it touches something in execution that it should not, it is tried once more with wide clearances.
+        Where it touches something in execution that it should not, it is tried once more with wide clearances; where it
+        slips, with trunk and arms that turn against the swinging leg.
         """
         config, plan = self._config, candidate.plan
         if candidate.failure is not None or config.until == "dynamics":
             return Trial(candidate, plan, failure=candidate.failure)
 
-        trial = self._executed(candidate, plan, Clearance())
-        if trial.execution is not None and _touches(trial.execution):
-            wider = self._executed(candidate, plan, WIDE)
-            trial = max(trial, wider, key=lambda each: each.merit)
+        trial = self._executed(candidate, plan, Manner())
+        manner = None if trial.execution is None else _better_manner(trial.execution)
+        if manner is not None:
+            trial = max(trial, self._executed(candidate, plan, manner), key=lambda each: each.merit)
         return trial
 
-    def _executed(self, candidate: Candidate, plan: MotionPlan, clearance: Clearance) -> Trial:
-        """The whole-body motion of a plan with a clearance, and its execution."""
+    def _executed(self, candidate: Candidate, plan: MotionPlan, manner: Manner) -> Trial:
+        """The whole-body motion of a plan, made in some manner, and its execution."""
         config, observer = self._config, self._observer
         observer.started("wholebody")
-        plan = whole_body(plan, self._scene, clearance)
+        plan = whole_body(plan, self._scene, manner)
         trajectory = plan.trajectory
         observer.finished("wholebody", trajectory.feasible, trajectory.seconds, trajectory.reason)
         if not trajectory.feasible:
@@ -160,10 +161,17 @@ class Tester:
         return trial
 
 
-def _touches(execution: Execution) -> bool:
-    """Whether a run failed because something touched the world that should not, and not in a fall."""
+def _better_manner(execution: Execution) -> Manner | None:
+    """What may mend a run that failed because something touched the world that should not, or because a sole slipped.
+
+    None for other failures, and for falls.
+    """
     failed = {check.name for check in execution.checks if check.result is Result.FAIL}
-    return not execution.fell and bool(failed & {"unplanned_contacts", "scuff"})
+    if execution.fell:
+        return None
+    if failed & {"unplanned_contacts", "scuff"}:
+        return WIDE
+    return LEVEL if "slip" in failed else None
 
 
 def _grazes(execution: Execution) -> str:

@@ -32,9 +32,20 @@ LEAVING, LANDING = Window(0.0, 0.2), Window(0.75, 1.0)  # the parts of a foot's 
 class WholeBodyIK:
     """The solver with its tasks and its state, solved tick after tick."""
 
-    def __init__(self, robot: RobotModel, tick: float, avoidance: Avoidance | None = None, lean: Lean | None = None):
-        """Set up the tasks for a tick in s; `avoidance` keeps all links clear, and `lean` turns the base."""
-        self.robot, self.tick, self.avoidance, self.lean = robot, tick, avoidance, lean
+    def __init__(
+        self,
+        robot: RobotModel,
+        tick: float,
+        avoidance: Avoidance | None = None,
+        lean: Lean | None = None,
+        turning: float = 1.0,
+    ):
+        """Set up the tasks for a tick in s.
+
+        `avoidance` keeps all links clear, `lean` turns the base, and `turning` is a factor on the weight of the planned
+        angular momentum about the vertical.
+        """
+        self.robot, self.tick, self.avoidance, self.lean, self.turning = robot, tick, avoidance, lean, turning
         self.pace, self.per_area = robot.scale.time, 1.0 / robot.scale.length**2
         self.wrapper = placo_wrapper(robot)
         self.order = pinocchio_map(robot, self.wrapper.model)
@@ -85,7 +96,8 @@ class WholeBodyIK:
         for joints, weight in self._groups():
             task = solver.add_joints_task()
             self.postures.append((task, {name: self.home[name] for name in joints}, weight))
-        self.momentum = solver.add_centroidal_momentum_task(np.zeros(3))
+        self.momentum, self.spin = (solver.add_centroidal_momentum_task(np.zeros(3)) for _ in range(2))
+        self.spin.mask.set_axises("z")
         solver.add_regularization_task(1e-6)
         self.dampers = self.limits = None
 
@@ -120,6 +132,7 @@ class WholeBodyIK:
         self.solver.enable_velocity_limits(False)
         self._set_targets(0.0, paths, motion)
         self.momentum.configure("momentum", "soft", 0.0)
+        self.spin.configure("spin", "soft", 0.0)
         self.steady.configure("steady", "soft", 0.0)
         # At rest, an eased posture task of weight w weighs as much as a plain one of weight w * ease.
         posture = dict(zip(self.robot.joint_names, self._posture(0.0, guess[7:], paths, motion), strict=True))
@@ -134,6 +147,7 @@ class WholeBodyIK:
         # placo's task is in kg m^2/s: over a tick, and divided by an inertia, it is an angle.
         angle = self.tick / (self.robot.mass * self.robot.com_height**2)
         self.momentum.configure("momentum", "soft", weights.ANGULAR_MOMENTUM * angle**2)
+        self.spin.configure("spin", "soft", (self.turning - 1.0) * weights.ANGULAR_MOMENTUM * angle**2)
         self.solver.enable_velocity_limits(True)
         self.drift, self.last_step = np.zeros(self.robot.mujoco_model.nv), np.zeros(len(self.robot.joint_names))
         return self.order.qpos_from_q(self.wrapper.state.q)
@@ -208,7 +222,7 @@ class WholeBodyIK:
 
     def _set_targets(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> None:
         self.com.target_world = motion.sample(time)[0]
-        self.momentum.L_world = momentum_at(motion, time)
+        self.momentum.L_world = self.spin.L_world = momentum_at(motion, time)
         feet = []
         for foot, task in self.feet.items():
             pose = paths.sample(foot, time).pose

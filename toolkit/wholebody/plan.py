@@ -45,40 +45,44 @@ class WholeBodyPlan(MotionPlan):
 
 
 @dataclass(frozen=True)
-class Clearance:
-    """How far limbs of a body of the usual size (`toolkit.robot.scale`) stay away from the world.
+class Manner:
+    """How a whole-body motion is made; lengths are those of a body of the usual size (`toolkit.robot.scale`).
 
     Attributes:
         foot_lift: m; guarded motion of feet along the surface normal.
-        links: Of all links but those of arms and the last ones of feet.
+        links: How all links but those of arms and the last ones of feet are kept apart.
+        turning: Factor on the weight of the planned angular momentum about the vertical.
     """
 
     foot_lift: float = LIFT
     links: Damper = BODY
+    turning: float = 1.0
 
 
-WIDE = Clearance(foot_lift=0.08, links=FAR)
+WIDE = Manner(foot_lift=0.08, links=FAR)
 """For motions that touched something in execution: it strays from what was planned."""
+LEVEL = Manner(turning=5.0)
+"""For motions whose soles slipped: trunk and arms turn against the swinging leg, so that the standing sole need not."""
 
 
 @warnings_refused("the whole-body motion", PlanningError)
-def whole_body(plan: MotionPlan, scene: mujoco.MjModel, clearance: Clearance | None = None) -> WholeBodyPlan:
+def whole_body(plan: MotionPlan, scene: mujoco.MjModel, manner: Manner | None = None) -> WholeBodyPlan:
     """Find swing paths and a whole-body trajectory for a motion plan.
 
     Args:
         plan: Contacts and motion, with a final rest.
         scene: The plan's robot and world in one model (`toolkit.world.scene.compose_scene`).
-        clearance: How far limbs stay away from the world; None for the usual distances.
+        manner: How the motion is made; None for the usual one.
 
     Returns:
         The plan with paths and trajectory; `trajectory.feasible` says whether every check passed.
     """
-    begin, clearance = perf_counter(), clearance or Clearance()
+    begin, manner = perf_counter(), manner or Manner()
     duration, rate = plan.schedule.duration, RATE / plan.robot.scale.time
     times = np.linspace(0.0, duration, max(int(round(duration * rate)), 2) + 1)
-    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, clearance.foot_lift)
+    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, manner.foot_lift)
     if plan.motion.feasible:
-        trajectory = _trajectory(plan, scene, paths, times, clearance.links)
+        trajectory = _trajectory(plan, scene, paths, times, manner)
     else:
         failure = Failure(f"the centroidal motion is not feasible: {plan.motion.outcome}")
         trajectory = replace(_without_postures(plan.robot, paths, times), failure=failure)
@@ -93,18 +97,18 @@ def solve_ik(
     times: np.ndarray,
     scene: mujoco.MjModel | None = None,
     lean: Lean | None = None,
-    links: Damper = BODY,
+    manner: Manner = Manner(),
 ) -> np.ndarray:
     """(T, 7 + n) qpos on a uniform time grid (T,) in s; all links keep clear in `scene` unless it is None.
 
-    The base is upright with the heading of the feet where nothing is in the way, or as `lean` wants it. Links other
-    than those of arms are kept apart as `links` says.
+    The base is upright with the heading of the feet where nothing is in the way, or as `lean` wants it.
 
     Raises:
         PlanningError: A quadratic program has no solution.
     """
     tick = float(times[1] - times[0]) / SUBSTEPS
-    solver = WholeBodyIK(robot, tick, None if scene is None else Avoidance(robot, scene, links), lean)
+    avoidance = None if scene is None else Avoidance(robot, scene, manner.links)
+    solver = WholeBodyIK(robot, tick, avoidance, lean, manner.turning)
     qpos = np.empty((len(times), len(robot.home)))
     qpos[0] = solver.start(first_guess(robot, paths, motion), paths, motion)
     for index in range(1, len(times)):
@@ -138,13 +142,14 @@ def _limb_arrays(paths: LimbPaths, times: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _trajectory(
-    plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray, links: Damper
+    plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray, manner: Manner
 ) -> WholeBodyTrajectory:
     """The postures with the results of their checks."""
     robot = plan.robot
     blocked, trajectory = _blocked(plan.schedule, paths), _without_postures(robot, paths, times)
     try:
-        qpos, report = _checked(plan, scene, paths, times, [links] if blocked else [links, links, links, CLOSE])
+        passes = [manner] if blocked else [manner, manner, manner, replace(manner, links=CLOSE)]
+        qpos, report = _checked(plan, scene, paths, times, passes)
     except PlanningError as error:
         return replace(trajectory, failure=Failure("; ".join([*(each.reason for each in blocked), str(error)])))
     return replace(
@@ -160,7 +165,7 @@ def _trajectory(
 
 
 def _checked(
-    plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray, passes: Sequence[Damper]
+    plan: MotionPlan, scene: mujoco.MjModel, paths: LimbPaths, times: np.ndarray, passes: Sequence[Manner]
 ) -> tuple[np.ndarray, CheckReport]:
     """The postures (T, 7 + n) with their checks: of the first pass that holds, or else of the first one.
 
@@ -169,14 +174,14 @@ def _checked(
     robot, motion = plan.robot, plan.motion
     found: list[tuple[np.ndarray, CheckReport]] = []
     lean, before = None, None
-    for links in passes:
-        if links is before and lean is None:
+    for manner in passes:
+        if manner is before and lean is None:
             continue
-        qpos = solve_ik(robot, paths, motion, times, scene, lean if links is before else None, links)
+        qpos = solve_ik(robot, paths, motion, times, scene, lean if manner is before else None, manner)
         found.append((qpos, check(robot, scene, paths, motion, times, qpos)))
         if not found[-1][1].findings:
             return found[-1]
-        lean, before = lean_ahead(paths, times, qpos, robot.scale.time), links
+        lean, before = lean_ahead(paths, times, qpos, robot.scale.time), manner
     return found[0]
 
 
