@@ -116,6 +116,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
         learning_rate=args.learning_rate,
         device=args.device,
         seed=args.seed,
+        length=robot.scale.length,
     )
     with progress_bar(console) as progress:
         task = progress.add_task("epochs", total=2 * config.epochs * len(wanted))

@@ -28,6 +28,7 @@ class FitConfig:
         patience: Number of epochs without a better validation loss before training stops.
         device: The device that torch computes on.
         seed: Seed of the initial weights and of the shuffling.
+        length: Factor on the lengths of the robot (`toolkit.robot.scale`).
     """
 
     epochs: int = 120
@@ -37,6 +38,7 @@ class FitConfig:
     patience: int = 40
     device: str = "cpu"
     seed: int = 0
+    length: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -30,9 +30,11 @@ from toolkit.prediction.network import (
     stored,
     training_summary,
 )
+from toolkit.robot.scale import Scale
 
 BLURRED = 2  # copies of each sample whose CoM state is disturbed
-COM_BLUR, VELOCITY_BLUR = (0.015, 0.015, 0.008), (0.04, 0.04, 0.02)  # m and m/s; usual errors of predicted states
+# of a body of the usual size (`toolkit.robot.scale`)
+COM_BLUR, VELOCITY_BLUR = (0.015, 0.015, 0.008), (0.04, 0.04, 0.02)  # m, m/s; usual errors of predicted states
 MINIMUM = 50  # least number of samples with each label
 OBJECTIVE_LIMIT = 5e4  # the regressor does not learn from transitions with a larger objective
 
@@ -115,7 +117,8 @@ def train_networks(
     kept = np.flatnonzero(samples.known & (samples.targets[:, 0] < OBJECTIVE_LIMIT))
     kept = np.repeat(kept, 1 + BLURRED)
     features = features[kept]
-    _blur(features, np.arange(len(kept)) % (1 + BLURRED) > 0, np.random.default_rng(config.seed))
+    blurred = np.arange(len(kept)) % (1 + BLURRED) > 0
+    _blur(features, blurred, Scale(config.length), np.random.default_rng(config.seed))
     targets = samples.targets[kept].astype(np.float64)
     targets[:, 0] = compressed(targets[:, 0])
     targets[:, 1:4] -= features[:, COM]
@@ -136,13 +139,15 @@ def train_networks(
     return TrainedNetworks(classifier, scaling.fold(regressor), curves)
 
 
-def _blur(features: np.ndarray, rows: np.ndarray, rng: np.random.Generator) -> None:
-    """Disturb the CoM states of some rows of features (n, d) as predictions of a search are wrong.
+def _blur(features: np.ndarray, rows: np.ndarray, scale: Scale, rng: np.random.Generator) -> None:
+    """Disturb the CoM states of some rows of features (n, d) as predictions of a search are wrong for a body of a size.
 
     In a search, a transition begins in the state that is predicted after the one before. What is learned of disturbed
     states with the labels of the true ones does not amplify such errors.
     """
-    spread = rng.uniform(0.0, 2.0, (rows.sum(), 1)) * np.concatenate([COM_BLUR, VELOCITY_BLUR])
+    spread = rng.uniform(0.0, 2.0, (rows.sum(), 1)) * np.concatenate(
+        [scale.length * np.array(COM_BLUR), scale.speed * np.array(VELOCITY_BLUR)]
+    )
     features[rows, COM.start : COM.stop + 3] += spread * rng.normal(size=(rows.sum(), 6))
 
 
