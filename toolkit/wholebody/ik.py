@@ -97,7 +97,7 @@ class WholeBodyIK:
             task = solver.add_joints_task()
             self.postures.append((task, {name: self.home[name] for name in joints}, weight))
         self.momentum, self.spin = (solver.add_centroidal_momentum_task(np.zeros(3)) for _ in range(2))
-        self.spin.mask.set_axises("z")
+        self.spin.mask.set_axises("z", "task")
         solver.add_regularization_task(1e-6)
         self.dampers = self.limits = None
 
