@@ -64,12 +64,23 @@ def test_legs_with_room_make_every_step(name):
     assert len(TransitionModel.of(load_robot(name), steps_60()).steps) == 60
 
 
-def test_steps_that_turn_thick_thighs_into_each_other_are_left_out(tmp_path):
+def thick_legged(folder, size, ahead):
+    """A robot with boxes of half extents `size` in m, `ahead` m before the hips, as thighs."""
     thighs = biped_mjcf().replace(
         'type="capsule" size="0.05" fromto="0 0 -0.08 0 0 -0.28" mass="3"',
-        'type="box" size="0.09 0.05 0.1" pos="0.08 0 -0.2" mass="3"',  # which reach far ahead of the hips
+        f'type="box" size="{size}" pos="{ahead} 0 -0.2" mass="3"',
     )
-    robot = load_robot(str(write_robot(tmp_path / "thick", thighs)))
+    return load_robot(str(write_robot(folder, thighs)))
+
+
+def test_legs_that_are_thicker_than_the_soles_pass_each_other_farther_apart(tmp_path):
+    slim, thick = (thick_legged(tmp_path / str(wide), f"0.05 {wide} 0.1", 0.0) for wide in (0.03, 0.08))
+    sole = 2.0 * thick.half_sizes[Limb.LEFT_FOOT, 1]
+    assert slim.passing_gap < thick.passing_gap <= thick.stance_width - sole
+
+
+def test_steps_that_turn_thick_thighs_into_each_other_are_left_out(tmp_path):
+    robot = thick_legged(tmp_path / "thick", "0.09 0.05 0.1", 0.08)  # which reach far ahead of the hips
     steps = TransitionModel.of(robot, steps_60()).steps
     narrow = steps[steps[:, 1] < steps[:, 1].min() + 0.01]
     assert legs_touch(robot, 0.17, np.radians(30)) and not legs_touch(robot, 0.3, np.radians(15))

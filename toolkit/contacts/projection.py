@@ -146,7 +146,7 @@ class Projector:
         missing = np.flatnonzero(~soles.found)
         if len(missing) and (self.room > sole).any():
             found = self._soles(pose[missing], low, high, sole, offsets)
-            for name in ("surface", "position", "rotation"):
+            for name in Projected.__dataclass_fields__:
                 getattr(soles, name)[missing] = getattr(found, name)
         return soles
 

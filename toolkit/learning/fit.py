@@ -33,8 +33,8 @@ from toolkit.prediction.network import (
 from toolkit.robot.scale import Scale
 
 BLURRED = 2  # copies of each sample whose CoM state is disturbed
-# of a body of the usual size (`toolkit.robot.scale`)
-COM_BLUR, VELOCITY_BLUR = (0.015, 0.015, 0.008), (0.04, 0.04, 0.02)  # m, m/s; usual errors of predicted states
+# m and m/s for a body of the usual size (`toolkit.robot.scale`); usual errors of predicted states
+COM_BLUR, VELOCITY_BLUR = np.array([0.015, 0.015, 0.008]), np.array([0.04, 0.04, 0.02])
 MINIMUM = 50  # least number of samples with each label
 OBJECTIVE_LIMIT = 5e4  # the regressor does not learn from transitions with a larger objective
 
@@ -145,9 +145,8 @@ def _blur(features: np.ndarray, rows: np.ndarray, scale: Scale, rng: np.random.G
     In a search, a transition begins in the state that is predicted after the one before. What is learned of disturbed
     states with the labels of the true ones does not amplify such errors.
     """
-    spread = rng.uniform(0.0, 2.0, (rows.sum(), 1)) * np.concatenate(
-        [scale.length * np.array(COM_BLUR), scale.speed * np.array(VELOCITY_BLUR)]
-    )
+    usual = np.concatenate([scale.length * COM_BLUR, scale.speed * VELOCITY_BLUR])
+    spread = rng.uniform(0.0, 2.0, (rows.sum(), 1)) * usual
     features[rows, COM.start : COM.stop + 3] += spread * rng.normal(size=(rows.sum(), 6))
 
 

@@ -1,4 +1,4 @@
-"""Whether the legs of a robot have room to stand with the feet turned towards each other."""
+"""Room of the legs: with the feet turned towards each other, and where one leg passes the other."""
 
 from __future__ import annotations
 
@@ -42,16 +42,18 @@ def legs_touch(robot: RobotModel, width: float, turn: float) -> bool:
 def passing_gap(robot: RobotModel) -> float:
     """Gap in m between the soles, side by side and one of them lifted, at which the legs are clear of each other.
 
-    It is no more than the gap at home, where legs may be as near as they are, and zero for legs that are always clear.
+    It is no more than the gap at home, where legs may be as near as they are, and zero for legs that are always clear
+    or do not reach such a posture.
     """
     sole, home, length = 2.0 * float(robot.half_sizes[FEET[0]][1]), robot.stance_width, robot.scale.length
     lift = 0.5 * max(leg.thigh + leg.shin for leg in robot.legs.values()) * _LIFT
-    wanted = min(length * _PASSING, _SHARE * _apart(robot, _standing(robot, home, 0.0, 0.0), length * _PASSING * 2.0))
+    at_home, lifted = (_standing(robot, home, 0.0, height) for height in (0.0, lift))
+    if at_home is None or lifted is None:
+        return 0.0
+    wanted = min(length * _PASSING, _SHARE * _apart(robot, at_home, length * _PASSING / _SHARE))
     gap = max(home - sole, 0.0)
     for width in np.arange(home, sole - 1e-9, -length * _FINER):
         data = _standing(robot, float(width), 0.0, lift)
-        if data is None and width == home:
-            return 0.0
         if data is None or _apart(robot, data, length * _PASSING) < wanted:
             break
         gap = max(float(width) - sole, 0.0)
@@ -92,10 +94,8 @@ def _standing(robot: RobotModel, width: float, turn: float, lift: float) -> mujo
     return data
 
 
-def _apart(robot: RobotModel, data: mujoco.MjData | None, most: float) -> float:
+def _apart(robot: RobotModel, data: mujoco.MjData, most: float) -> float:
     """Distance in m between the legs above the feet, negative where they are in each other; `most` where it is more."""
-    if data is None:
-        return most
     model = copy.copy(robot.mujoco_model)
     model.geom_margin[:] = most
     model.body_margin[:] = most

@@ -271,7 +271,7 @@ class RobotModel:
 
     def foot_room(self, margin: float) -> np.ndarray:
         """Half extents (2,) m of the place of a foot: its sole with a margin in m, and all of it that is wider."""
-        return np.maximum(self.half_sizes[FEET[0]] + margin, self.foot_outline + self.scale.length * _CLEAR)
+        return np.maximum(self.half_sizes[list(FEET)].max(0) + margin, self.foot_outline + self.scale.length * _CLEAR)
 
     @cached_property
     def stance_width(self) -> float:

@@ -148,6 +148,7 @@ class WholeBodyIK:
         angle = self.tick / (self.robot.mass * self.robot.com_height**2)
         self.momentum.configure("momentum", "soft", weights.ANGULAR_MOMENTUM * angle**2)
         self.spin.configure("spin", "soft", (self.turning - 1.0) * weights.ANGULAR_MOMENTUM * angle**2)
+        self.steady.configure("steady", "soft", weights.STEADY)
         self.solver.enable_velocity_limits(True)
         self.drift, self.last_step = np.zeros(self.robot.mujoco_model.nv), np.zeros(len(self.robot.joint_names))
         return self.order.qpos_from_q(self.wrapper.state.q)
@@ -170,7 +171,6 @@ class WholeBodyIK:
         before = self.order.qpos_from_q(self.wrapper.state.q)
         turned = self.wrapper.get_T_world_frame(self.robot.base)[:3, :3] @ rotation_exponential(self.drift[3:6])
         self.steady.R_world_frame = turned
-        self.steady.configure("steady", "soft", weights.STEADY)
         self._set_dampers(before, angles, time, paths)
         self._solve(time)
         self._spare_motors(time, before, motion)

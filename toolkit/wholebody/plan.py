@@ -66,18 +66,18 @@ LEVEL = Manner(turning=5.0)
 
 
 @warnings_refused("the whole-body motion", PlanningError)
-def whole_body(plan: MotionPlan, scene: mujoco.MjModel, manner: Manner | None = None) -> WholeBodyPlan:
+def whole_body(plan: MotionPlan, scene: mujoco.MjModel, manner: Manner = Manner()) -> WholeBodyPlan:
     """Find swing paths and a whole-body trajectory for a motion plan.
 
     Args:
         plan: Contacts and motion, with a final rest.
         scene: The plan's robot and world in one model (`toolkit.world.scene.compose_scene`).
-        manner: How the motion is made; None for the usual one.
+        manner: How the motion is made.
 
     Returns:
         The plan with paths and trajectory; `trajectory.feasible` says whether every check passed.
     """
-    begin, manner = perf_counter(), manner or Manner()
+    begin = perf_counter()
     duration, rate = plan.schedule.duration, RATE / plan.robot.scale.time
     times = np.linspace(0.0, duration, max(int(round(duration * rate)), 2) + 1)
     paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, manner.foot_lift)
