@@ -54,7 +54,7 @@ def test_a_lazy_search_lets_everything_wait_and_may_look_at_more(robot, slides):
     assert strategy.cost.steep == (0.0 if slides else CONFIG.cost.steep)
 
 
-@pytest.mark.parametrize(("limit", "patient", "hasty"), [(100, 1000, 60), (None, None, 600)])
+@pytest.mark.parametrize(("limit", "patient", "hasty"), [(100, 1000, 30), (None, None, 300)])
 def test_a_sliding_search_begins_in_haste_and_asks_the_stand_in(quick, limit, patient, hasty):
     config = replace(CONFIG, search=replace(CONFIG.search, max_expansions=limit))
     strategy = strategy_of(config, quick, 3.0, slides=True)

@@ -59,11 +59,11 @@ class Arrival:
         passed = [state for state in states if not is_pending(state)]
         ends = [*passed[1:], edge.state]
         transitions = [self._reader.transition(*step) for step in zip(ends, [*judged, edge.payload], strict=True)]
-        if not self._comes_to_rest(passed, transitions):
-            self._tally.rejected[Reason.DYNAMICS] += 1
-            return None
         sequence = ContactSequence(self._reader.origin(passed[0])[0], tuple(transitions))
         at = self._blame.first_in(sequence)
+        if at is None and not self._comes_to_rest(passed, transitions):
+            self._tally.rejected[Reason.DYNAMICS] += 1
+            return None
         objective = self._finish(sequence) if at is None else Failure("avoided", transition=at)
         if isinstance(objective, Failure):
             self._tally.rejected[Reason.DYNAMICS] += 1

@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import cycle, islice
 
 import numpy as np
 
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.errors import PlanningError
-from toolkit.geometry.limb import PALMS, Limb
+from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.mjcf import warnings_refused
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.robot.model import RobotModel
@@ -127,7 +128,8 @@ class ContactPlanner:
         searches = [(ContactProblem(parts, state), patient)]
         if strategy.hasty is not None:  # a sequence that begins with the right foot often mirrors one that does not
             hasty = replace(strategy.hasty, unit=unit)
-            searches.insert(0, (ContactProblem(parts, moved_last(state, Limb.RIGHT_FOOT)), hasty))
+            for last in islice(cycle(FEET[::-1]), strategy.attempts):
+                searches.insert(-1, (ContactProblem(parts, moved_last(state, last)), hasty))
         judge = None
         if self._finish is not None:
             at_rest = self._at_rest if way.slides else None

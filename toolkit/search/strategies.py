@@ -11,6 +11,7 @@ from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.planner_config import PlannerConfig
 
 _SHORTEST = 1.0  # m for a body of the usual size (`toolkit.robot.scale`); shorter ways are taken to be as long
+_ATTEMPTS = 20  # at a first sequence over ground on which no foot rests
 _LAYER = 0.13  # units; random expansions are as likely at every distance from the goal
 
 
@@ -25,8 +26,10 @@ class Strategy:
         waiting: Judges a transition that has waited. Where there is a judge `at_once` as well and it rejects every way
             on, the transitions it rejects wait. None: nothing waits.
         patient: Settings of the search of the whole graph.
-        hasty: Settings of a search before that one, in a graph without sequences that begin with the right foot; states
-            that run ahead of their feet then wait (`costs.delay.Haste`). None: there is no such search.
+        hasty: Settings of searches before that one, until one of them finds a sequence, in graphs without sequences
+            that begin with one of the feet; states that run ahead of their feet then wait (`costs.delay.Haste`). None:
+            there are no such searches.
+        attempts: Number of those searches.
     """
 
     cost: CostConfig
@@ -34,6 +37,7 @@ class Strategy:
     waiting: TransitionEvaluator | None
     patient: AnaStarConfig
     hasty: AnaStarConfig | None = None
+    attempts: int = 0
 
 
 def strategy_of(
@@ -76,7 +80,7 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
 
     The cost so far does not count before there is a solution, since it would only lead back: it is high for all states
     that get far. Expansions are ten times as many, as most of them only show that the robot arrives too fast; the
-    hasty search has a fifth of them.
+    hasty searches have a thirtieth of them each.
     """
     limit = config.search.max_expansions
     patient = replace(
@@ -91,10 +95,11 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
         layer=0.13,
         epsilon=0.3,
         crowding=0.013,
-        max_expansions=600 if limit is None else 3 * limit // 5,
+        max_expansions=300 if limit is None else 3 * limit // 10,
+        persistence=1,
         first_only=True,
     )
-    return Strategy(config.cost, evaluator, evaluator.stand_in, patient, hasty)
+    return Strategy(config.cost, evaluator, evaluator.stand_in, patient, hasty, _ATTEMPTS)
 
 
 def _acceptable(config: PlannerConfig, length: float) -> float:

@@ -30,6 +30,7 @@ from toolkit.search.anytime.graph import Edge, Fault, Judge, Path, Progress, Sea
 from toolkit.search.anytime.open_list import OpenList
 
 _TINY = 1e-9  # divisor in place of h = 0
+_REFUSALS = 4  # of goals out of one state, the cheapest first, after which the others count as refused
 _REFUSAL = 0.4  # units; added to h, for the order of expansion, where the judge refused a goal
 _MAX_STATES = 700_000  # a search that knows so many states ends, to bound its memory
 _REPORT_INTERVAL = 0.1  # s between calls of the observer, solutions apart
@@ -172,11 +173,9 @@ class AnaStar(Generic[State]):
             if not paths:
                 self._crowding = config.crowding * (1.0 + len(expanded) / config.patience)
             self._missing = 0.0
-            for edge in sorted(goals, key=lambda goal: goal.cost):
-                path = self._reach(node, edge, began, len(expanded))
-                if path is not None:
-                    paths.append(path)
-                    break
+            path = self._reach_one_of(node, goals, began, len(expanded))
+            if path is not None:
+                paths.append(path)
             if observer is not None and (now - reported >= _REPORT_INTERVAL or (paths and goals)):
                 reported = now
                 bound = paths[-1].bound if paths else math.inf
@@ -259,6 +258,25 @@ class AnaStar(Generic[State]):
             node = self._parent[node]
         self._broken.add((self._parent[node], node))
         self._g[node] = math.inf  # other ways to it may be longer
+
+    def _reach_one_of(self, node: int, goals: list[Edge[State]], began: float, expansions: int) -> Path[State] | None:
+        """Take the cheapest edge to a goal out of a node that `_reach` takes, if any.
+
+        Where the judge refuses the cheapest few, it seldom agrees to another one: the fault is how the node was
+        reached. All of them are then opened as states on the way to other goals.
+        """
+        refused = 0
+        for edge in sorted(goals, key=lambda goal: goal.cost):
+            if refused >= _REFUSALS:
+                self._refuse(node, edge)
+                continue
+            path = self._reach(node, edge, began, expansions)
+            if path is not None:
+                return path
+            if self._cut_off(node):
+                return None  # the judge has found a fault on the way to all of them
+            refused += 1
+        return None
 
     def _reach(self, node: int, edge: Edge[State], began: float, expansions: int) -> Path[State] | None:
         """Take an edge to a goal if it improves on the best solution and the judge agrees.

@@ -1,9 +1,12 @@
-"""Searches in turn: a hasty one for a first sequence, then a patient one that begins again at the start.
+"""Searches in turn: hasty ones for a first sequence, then a patient one that begins again at the start.
 
-The sequence that is found first is seldom one that holds. The hasty search would go on around its own first sequence,
+How long a random search takes to its first sequence varies a lot: most find one at once or hardly at all. So a hasty
+search that has not found one soon gives way to another one, with other draws. The sequence that is found first is seldom one that holds. The hasty search would go on around its own first sequence,
 so the patient one does not build on it.
 
-Reference:
+References:
+    Gomes, Selman, Crato, Kautz: Heavy-tailed phenomena in satisfiability and constraint satisfaction problems, Journal
+    of Automated Reasoning 2000.
     Richter, Thayer, Ruml: The joy of forgetting: faster anytime search via restarting, ICAPS 2010.
 """
 
@@ -28,7 +31,8 @@ def search_in_turn(
 ) -> tuple[AnaStarResult[State], int]:
     """Run one search after the other, each from the start.
 
-    No later search runs where one ran out of time, or looked at every state of the whole graph.
+    No later search runs where one ran out of time, or looked at every state of the whole graph. Where one finds a
+    sequence, the last one follows.
 
     Args:
         searches: Graph and settings of each. The graphs before the last one are the same, or parts of it.
@@ -47,6 +51,8 @@ def search_in_turn(
     seconds, bound, early = 0.0, 0.0, 0
     result: AnaStarResult[State] | None = None
     for (problem, config), generator in zip(searches, [*rng.spawn(len(searches) - 1), rng], strict=True):
+        if paths and generator is not rng:
+            continue
         early, whole, before = len(paths), problem is searches[-1][0], len(expanded)
         # The bound of a part of the graph does not hold for the whole one: there only h of the start is known.
         least = 0.0 if whole else float(problem.heuristic([problem.start()])[0])
