@@ -9,6 +9,7 @@ from shapely.geometry import Polygon
 from toolkit.world.convex import convex_partition, is_convex
 from toolkit.world.decomposition import decompose_mesh
 from toolkit.world.facets import find_facets
+from toolkit.world.mesh_patches import closed_block
 
 
 def random_region(rng):
@@ -106,3 +107,14 @@ def test_a_spike_of_no_width_is_cut_off():
     spiked = Polygon([(0.1, -0.3), (0.1, 0.3), (-0.3, 0.3), (-0.1, 0.3), (-0.1, -0.3)])
     pieces = convex_partition(spiked)
     assert sum(Polygon(piece).area for piece in pieces) == pytest.approx(0.12, abs=1e-6)
+
+
+def test_slightly_bent_ground_takes_nothing_from_the_flat_patch_beside_it():
+    x, y = np.meshgrid(np.arange(12) * 0.1, np.arange(8) * 0.1, indexing="ij")
+    heights = np.where(x > 0.65, 0.002 * (x - 0.6) / 0.1, 0.0)  # 1.1 deg; the triangles of both are equally large
+    mesh = closed_block(x[:, 0], y[0], heights)
+    facets = find_facets(mesh, angle=np.radians(3), distance=1.5e-3)
+    flat = next(facet for facet in facets if facet.frame.rotation[2, 2] > 0.9)
+    assert shapely.box(-1, -1, 0.6, 1).intersection(
+        shapely.transform(flat.polygon, lambda xy: (flat.frame @ np.c_[xy, np.zeros(len(xy))])[:, :2])
+    ).area == pytest.approx(0.6 * 0.7, rel=1e-3)

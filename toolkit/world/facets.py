@@ -16,6 +16,7 @@ from toolkit.world.overlay import united
 if TYPE_CHECKING:
     import trimesh
 
+_STRICT = 0.07  # part of the tolerances within which the seed of a facet is flat
 _MANY = 100  # more triangles are merged along edges; for fewer the general union is as quick and allows overlaps
 
 
@@ -43,12 +44,13 @@ def plane_frame(origin: np.ndarray, normal: np.ndarray) -> Pose:
 
 
 def find_facets(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_area: float = 0.0) -> list[Facet]:
-    """Flat facets of a mesh with merged vertices, ordered by the area of their first triangle, largest first.
+    """Flat facets of a mesh with merged vertices, ordered by the area of their seeds, largest first.
 
-    Each facet grows from its largest triangle over shared edges. A triangle joins if its normal is within `angle` rad
-    of the FIRST triangle's and its corners are within `distance` m of the first triangle's plane, so that a smoothly
-    curved mesh does not become one facet. The facet's plane is the area-weighted mean of its triangles. Degenerate
-    triangles and facets smaller than `least_area` m^2 are left out.
+    Each facet grows over shared edges from a seed, a patch that is flat within a small part of the tolerances. A
+    triangle joins if its normal is within `angle` rad of the seed's first triangle's and its corners are within
+    `distance` m of that triangle's plane, so that a smoothly curved mesh does not become one facet, and slightly bent
+    ground next to a flat patch takes nothing from it. The facet's plane is the area-weighted mean of its triangles.
+    Degenerate triangles and facets smaller than `least_area` m^2 are left out.
     """
     return [facet_of(mesh, group) for group in flat_groups(mesh, angle=angle, distance=distance, least_area=least_area)]
 
@@ -59,20 +61,19 @@ def flat_groups(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_a
     pairs = mesh.face_adjacency
     ends = pairs.ravel()
     order = np.argsort(ends, kind="stable")
-    members, last = np.empty(len(area), np.int64), np.empty(len(area), np.int64)
-    count = _grow(
-        np.argsort(-area, kind="stable"),
-        area > 1e-10,
-        np.searchsorted(ends[order], np.arange(len(area) + 1)),
-        pairs[:, ::-1].ravel()[order],
-        np.ascontiguousarray(mesh.face_normals),
-        np.ascontiguousarray(mesh.triangles),
-        float(np.cos(angle)),
-        distance,
-        members,
-        last,
-    )
-    groups = np.split(members[: last[count - 1]], last[: count - 1]) if count else []
+    first, neighbours = np.searchsorted(ends[order], np.arange(len(area) + 1)), pairs[:, ::-1].ravel()[order]
+    normals, corners = np.ascontiguousarray(mesh.face_normals), np.ascontiguousarray(mesh.triangles)
+
+    def grown(seeds: np.ndarray, part: float) -> list[np.ndarray]:
+        members, last = np.empty(len(area), np.int64), np.empty(len(area), np.int64)
+        within = float(np.cos(part * angle)), part * distance
+        count = _grow(seeds, area > 1e-10, first, neighbours, normals, corners, *within, members, last)
+        return np.split(members[: last[count - 1]], last[: count - 1]) if count else []
+
+    seed_area = area.copy()
+    for patch in grown(np.argsort(-area, kind="stable"), _STRICT):
+        seed_area[patch] = area[patch].sum()
+    groups = grown(np.lexsort([-area, -seed_area]), 1.0)
     return [group for group in groups if area[group].sum() >= least_area]
 
 
