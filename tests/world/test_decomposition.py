@@ -6,7 +6,7 @@ import shapely
 import trimesh
 from shapely.geometry import Polygon
 
-from toolkit.world.convex import convex_partition, is_convex
+from toolkit.world.convex import convex_partition, is_convex, simplified
 from toolkit.world.decomposition import decompose_mesh
 from toolkit.world.facets import find_facets
 from toolkit.world.mesh_patches import closed_block
@@ -107,6 +107,13 @@ def test_a_spike_of_no_width_is_cut_off():
     spiked = Polygon([(0.1, -0.3), (0.1, 0.3), (-0.3, 0.3), (-0.1, 0.3), (-0.1, -0.3)])
     pieces = convex_partition(spiked)
     assert sum(Polygon(piece).area for piece in pieces) == pytest.approx(0.12, abs=1e-6)
+
+
+@pytest.mark.parametrize("start", range(7))
+def test_corners_that_hardly_turn_are_left_out(start):
+    ring = np.array([[0, 0], [0.5, -2e-5], [1, 0], [1, 0.4], [1, 0.8], [0.5, 0.9], [0, 0.8]])
+    kept = simplified(np.roll(ring, start, axis=0), 1e-4)
+    assert {tuple(corner) for corner in kept} == {tuple(ring[index]) for index in (0, 2, 4, 5, 6)}
 
 
 def test_slightly_bent_ground_takes_nothing_from_the_flat_patch_beside_it():

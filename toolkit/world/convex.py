@@ -53,6 +53,19 @@ def convex_partition(region: Polygon) -> list[np.ndarray]:
     return [_without_straight_corners(points[ring]) for ring in rings.values()]
 
 
+def simplified(ring: np.ndarray, tolerance: float) -> np.ndarray:
+    """A convex ring (k, 2) without the corners that lie within a tolerance in m of the edges without them.
+
+    Corners that hardly turn split the faces of a solid into slivers, in which collision detection finds too few points.
+    """
+    kept = np.asarray(shapely.simplify(Polygon(ring), tolerance).exterior.coords)[:-1, :2]
+    before, after = kept - np.roll(kept, 1, axis=0), np.roll(kept, -1, axis=0) - kept
+    height = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / np.hypot(*(before + after).T)
+    turns = height > tolerance
+    turns[1:] = True  # only the first corner was kept whatever it does
+    return kept[turns] if turns.sum() >= 3 else kept
+
+
 def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int] | None:
     """The ring of two rings without their common edge a-b; None if they share more than that edge."""
     i, j = first.index(b), second.index(a)

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from toolkit.world.convex import convex_partition
+from toolkit.world.convex import convex_partition, simplified
 from toolkit.world.facets import Facet, facet_of, flat_groups
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ _DEPTH = 0.06  # m; thickness of a part where the mesh is thick enough
 _LEAST_DEPTH = 2e-3  # m; least thickness of a part
 _TAPER = 0.7  # size of a part's back relative to its front, so that sharp edges of the mesh stay sharp
 _LEAST_WIDTH = 2e-4  # m; narrower slivers are left out
+_STRAIGHT = 1e-4  # m; corners that turn less are left out
 _MOST_PARTS = 4000
 
 
@@ -131,6 +132,7 @@ def _fronts(facets: list[Facet]) -> list[tuple[np.ndarray, np.ndarray]]:
         for ring in convex_partition(shape) if shape.area > 1e-8 else []:
             piece = Polygon(ring)
             if 2 * piece.area > _LEAST_WIDTH * piece.length:
+                ring = simplified(ring, _STRAIGHT)
                 fronts.append((facet.frame @ np.column_stack([ring, np.zeros(len(ring))]), facet.frame.normal))
     return fronts
 
