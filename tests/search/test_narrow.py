@@ -86,6 +86,19 @@ def test_a_slot_leads_to_the_goal_sideways(robot, heading):
     assert at(found, 1.2, 0.0, yaw=0.0) == np.inf
 
 
+@pytest.mark.parametrize("depth", [0.1, 0.3])
+@pytest.mark.parametrize("wall", [2.0, 0.5], ids=["wide wall", "with ways for the body beside the ground"])
+def test_the_way_knows_that_a_door_narrower_than_the_shoulders_is_passed_sideways(robot, depth, wall):
+    body = BodyBox.of(robot)
+    for width, forward in ((body.half_depth + body.half_width, False), (2 * body.half_width + 0.3, True)):
+        door = [box([1.0, side * (width / 2 + wall), 1.0], [depth / 2, wall, 1.0]) for side in (-1, 1)]
+        world = make_world(box([1.0, 0, -0.05], [2.5, 0.9, 0.05]), *door, goal=(2.2, 0, 0))
+        planner = planner_of(robot, world)
+        distance = planner.ground.way(planner.ground.start_stance()).distance
+        ahead, sideways = (at(distance, 0.8, 0.0, yaw=yaw) for yaw in (0.0, np.pi / 2))
+        assert (ahead > sideways + 0.15) != forward
+
+
 def test_a_body_does_not_pass_through_a_wall_between_two_stances(robot):
     """The stances before and after a long step are free; half-way there is a thin wall above the feet."""
     body = BodyBox.of(robot)

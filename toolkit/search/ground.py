@@ -150,12 +150,14 @@ class Ground:
         if config.heuristic == "euclidean":
             return EuclideanDistance(self._world.goal), strides[-1]
         distance, stride = self._first(feet, strides, narrow=False)
-        if distance is not None and distance.sound(feet.position):
+        sound = distance is not None and distance.sound(feet.position)
+        if distance is not None and sound and distance.forward(feet.position):
             return distance, stride
-        obstacle = self._obstacle(feet, strides)
-        if obstacle is None:
-            if distance is None:
-                distance, stride = self._first(feet, strides, narrow=True)
+        obstacle = None if sound else self._obstacle(feet, strides)
+        if obstacle is None:  # the finer grid also knows how far before a narrow place to turn
+            finer, longest = self._first(feet, strides, narrow=True)
+            if finer is not None and (distance is None or finer.sound(feet.position)):
+                return finer, longest
             return distance or EuclideanDistance(self._world.goal), stride
         if config.rest_friction is not None:
             if self._distances(self._projected(None)).distance(feet, strides[-1]) is not None:

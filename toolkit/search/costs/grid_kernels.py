@@ -97,6 +97,43 @@ def number_nodes(levels, corner, cell, occupancy, body, nodes, low):
 
 
 @compiled(kept=True)
+def spread_forward(levels, free, climb, reached):
+    """Spread reached (nx, ny, 4) to cells from which a body gets there that always faces the way it goes, or backwards.
+
+    free (nx, ny, 4, yaws) says where it fits with which layer of yaw; heights of neighbours differ by `climb` at most.
+    """
+    nx, ny, yaws = free.shape[0], free.shape[1], free.shape[3]
+    stack = np.empty((nx * ny * LEVELS, 3), np.int32)
+    count = 0
+    for a in range(nx):
+        for b in range(ny):
+            for m in range(LEVELS):
+                if reached[a, b, m]:
+                    stack[count, 0], stack[count, 1], stack[count, 2] = a, b, m
+                    count += 1
+    while count > 0:
+        count -= 1
+        a, b, m = stack[count, 0], stack[count, 1], stack[count, 2]
+        for i in range(max(a - 1, 0), min(a + 2, nx)):
+            for j in range(max(b - 1, 0), min(b + 2, ny)):
+                if i == a and j == b:
+                    continue
+                if i == a:
+                    layer = yaws // 2
+                else:
+                    layer = ((i - a) * (j - b) * yaws // 4) % yaws
+                if not free[a, b, m, layer]:
+                    continue
+                for n in range(LEVELS):
+                    if not free[i, j, n, layer] or reached[i, j, n]:
+                        continue
+                    if abs(levels[i, j, n] - levels[a, b, m]) <= climb:
+                        reached[i, j, n] = True
+                        stack[count, 0], stack[count, 1], stack[count, 2] = i, j, n
+                        count += 1
+
+
+@compiled(kept=True)
 def link_nodes(nodes, low, levels, cell, climb, body, start, end, weight):
     """Compressed rows of the grid graph, whose edges all go both ways.
 

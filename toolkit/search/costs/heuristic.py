@@ -17,7 +17,16 @@ from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projector
 from toolkit.contacts.surface_table import SurfaceTable
 from toolkit.geometry.limb import Limb
-from toolkit.search.costs.grid_kernels import LEVELS, add_level, link_nodes, number_nodes, query, sole_levels, spread
+from toolkit.search.costs.grid_kernels import (
+    LEVELS,
+    add_level,
+    link_nodes,
+    number_nodes,
+    query,
+    sole_levels,
+    spread,
+    spread_forward,
+)
 from toolkit.search.costs.proof_kernels import disc, flood, mark_between, mark_stances
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.world import Goal
@@ -162,8 +171,19 @@ class GridDistance:
             self._height, self._soles, np.insert(disc(reach / 2), 0, 0, axis=0), self._climb, self._merge, reached
         )
         flood(self._height, free, self._climb, none, reached)
-        i, j = np.clip(np.round((place[:2] - self._corner) / self._cell).astype(int), 1, np.array(ground.shape) - 2)
-        return bool(reached[i - 1 : i + 2, j - 1 : j + 2].any())
+        return self._near_one(place, reached)
+
+    def forward(self, place: np.ndarray) -> bool:
+        """Whether a way leads to the goal from a place (3,) m on which the body faces where it goes."""
+        reached = self._distance.min(3) == 0.0
+        spread_forward(self._height, np.isfinite(self._distance), self._climb, reached)
+        return self._near_one(place, reached)
+
+    def _near_one(self, place: np.ndarray, cells: np.ndarray) -> bool:
+        """Whether a place (3,) m is near one of the cells (nx, ny, 4) bool."""
+        most = np.array(cells.shape[:2]) - 2
+        i, j = np.clip(np.round((place[:2] - self._corner) / self._cell).astype(int), 1, most)
+        return bool(cells[i - 1 : i + 2, j - 1 : j + 2].any())
 
     def _add_footholds(self, table: SurfaceTable, footholds: Footholds, levels: np.ndarray) -> None:
         """Add the heights of surfaces that no sole of the grid met, but others fit on: stones, beams."""
