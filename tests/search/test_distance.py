@@ -8,8 +8,10 @@ from toolkit.contacts.projection import Projector
 from toolkit.geometry.pose import Pose
 from toolkit.search.costs.heuristic import EuclideanDistance
 from toolkit.search.costs.terrain_distance import TerrainDistance
+from toolkit.search.ground import Ground
 from toolkit.search.moves.obstacles import world_triangles
 from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
+from toolkit.search.planner_config import PlannerConfig
 
 
 def terrain(robot, world):
@@ -141,3 +143,19 @@ def test_triangles_lie_on_their_geoms():
     edges = np.diff(triangles[-12:], axis=1)
     outward = np.cross(edges[:, 0], edges[:, 1])
     assert np.linalg.norm(outward, axis=1).min() > 0
+
+
+@pytest.mark.parametrize(("used", "slides"), [(0.93, False), (0.975, True), (1.05, True)])
+def test_ground_on_which_plans_have_no_friction_left_slides(robot, used, slides):
+    """Feet could rest a little below the friction angle, but a plan that rests there has nothing left to steer with."""
+    angle = np.arctan(0.5 * used)
+    drop, along = 2.0 * np.sin(angle), 2.0 * np.cos(angle)
+    upper = box([-0.5, 0, -0.02], [0.5, 0.6, 0.02], friction=0.5)
+    lower = box([along + 0.5, 0, -drop - 0.02], [0.5, 0.6, 0.02], friction=0.5)
+    middle = np.array([along / 2, 0, -drop / 2]) - 0.02 * np.array([np.sin(angle), 0, np.cos(angle)])
+    slope = box(middle, [1.0, 0.6, 0.02], (0, float(np.degrees(angle)), 0), friction=0.5)
+    world = make_world(upper, slope, lower, start=(-0.4, 0, 0), goal=(along + 0.5, 0, -drop))
+    ground = Ground(robot, world, PlannerConfig())
+    way = ground.way(ground.start_stance())
+    assert way.slides == slides
+    assert (way.forced > 0.0) or not slides

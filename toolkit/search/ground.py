@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolkit.centroidal.program import LEAST
 from toolkit.contacts.arm_map import ArmMap
 from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projected, Projector
@@ -113,7 +114,7 @@ class Ground:
         feet, forced = start.mean_feet, self._terrain.forced_acceleration()
         strides, slides = self._strides, False
         if forced > 0.0:
-            projector = self._projected(1.0)
+            projector = self._projected(LEAST.friction)
             rests: list[float] = []
             if projector.table.foot.any():
                 resting = self._distances(projector)

@@ -23,6 +23,7 @@ from toolkit.world.world import World
 _DETOURS = (2.0, 8.0)  # m around start and goal that the grid covers; the larger where the smaller has no way
 _BENT = 0.3  # m by which a m of way with bent knees seems longer
 _AROUND, _BEYOND = 0.3, 0.5  # m around start, goal and ground that the grid covers; beyond it, what a body may hit
+_USED = 0.9  # part of the friction that motions use where feet slide; the rest steers them
 _TURN = 1e-4  # m; cost of one layer of yaw, only there to prefer straight ways
 _WIDE, _CELL = Mesh(cell=0.1, yaws=8), 0.05  # and the edge in m of the cells that a body may hit
 # Where no way is wide enough for these: narrow places that bodies pass sideways. A quarter turn takes about six steps,
@@ -179,10 +180,10 @@ class TerrainDistance:
     def forced_acceleration(self) -> float:
         """The most, in m/s^2, that a foot surface on the way forces the robot to accelerate horizontally; 0: none.
 
-        Surfaces steeper than their friction angle force it, since no foot can rest on them.
+        Surfaces force it on which no foot can rest with the friction that motions keep clear of.
         """
         table, bounds = self._projector.table, self._bounds[0]
         upright = np.clip(table.rotation[:, 2, 2], 1e-6, 1.0)
         near = (table.centre[:, :2] >= bounds[:2]).all(1) & (table.centre[:, :2] <= bounds[2:]).all(1)
-        gain = (np.sqrt(1.0 - upright**2) - table.friction * upright) * upright * -GRAVITY[2]
+        gain = (np.sqrt(1.0 - upright**2) - _USED * table.friction * upright) * upright * -GRAVITY[2]
         return float(max(gain[table.foot & near].max(initial=0.0), 0.0))
