@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from toolkit.search.anytime.ana_star import AnaStar, AnaStarConfig, Edge
+from toolkit.search.anytime.graph import Fault
 
 
 class Graph:
@@ -229,3 +230,36 @@ def test_an_assumed_cost_that_is_far_too_low_grows_until_something_is_found():
 
     assert not search(10_000).paths
     assert search(100).paths
+
+
+class Fan:
+    """A start, two states behind it, and many goals behind each of these."""
+
+    def start(self):
+        return (0,)
+
+    def expand(self, state, slack):
+        count = {1: 2, 2: 20}.get(len(state), 0)
+        return [Edge((*state, k), 1.0 + k / 100, None) for k in range(count)]
+
+    def heuristic(self, states):
+        return [0.5 * (3 - len(state)) for state in states]
+
+    def is_goal(self, states):
+        return [len(state) == 3 for state in states]
+
+    def crowd(self, states):
+        return states
+
+
+@pytest.mark.parametrize("answer", [None, Fault(1)], ids=["refused", "a fault on the way"])
+def test_a_judge_is_asked_about_few_goals_out_of_a_state(answer):
+    asked = []
+
+    def judge(states, payloads, edge):
+        asked.append(edge.state)
+        return answer
+
+    assert not AnaStar(Fan(), np.random.default_rng(0), AnaStarConfig(epsilon=0.0), judge=judge).run().paths
+    most = 4 if answer is None else 1
+    assert sorted(asked) == [(0, way, goal) for way in (0, 1) for goal in range(most)]

@@ -67,3 +67,15 @@ def test_a_part_of_the_graph_that_ends_does_not_end_the_whole():
     assert part.expansions > 0 and graph.expansions > 0
     assert whole.expansions == part.expansions + graph.expansions
     assert whole.lower_bound == pytest.approx(graph.least)
+
+
+def test_hasty_searches_begin_again_until_one_finds_a_sequence():
+    graph = Graph(np.random.default_rng(0), goals=4)
+    short = AnaStarConfig(epsilon=0.5, first_only=True, max_expansions=1)
+    one, _ = search_in_turn([(graph, HASTY), (graph, PATIENT)], np.random.default_rng(1), None, math.inf)
+    found, early = search_in_turn([(graph, HASTY)] * 3 + [(graph, PATIENT)], np.random.default_rng(1), None, math.inf)
+    assert early == 1  # the other two are left out
+    assert [path.states for path in found.paths] == [path.states for path in one.paths]
+    none, early = search_in_turn([(graph, short)] * 3 + [(graph, PATIENT)], np.random.default_rng(1), None, math.inf)
+    alone = AnaStar(graph, np.random.default_rng(1), PATIENT).run()
+    assert early == 0 and none.expansions == alone.expansions + 3

@@ -19,7 +19,6 @@ from toolkit.world.convex import convex_partition, simplified
 
 _SPACING = 0.02  # m; distance of samples, as far as the scene is small enough
 _OPPOSITE = -0.9  # cosine of the angle between the normals of the two sides of a wall
-_STRAIGHT = 1e-4  # m; corners of a plate that turn less are left out
 _LOWER = 2e-3  # m; what is there but cannot be touched ends so far below the surface: it covers, and is no part of it
 _LEAST = 3e-3  # m^2; smaller patches cannot be touched
 _GAP = 1e-3  # m; between the backs of the two sides of a wall
@@ -102,7 +101,7 @@ def _add_plates(world: WorldText, name: str, patch: Patch, outline: Polygon, top
     material = "platform" if abs(patch.frame.normal[2]) > 0.7 else "panel"
     rings = [] if outline.is_empty else [ring for ring in convex_partition(outline) if Polygon(ring).area > 1e-6]
     for piece, ring in enumerate(rings):
-        corners = simplified(ring, _STRAIGHT)
+        corners = simplified(ring)
         plate = np.concatenate([np.column_stack([corners, np.full(len(corners), z)]) for z in (top, bottom)])
         world.mesh(name if piece == 0 else f"{name}_{piece}", patch.frame @ plate, material=material)
 

@@ -80,7 +80,7 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
 
     The cost so far does not count before there is a solution, since it would only lead back: it is high for all states
     that get far. Expansions are ten times as many, as most of them only show that the robot arrives too fast; the
-    hasty searches have a thirtieth of them each.
+    hasty searches have 3 % of them each.
     """
     limit = config.search.max_expansions
     patient = replace(

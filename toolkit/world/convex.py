@@ -8,6 +8,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
 _FLAT = 1e-9  # a corner with a smaller cross product is straight
+STRAIGHT = 1e-4  # m; corners of solids that lie so near to the edges without them are left out
 
 
 def ring_points(polygon: Polygon) -> np.ndarray:
@@ -17,9 +18,7 @@ def ring_points(polygon: Polygon) -> np.ndarray:
 
 def is_convex(points: np.ndarray, tolerance: float = _FLAT) -> bool:
     """Whether a counterclockwise ring (k, 2) turns left or goes straight everywhere."""
-    edges = np.roll(points, -1, axis=0) - points
-    following = np.roll(edges, -1, axis=0)
-    return bool((edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0] > -tolerance).all())
+    return bool((_turns(points) > -tolerance).all())
 
 
 def convex_partition(region: Polygon) -> list[np.ndarray]:
@@ -53,17 +52,15 @@ def convex_partition(region: Polygon) -> list[np.ndarray]:
     return [_without_straight_corners(points[ring]) for ring in rings.values()]
 
 
-def simplified(ring: np.ndarray, tolerance: float) -> np.ndarray:
+def simplified(ring: np.ndarray, tolerance: float = STRAIGHT) -> np.ndarray:
     """A convex ring (k, 2) without the corners that lie within a tolerance in m of the edges without them.
 
     Corners that hardly turn split the faces of a solid into slivers, in which collision detection finds too few points.
     """
     kept = np.asarray(shapely.simplify(Polygon(ring), tolerance).exterior.coords)[:-1, :2]
-    before, after = kept - np.roll(kept, 1, axis=0), np.roll(kept, -1, axis=0) - kept
-    height = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / np.hypot(*(before + after).T)
-    turns = height > tolerance
-    turns[1:] = True  # only the first corner was kept whatever it does
-    return kept[turns] if turns.sum() >= 3 else kept
+    # Its first corner was kept whatever it does.
+    height = abs(_turns(kept)[0]) / np.hypot(*(kept[1] - kept[-1]))
+    return kept[1:] if height <= tolerance and len(kept) > 3 else kept
 
 
 def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int] | None:
@@ -76,6 +73,11 @@ def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int] | 
 
 def _without_straight_corners(points: np.ndarray) -> np.ndarray:
     """The ring (k, 2) without the corners that do not turn."""
-    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-    turns = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) > _FLAT
+    turns = np.abs(_turns(points)) > _FLAT
     return points[turns] if turns.sum() >= 3 else points
+
+
+def _turns(ring: np.ndarray) -> np.ndarray:
+    """(k,) m^2; cross products of the edges before and after each corner of a ring (k, 2), positive to the left."""
+    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    return before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]

@@ -22,7 +22,6 @@ _DEPTH = 0.06  # m; thickness of a part where the mesh is thick enough
 _LEAST_DEPTH = 2e-3  # m; least thickness of a part
 _TAPER = 0.7  # size of a part's back relative to its front, so that sharp edges of the mesh stay sharp
 _LEAST_WIDTH = 2e-4  # m; narrower slivers are left out
-_STRAIGHT = 1e-4  # m; corners that turn less are left out
 _MOST_PARTS = 4000
 
 
@@ -132,8 +131,8 @@ def _fronts(facets: list[Facet]) -> list[tuple[np.ndarray, np.ndarray]]:
         for ring in convex_partition(shape) if shape.area > 1e-8 else []:
             piece = Polygon(ring)
             if 2 * piece.area > _LEAST_WIDTH * piece.length:
-                ring = simplified(ring, _STRAIGHT)
-                fronts.append((facet.frame @ np.column_stack([ring, np.zeros(len(ring))]), facet.frame.normal))
+                corners = simplified(ring)
+                fronts.append((facet.frame @ np.column_stack([corners, np.zeros(len(corners))]), facet.frame.normal))
     return fronts
 
 

@@ -7,7 +7,8 @@ ANA* keeps the cost G of the best solution and always expands the open state wit
 that is, the one that most probably improves on G. With h admissible, a solution is at most max_open e(s) times as
 costly as the best one. With probability epsilon a random open state is expanded instead, which leaves the guarantees
 alone and helps out of cul-de-sacs. States reopen when a cheaper path to them is found. A search that runs to
-exhaustion therefore ends with the cheapest path, whether or not h is consistent.
+exhaustion therefore ends with the cheapest path, whether or not h is consistent; one with a judge may miss it, as it
+asks about no more than a few goals out of a state.
 
 Beyond the paper, similar states can be made to wait for each other (`AnaStarConfig.crowding`). Each expansion in a
 crowd adds to the h by which the other states of the crowd are ordered. Pruning and bounds keep the true h.
@@ -30,7 +31,7 @@ from toolkit.search.anytime.graph import Edge, Fault, Judge, Path, Progress, Sea
 from toolkit.search.anytime.open_list import OpenList
 
 _TINY = 1e-9  # divisor in place of h = 0
-_REFUSALS = 4  # of goals out of one state, the cheapest first, after which the others count as refused
+_REFUSALS = 4  # goals out of one state, the cheapest first, that are of no use until the others count as refused
 _REFUSAL = 0.4  # units; added to h, for the order of expansion, where the judge refused a goal
 _MAX_STATES = 700_000  # a search that knows so many states ends, to bound its memory
 _REPORT_INTERVAL = 0.1  # s between calls of the observer, solutions apart
@@ -262,8 +263,8 @@ class AnaStar(Generic[State]):
     def _reach_one_of(self, node: int, goals: list[Edge[State]], began: float, expansions: int) -> Path[State] | None:
         """Take the cheapest edge to a goal out of a node that `_reach` takes, if any.
 
-        Where the judge refuses the cheapest few, it seldom agrees to another one: the fault is how the node was
-        reached. All of them are then opened as states on the way to other goals.
+        Where the judge refuses the cheapest few, or makes them too dear, it seldom does better by another one: the
+        fault is how the node was reached. The others are then opened, unasked, as states on the way to other goals.
         """
         refused = 0
         for edge in sorted(goals, key=lambda goal: goal.cost):

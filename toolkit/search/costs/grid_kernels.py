@@ -96,6 +96,20 @@ def number_nodes(levels, corner, cell, occupancy, body, nodes, low):
     return count
 
 
+@compiled
+def stack_of(reached):
+    """A stack for all cells of reached (nx, ny, L) bool, with those that are on it, and their number."""
+    nx, ny, depth = reached.shape
+    stack, count = np.empty((nx * ny * depth, 3), np.int32), 0
+    for a in range(nx):
+        for b in range(ny):
+            for m in range(depth):
+                if reached[a, b, m]:
+                    stack[count, 0], stack[count, 1], stack[count, 2] = a, b, m
+                    count += 1
+    return stack, count
+
+
 @compiled(kept=True)
 def spread_forward(levels, free, climb, reached):
     """Spread reached (nx, ny, 4) to cells from which a body gets there that always faces the way it goes, or backwards.
@@ -103,14 +117,7 @@ def spread_forward(levels, free, climb, reached):
     free (nx, ny, 4, yaws) says where it fits with which layer of yaw; heights of neighbours differ by `climb` at most.
     """
     nx, ny, yaws = free.shape[0], free.shape[1], free.shape[3]
-    stack = np.empty((nx * ny * LEVELS, 3), np.int32)
-    count = 0
-    for a in range(nx):
-        for b in range(ny):
-            for m in range(LEVELS):
-                if reached[a, b, m]:
-                    stack[count, 0], stack[count, 1], stack[count, 2] = a, b, m
-                    count += 1
+    stack, count = stack_of(reached)
     while count > 0:
         count -= 1
         a, b, m = stack[count, 0], stack[count, 1], stack[count, 2]

@@ -164,9 +164,8 @@ class GridDistance:
         ground, none = self._soles.max(2) > -np.inf, np.zeros(4, np.bool_)
         reach = self._stride / self._cell
         between = mark_between(ground, reach + 1.0, none)
-        reached = self._distance.min(3) == 0.0
         free = np.isfinite(self._distance).any(3) & between[..., None]
-        reached &= free
+        reached = self._at_goal() & free
         mark_stances(
             self._height, self._soles, np.insert(disc(reach / 2), 0, 0, axis=0), self._climb, self._merge, reached
         )
@@ -175,9 +174,13 @@ class GridDistance:
 
     def forward(self, place: np.ndarray) -> bool:
         """Whether a way leads to the goal from a place (3,) m on which the body faces where it goes."""
-        reached = self._distance.min(3) == 0.0
+        reached = self._at_goal()
         spread_forward(self._height, np.isfinite(self._distance), self._climb, reached)
         return self._near_one(place, reached)
+
+    def _at_goal(self) -> np.ndarray:
+        """(nx, ny, 4) bool; the cells in the goal region in which the body fits."""
+        return self._distance.min(3) == 0.0
 
     def _near_one(self, place: np.ndarray, cells: np.ndarray) -> bool:
         """Whether a place (3,) m is near one of the cells (nx, ny, 4) bool."""

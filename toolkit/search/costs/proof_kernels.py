@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from toolkit.compiled import compiled
-from toolkit.search.costs.grid_kernels import add_level
+from toolkit.search.costs.grid_kernels import add_level, stack_of
 
 _SECTORS = 96  # directions that are told apart
 
@@ -196,14 +196,8 @@ def flood(levels, free, climb, border, reached):
     of these reaches all of them.
     """
     nx, ny, depth = levels.shape
-    stack = np.empty((nx * ny * depth, 3), np.int32)
-    count, outside = 0, False
-    for a in range(nx):
-        for b in range(ny):
-            for m in range(depth):
-                if reached[a, b, m]:
-                    stack[count, 0], stack[count, 1], stack[count, 2] = a, b, m
-                    count += 1
+    stack, count = stack_of(reached)
+    outside = False
     while count > 0:
         count -= 1
         a, b, m = stack[count, 0], stack[count, 1], stack[count, 2]

@@ -180,7 +180,7 @@ class TerrainDistance:
     def forced_acceleration(self) -> float:
         """The most, in m/s^2, that a foot surface on the way forces the robot to accelerate horizontally; 0: none.
 
-        Surfaces force it on which no foot can rest with the friction that motions keep clear of.
+        Surfaces force it on which no foot can rest with the part `_USED` of their friction.
         """
         table, bounds = self._projector.table, self._bounds[0]
         upright = np.clip(table.rotation[:, 2, 2], 1e-6, 1.0)
