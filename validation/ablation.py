@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -36,7 +37,7 @@ search. All worlds are fresh, the timing is the same for all, and plans are comp
 FIELD, CORRIDOR = "rubble_field", "rubble_corridor"
 KINDS = (FIELD, CORRIDOR, "any_stairs", "any_stones", "any_gap", "any_slope")
 TIMING = Timing(0.6, 0.8)
-OURS, KINEMATIC, BASELINE = "learned", "kinematic", "quasi-static"
+JUDGE, OURS, KINEMATIC, BASELINE = "optimiser", "learned", "kinematic", "quasi-static"
 QUANTITIES: dict[str, tuple[str, ...]] = {
     "true cost": ("true_cost",),
     "J": ("objective",),
@@ -185,6 +186,12 @@ def main(argv: list[str] | None = None) -> int:
         help="trials of each kind of world but fields and corridors (default: %(default)s)",
     )
     parser.add_argument(
+        "--optimiser-trials",
+        type=cli.positive(int),
+        metavar="N",
+        help="most trials of each kind with the optimiser as judge, which takes minutes each (default: no limit)",
+    )
+    parser.add_argument(
         "--optimisations",
         type=cli.positive(int),
         default=effort.optimisations,
@@ -211,12 +218,13 @@ def main(argv: list[str] | None = None) -> int:
     console = make_console()
     settings, first = options.settings_of(args), options.first_seed(args, "ablation")
     effort = Effort(args.optimisations, args.seconds, args.local_search)
-    worlds = [
-        case
+    cases = [
+        (case, planner)
         for kind in args.kinds
         for case in make_cases([kind], args.trials if kind in (FIELD, CORRIDOR) else args.other_trials, first)
+        for planner in args.planners
+        if planner != JUDGE or case.seed - first < (args.optimiser_trials or math.inf)
     ]
-    cases = [(case, planner) for case in worlds for planner in args.planners]
     chosen = {"optimisations": args.optimisations, "seconds": args.seconds, "local_search": args.local_search}
     chosen |= {"execute": args.execute}
     store = TrialFile(args.out / "trials.jsonl", settings.deciding() | chosen)

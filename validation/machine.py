@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import os
 import platform
 import resource
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -31,16 +33,39 @@ def environment() -> dict[str, Any]:
 
 
 def code_fingerprint() -> str:
-    """Twelve hex digits of the toolkit's source: results of two states of the code are never mixed unnoticed."""
+    """The same of the toolkit's source: results of two states of the code are never mixed unnoticed."""
+    return source_fingerprint((ROOT / "toolkit").rglob("*.py"))
+
+
+def source_fingerprint(paths: Iterable[Path]) -> str:
+    """Twelve hex digits of what modules under the project's root compute: comments and docstrings are no part of it."""
     digest = hashlib.sha256()
-    for path in sorted((ROOT / "toolkit").rglob("*.py")):
-        digest.update(str(path.relative_to(ROOT)).encode())
-        digest.update(path.read_bytes())
+    for path in sorted(paths):
+        digest.update(path.relative_to(ROOT).as_posix().encode())
+        digest.update(_statements(path.read_text(encoding="utf-8")).encode())
     return digest.hexdigest()[:12]
 
 
+def _statements(source: str) -> str:
+    """A module as a tree of statements, without strings that stand alone."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            node.body = [statement for statement in node.body if not _is_comment(statement)]
+    return ast.dump(tree)
+
+
+def _is_comment(statement: ast.stmt) -> bool:
+    """Whether a statement is a string and nothing else."""
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )
+
+
 def folder_fingerprint(folder: Path) -> str:
-    """The same of every file of a robot's folder, networks included."""
+    """Twelve hex digits of every file of a robot's folder, networks included."""
     digest = hashlib.sha256()
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         digest.update(str(path.relative_to(folder)).encode())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from toolkit.report.console import make_console
 from validation import goals, map_families, map_worlds, options
 from validation.goals import Goal
 from validation.jobs import Job, run_jobs
+from validation.machine import source_fingerprint
 from validation.map_families import FAMILIES, QUICK, SEEDS, Cell, cells_of
 from validation.map_picture import draw_map
 from validation.map_table import hole_table, summarise, table
@@ -36,8 +36,7 @@ was: --out has a small file for each cell.
 
 def worlds_fingerprint() -> str:
     """Twelve hex digits of the source that makes the worlds."""
-    sources = (Path(module.__file__ or "").read_bytes() for module in (map_families, map_worlds))
-    return hashlib.sha256(b"".join(sources)).hexdigest()[:12]
+    return source_fingerprint(Path(module.__file__ or "") for module in (map_families, map_worlds))
 
 
 def goals_of(rows: list[dict[str, Any]]) -> list[Goal]:
