@@ -57,16 +57,19 @@ def test_torques_are_the_jacobian_transpose(walker):
     for limb in FEET:
         leg = walker.legs[limb]
         for data, joints, _, com, position, rotation in random_legs(walker, limb, rng, 20):
-            axes = np.abs(data.xaxis[joints]).argmax(1)
             force, moment = rng.normal(size=3) * [50, 50, 300], rng.normal(size=3) * 20
             jacobian = np.zeros((2, 3, model.nv))
             mujoco.mj_jacSite(model, data, jacobian[0], jacobian[1], model.site(limb.label).id)
             torque = (jacobian[0].T @ force + jacobian[1].T @ moment)[model.jnt_dofadr[joints]]
             posture = leg_posture(leg, com[None], np.zeros(1), position[None], rotation[None])
             ours = leg_torques(posture, position[None], rotation[None], force[None], moment[None])
-            at = {"hip_roll": 1, "hip_pitch": 2, "knee": 3, "ankle_pitch": 4, "ankle_roll": 5}
-            if abs(axes[4] - 1) > 0 and abs(axes[5] - 1) == 0:
-                at |= {"ankle_pitch": 5, "ankle_roll": 4}
+            ankle = (
+                ("ankle_pitch", "ankle_roll")
+                if "pitch" in model.joint(joints[4]).name
+                else ("ankle_roll", "ankle_pitch")
+            )
+            hips = [f"hip_{('roll', 'pitch', 'yaw')[axis]}" for axis in leg.hips.order]
+            at = {role: number for number, role in enumerate([*hips, "knee", *ankle])}
             for role in TORQUE_ROLES:
                 np.testing.assert_allclose(abs(ours[role][0]), abs(torque[at[role]]), atol=1e-6, err_msg=role)
 
@@ -78,7 +81,7 @@ def test_casadi_and_numpy_agree_about_a_leg(walker):
         leg = walker.legs[limb]
         for _, _, _, com, position, rotation in random_legs(walker, limb, rng, 20):
             ankle = position + rotation @ leg.ankle_in_sole
-            posture = [leg.hip_in_com, ankle, rotation.ravel(), [leg.thigh, leg.shin]]
+            posture = [leg.hip_in_com, ankle, rotation.ravel(), [leg.thigh, leg.shin, 1.0, 0.0], leg.hips.numbers]
             parameters = np.concatenate([*posture, leg_limits(leg, wanted)])
             rows = np.array(pieces()["leg"].value(ca.vertcat(com, 0.0), parameters)).reshape(-1, 2).min(1)
             found = leg_posture(leg, com[None], np.zeros(1), position[None], rotation[None])
@@ -104,6 +107,8 @@ def test_casadi_and_numpy_agree_about_torques(walker):
                 position + rotation @ leg.ankle_in_sole,
                 rotation.ravel(),
                 [leg.thigh, leg.shin],
+                [1.0, 0.0],
+                leg.hips.numbers,
                 position,
                 limits,
                 [0.8],
@@ -136,6 +141,7 @@ def test_every_limit_is_noticed(walker, motion):
         "knee torque": replace(motion, force=8 * motion.force),
         "hip pitch torque": replace(motion, cop=motion.cop + [0.6, 0.0]),
         "hip roll torque": replace(motion, cop=motion.cop + [0.0, 0.6]),
+        "hip yaw torque": replace(motion, yaw_torque=motion.yaw_torque + 1000.0),
         "ankle pitch torque": replace(motion, cop=motion.cop + [0.6, 0.0]),
         "ankle roll torque": replace(motion, cop=motion.cop + [0.0, 0.6]),
     }

@@ -15,13 +15,18 @@ def turn(axis, angle):
 
 def chain(leg, com, heading, angles):
     """Hip, knee, ankle, sole (3,) m and world_from_sole of a leg with joint angles in the order of `ROLES`."""
-    frames = [turn(_AXES["yaw"], heading)]
-    for role, angle in zip(ROLES, angles, strict=True):
-        frames.append(frames[-1] @ turn(_AXES["pitch" if role == "knee" else role.partition("_")[2]], angle))
-    hip = com + frames[0] @ leg.hip_in_com
-    knee = hip - leg.thigh * frames[3][:, 2]
-    ankle = knee - leg.shin * frames[4][:, 2]
-    return hip, knee, ankle, ankle - frames[6] @ leg.ankle_in_sole, frames[6]
+    base, angle_of = turn(_AXES["yaw"], heading), dict(zip(ROLES, angles, strict=True))
+    thigh = base
+    for number in leg.hips.order:
+        axis = ("roll", "pitch", "yaw")[number]
+        thigh = thigh @ turn(_AXES[axis], angle_of[f"hip_{axis}"])
+    thigh = thigh @ turn(_AXES["pitch"], -np.arctan2(leg.hips.skew[1], leg.hips.skew[0]))
+    shin = thigh @ turn(_AXES["pitch"], angle_of["knee"])
+    sole = shin @ turn(_AXES["pitch"], angle_of["ankle_pitch"]) @ turn(_AXES["roll"], angle_of["ankle_roll"])
+    hip = com + base @ leg.hip_in_com
+    knee = hip - leg.thigh * thigh[:, 2]
+    ankle = knee - leg.shin * shin[:, 2]
+    return hip, knee, ankle, ankle - sole @ leg.ankle_in_sole, sole
 
 
 def angles_of(posture):

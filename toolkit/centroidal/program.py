@@ -341,10 +341,9 @@ class Program:
             here = np.flatnonzero(limbs == limb)
             at, rotation = knots[here], rotations[here]
             ankle = positions[here] + rotation @ leg.ankle_in_sole
-            hip = (self._heading @ leg.hip_in_com)[at]
             limits = np.tile(leg_limits(leg, self._body), (len(at), 1))
-            posture = [hip, ankle, rotation.reshape(-1, 9), np.tile([leg.thigh, leg.shin], (len(at), 1)), limits]
-            parts.append((at, self.layout.legs(at, limb), np.column_stack(posture)))
+            posture = _posture_parameters(leg, self._heading[at], ankle, rotation)
+            parts.append((at, self.layout.legs(at, limb), np.column_stack([posture, limits])))
         return _joined(parts, LEG_ROWS)
 
     def _torques(self) -> Block:
@@ -353,16 +352,12 @@ class Program:
         for limb in FEET:
             leg, step = self.robot.legs[limb], np.flatnonzero(p.active[:, limb])
             sole, rotation = p.position[step, limb], p.rotation[step, limb]
-            fixed = [leg.thigh, leg.shin], [leg.torques[role] / self._weight for role in TORQUE_ROLES]
-            links, limits = (np.tile(item, (len(step), 1)) for item in fixed)
+            limits = [leg.torques[role] / self._weight for role in TORQUE_ROLES]
             parameters = [
                 p.dt[step] / 2,
-                (self._middle_heading @ leg.hip_in_com)[step],
-                sole + rotation @ leg.ankle_in_sole,
-                rotation.reshape(-1, 9),
-                links,
+                _posture_parameters(leg, self._middle_heading[step], sole + rotation @ leg.ankle_in_sole, rotation),
                 sole,
-                limits,
+                np.tile(limits, (len(step), 1)),
                 np.full(len(step), self._body.torque),
             ]
             parts.append((step, self.layout.torques(step, limb), np.column_stack(parameters)))
@@ -479,6 +474,12 @@ def leg_limits(leg: LegGeometry, margins: ReachMargins) -> np.ndarray:
     """Parameters of the limits of a leg: lower and upper end of each, in order, then the wanted margins."""
     ranges = [limit.range_of(leg) for limit in PLANNED]
     return np.concatenate([*ranges, [getattr(margins, name) for name in MARGINS]])
+
+
+def _posture_parameters(leg: LegGeometry, base: np.ndarray, ankle: np.ndarray, sole: np.ndarray) -> np.ndarray:
+    """(n, p) parameters of a leg's posture: base and sole (n, 3, 3) in the world, and ankle (n, 3) m."""
+    fixed = np.tile([leg.thigh, leg.shin], (len(base), 1)), np.tile(leg.hips.numbers, (len(base), 1))
+    return np.column_stack([base @ leg.hip_in_com, ankle, sole.reshape(-1, 9), fixed[0], base[:, :2, 0], fixed[1]])
 
 
 def _joined(parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]], rows: int) -> Block:

@@ -1,13 +1,16 @@
 """A leg of two links in closed form: joint angles, points and torques from the CoM, the base's heading and the sole.
 
 The base stands upright at the heading psi and its CoM c where the home posture has it; the hip is a ball joint of yaw,
-roll and pitch, the ankle one of pitch and roll (the usual humanoid leg). With
+roll and pitch in any order, the ankle one of pitch and roll (the usual humanoid leg). With
 
     h = R_sole^T (c + Rz(psi) hip_in_com - p) - ankle_in_sole        hip seen from the ankle, in the sole frame
 
 all six joint angles follow: the ankle rolls until h lies in the plane of the leg, the cosine rule gives the knee and
 the shin, and the thigh's frame seen from the base gives the hip. Where a leg has no ankle roll, that angle is the one
 by which its foot rolls on the ground.
+
+The order of a hip's joints (`toolkit.robot.model.HipJoints`) decides what its motors bear: a yaw joint below the others
+lies along the thigh, and on a bent leg it carries part of the weight, which one at the top never does.
 
 The laws serve numbers in compiled code, arrays and CasADi's symbols. A vector is anything with components v[0], v[1]
 and v[2], and a rotation has components r[i, j]. Each component is a number, an array (n,) or a symbol.
@@ -21,7 +24,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from toolkit.compiled import law
-from toolkit.robot.model import LegGeometry
+from toolkit.robot.model import HipJoints, LegGeometry
 
 _STRAIGHT = 0.9999  # largest |cosine| or |sine| whose angle is taken, so that derivatives stay finite
 
@@ -75,7 +78,7 @@ LIMITS = (
 )
 """All limits of a leg, for the screens, the optimiser and the checks."""
 PLANNED = tuple(limit for limit in LIMITS if limit.planned)
-TORQUE_ROLES = ("knee", "hip_pitch", "hip_roll", "ankle_pitch", "ankle_roll")
+TORQUE_ROLES = ("knee", "hip_roll", "hip_pitch", "hip_yaw", "ankle_pitch", "ankle_roll")
 
 
 class LegPosture(NamedTuple):
@@ -84,7 +87,8 @@ class LegPosture(NamedTuple):
     Attributes:
         length: m; hip to ankle. Where the two links are too short, the angles are those of a nearly straight leg.
         ankle_pitch, ankle_roll, hip_pitch, hip_roll, hip_yaw, knee: rad.
-        pitch_axis: Unit vector; axis of hip pitch, knee and ankle pitch in the world.
+        pitch_axis: Unit vector; axis of knee and ankle pitch in the world.
+        hip_axes: Unit vectors; axes of hip roll, pitch and yaw in the world.
         hip_point, knee_point, ankle_point: m.
     """
 
@@ -96,6 +100,7 @@ class LegPosture(NamedTuple):
     hip_yaw: Any
     knee: Any
     pitch_axis: tuple
+    hip_axes: tuple
     hip_point: tuple
     knee_point: tuple
     ankle_point: tuple
@@ -147,11 +152,97 @@ def _kept(cosine):
 
 
 @law
-def posture_between(hip, ankle, rotation, heading, thigh, shin, tiny=0.0):
+def hip_joints(numbers):
+    """`HipJoints` of their nine `numbers`, which may be symbols."""
+    n = numbers
+    return HipJoints((n[0], n[1], n[2]), n[3], (n[4], n[5], n[6]), (n[7], n[8]))
+
+
+@law
+def _picked(number, items):
+    """One of three items by its number, which may be a symbol."""
+    return (number == 0) * items[0] + (number == 1) * items[1] + (number == 2) * items[2]
+
+
+@law
+def _picked_vector(number, vectors):
+    """One of three vectors by its number."""
+    a, b, c = vectors
+    return (
+        _picked(number, (a[0], b[0], c[0])),
+        _picked(number, (a[1], b[1], c[1])),
+        _picked(number, (a[2], b[2], c[2])),
+    )
+
+
+@law
+def _by_axis(order, items):
+    """What belongs to the joints of a hip from the base down, in the order roll, pitch, yaw."""
+    a, b, c = order
+    return (
+        (a == 0) * items[0] + (b == 0) * items[1] + (c == 0) * items[2],
+        (a == 1) * items[0] + (b == 1) * items[1] + (c == 1) * items[2],
+        (a == 2) * items[0] + (b == 2) * items[1] + (c == 2) * items[2],
+    )
+
+
+@law
+def _cross(a, b):
+    """Cross product of two vectors."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@law
+def _in_base(v, heading):
+    """A vector of the world in the axes of a base with that heading."""
+    c, s = heading[0], heading[1]
+    return c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]
+
+
+@law
+def _hip_angles(thigh, joints):
+    """Angles of hip roll, pitch and yaw in rad of the thigh's axes x, y and z in the axes of the base.
+
+    A rotation about three axes i, j, k in turn has sin(middle) = s R_ik, tan(first) = -s R_jk / R_kk and
+    tan(last) = -s R_ij / R_ii, with s = 1 where i, j, k are cyclic and -1 where they are not.
+    """
+    i, j, k = joints.order
+    last, s = _picked_vector(k, thigh), joints.sign
+    by_last, by_middle = _picked(i, last), _picked(i, _picked_vector(j, thigh))
+    return _by_axis(
+        joints.order,
+        (
+            np.arctan2(-s * _picked(j, last), _picked(k, last)),
+            np.arcsin(_kept(s * by_last)),
+            np.arctan2(-s * by_middle, _picked(i, _picked_vector(i, thigh))),
+        ),
+    )
+
+
+@law
+def _hip_axes(thigh, heading, joints, tiny):
+    """Axes of hip roll, pitch and yaw in the world, of the thigh's axes x, y and z in the world.
+
+    The first joint turns with the base, the last one with the thigh, and the one between is normal to both.
+    """
+    c, s, base = heading[0], heading[1], joints.first
+    first = (c * base[0] - s * base[1], s * base[0] + c * base[1], base[2])
+    last = _picked_vector(joints.order[2], thigh)
+    x, y, z = _cross(last, first)
+    scale = joints.sign / np.sqrt(x * x + y * y + z * z + tiny)
+    middle = (scale * x, scale * y, scale * z)
+    a = _by_axis(joints.order, (first[0], middle[0], last[0]))
+    b = _by_axis(joints.order, (first[1], middle[1], last[1]))
+    c = _by_axis(joints.order, (first[2], middle[2], last[2]))
+    return (a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2])
+
+
+@law
+def posture_between(hip, ankle, rotation, heading, thigh, shin, joints, tiny=0.0):
     """Posture of a leg of two links in m between a hip and an ankle in m in the world.
 
-    The rotation is world_from_sole, the heading the cosine and sine of the base's. `tiny` in m^2 is added to squares
-    under roots where derivatives are needed, so that they stay finite.
+    The rotation is world_from_sole, the heading the cosine and sine of the base's, the joints the `HipJoints`. `tiny`
+    in m^2 is added to squares under roots where derivatives are needed, so that they stay finite.
     """
     r = rotation
     dx, dy, dz = hip[0] - ankle[0], hip[1] - ankle[1], hip[2] - ankle[2]
@@ -164,20 +255,29 @@ def posture_between(hip, ankle, rotation, heading, thigh, shin, tiny=0.0):
     at_ankle = np.arccos(_kept((square + shin * shin - thigh * thigh) / (2.0 * shin * length)))
     at_knee = np.arccos(_kept((thigh * thigh + shin * shin - square) / (2.0 * thigh * shin)))
     lean = np.arctan2(x, np.sqrt(y * y + z * z + tiny)) + at_ankle  # of the shin, towards the toes
-    axis = turned(r, (0.0, np.cos(roll), -np.sin(roll)))
+    across = turned(r, (0.0, np.cos(roll), -np.sin(roll)))
     ux, uy, uz = turned(r, (np.sin(lean), np.sin(roll) * np.cos(lean), np.cos(roll) * np.cos(lean)))
     knee = (ankle[0] + shin * ux, ankle[1] + shin * uy, ankle[2] + shin * uz)
-    tx, ty, tz = hip[0] - knee[0], hip[1] - knee[1], hip[2] - knee[2]
-    c, s = heading[0], heading[1]
+    up = ((hip[0] - knee[0]) / thigh, (hip[1] - knee[1]) / thigh, (hip[2] - knee[2]) / thigh)
+    ahead = _cross(across, up)
+    k, q = joints.skew
+    axes = (
+        (k * ahead[0] - q * up[0], k * ahead[1] - q * up[1], k * ahead[2] - q * up[2]),
+        across,
+        (k * up[0] + q * ahead[0], k * up[1] + q * ahead[1], k * up[2] + q * ahead[2]),
+    )
+    inside = (_in_base(axes[0], heading), _in_base(axes[1], heading), _in_base(axes[2], heading))
+    hip_roll, hip_pitch, hip_yaw = _hip_angles(inside, joints)
     return LegPosture(
         length,
         -lean,
         roll,
-        np.arctan2(axis[1] * tx - axis[0] * ty, tz),
-        np.arcsin(_kept(axis[2])),
-        np.arctan2(-c * axis[0] - s * axis[1], c * axis[1] - s * axis[0]),
+        hip_pitch,
+        hip_roll,
+        hip_yaw,
         np.pi - at_knee,
-        axis,
+        across,
+        _hip_axes(axes, heading, joints, tiny),
         (hip[0], hip[1], hip[2]),
         knee,
         (ankle[0], ankle[1], ankle[2]),
@@ -196,20 +296,19 @@ def _torque_about(axis, origin, point, force, moment):
 
 
 @law
-def joint_torques(posture, sole, rotation, force, moment, tiny=0.0):
+def joint_torques(posture, sole, rotation, force, moment):
     """Static torques of a stance leg about its joints, its own weight left out, in the order of `TORQUE_ROLES`.
 
     The sole is the position of its centre in m, and the rotation world_from_sole. The force in N acts on the sole, with
-    the moment in N m about its centre; all are in the world. `tiny` is as in `posture_between`.
+    the moment in N m about its centre; all are in the world.
     """
-    w = posture.pitch_axis
-    flat = np.sqrt(w[0] * w[0] + w[1] * w[1] + tiny)
-    hip_roll, ankle_roll = (w[1] / flat, -w[0] / flat, 0.0), (rotation[0, 0], rotation[1, 0], rotation[2, 0])
+    ankle_roll = (rotation[0, 0], rotation[1, 0], rotation[2, 0])
     return (
-        _torque_about(w, posture.knee_point, sole, force, moment),
-        _torque_about(w, posture.hip_point, sole, force, moment),
-        _torque_about(hip_roll, posture.hip_point, sole, force, moment),
-        _torque_about(w, posture.ankle_point, sole, force, moment),
+        _torque_about(posture.pitch_axis, posture.knee_point, sole, force, moment),
+        _torque_about(posture.hip_axes[0], posture.hip_point, sole, force, moment),
+        _torque_about(posture.hip_axes[1], posture.hip_point, sole, force, moment),
+        _torque_about(posture.hip_axes[2], posture.hip_point, sole, force, moment),
+        _torque_about(posture.pitch_axis, posture.ankle_point, sole, force, moment),
         _torque_about(ankle_roll, posture.ankle_point, sole, force, moment),
     )
 
@@ -228,7 +327,7 @@ def leg_posture(
     """
     heading, r = (np.cos(yaw), np.sin(yaw)), np.moveaxis(rotation, 0, -1)
     hip, ankle = hip_at(com.T, heading, leg.hip_in_com), ankle_at(position.T, r, leg.ankle_in_sole)
-    return posture_between(hip, ankle, r, heading, leg.thigh, leg.shin)
+    return posture_between(hip, ankle, r, heading, leg.thigh, leg.shin, leg.hips)
 
 
 def leg_clearances(leg: LegGeometry, posture: LegPosture, margins: ReachMargins) -> dict[str, np.ndarray]:

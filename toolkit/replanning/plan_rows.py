@@ -10,7 +10,7 @@ from toolkit.centroidal.body import BodyMargins, lowest_foot
 from toolkit.centroidal.problem import CentroidalProblem
 from toolkit.centroidal.program import Layout, Program, Regularisers
 from toolkit.centroidal.stages.blocks import Block
-from toolkit.centroidal.stages.rows import DISTANCE_ROWS, LEG_ROWS, TORQUE_ROWS
+from toolkit.centroidal.stages.rows import DISTANCE_ROWS, LEG_ROWS, POSTURE, TORQUE_ROWS
 from toolkit.centroidal.stages.steps import STATE
 from toolkit.geometry.limb import FEET
 from toolkit.replanning.situation import HorizonContacts
@@ -21,7 +21,8 @@ BODY = BodyMargins(length=0.007, ankle=0.05, hip=0.025, height=0.01, torque=0.92
 
 They are smaller than the plan's, so that a correction has some room.
 """
-_LEG_ANKLE, _TORQUE_ANKLE, _TORQUE_SOLE = slice(3, 6), slice(4, 7), slice(18, 21)  # among the parameters of the rows
+# Among the parameters of the rows.
+_LEG_ANKLE, _TORQUE_ANKLE, _TORQUE_SOLE = slice(3, 6), slice(4, 7), slice(1 + POSTURE, 4 + POSTURE)
 _TANGENTS = 10  # first parameter of a distance that says how its tip follows displacements
 
 

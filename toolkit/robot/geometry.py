@@ -12,7 +12,7 @@ from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rolled_onto
 from toolkit.robot.chain import arm_joints, joints_to
-from toolkit.robot.model import ArmGeometry, LegGeometry
+from toolkit.robot.model import ArmGeometry, HipJoints, LegGeometry
 from toolkit.robot.rolling import rolling_range
 
 STRAIGHT_LEG_MARGIN = 0.015  # share of the length from hip to ankle
@@ -50,8 +50,9 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
         ankle = _axes_crossing(data, [roles["ankle_pitch"], roles["ankle_roll"]])
     upward_thigh, upward_shin = _across(hip - knee, across), _across(knee - ankle, across)
     thigh, shin = float(np.linalg.norm(upward_thigh)), float(np.linalg.norm(upward_shin))
+    hips, skew = _hip_joints(data, roles, base, np.cross(across, upward_thigh / thigh), upward_thigh / thigh)
     angles = {
-        "hip_pitch": _angle(base[:, 2], upward_thigh, across),
+        "hip_pitch": _angle(base[:, 2], upward_thigh, across) + skew,
         "knee": _angle(upward_thigh, upward_shin, across),
         "ankle_pitch": _angle(upward_shin, sole[:, 2], across),
     }
@@ -91,6 +92,7 @@ def leg_geometry(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> LegG
         ),
         ranges=ranges,
         torques=torques,
+        hips=hips,
     )
 
 
@@ -169,6 +171,23 @@ def _shared_ranges(
         shares = np.fmin(high / most, low / least)[oblique]
     share = float(np.clip(np.fmin(shares.min(), 1.0), 0.0, 1.0))
     return {hips[k]: (share * float(low[k]), share * float(high[k])) for k in oblique}
+
+
+def _hip_joints(
+    data: mujoco.MjData, roles: Mapping[str, int], base: np.ndarray, ahead: np.ndarray, up: np.ndarray
+) -> tuple[HipJoints, float]:
+    """How a hip's joints follow each other, and the skew in rad of the thigh's axes.
+
+    The thigh's line goes `up` from knee to hip, and `ahead` is normal to it and to the axis of the knee.
+    """
+    order = sorted(range(3), key=lambda axis: roles[f"hip_{_ROLES[axis]}"])
+    axes = data.xaxis[[roles[f"hip_{_ROLES[axis]}"] for axis in order]]
+    axes = axes * np.sign(np.sum(axes.T * base[:, order], 0))[:, None]
+    x, z = axes[2] @ ahead, axes[2] @ up
+    skew = {"roll": np.arctan2(-z, x), "pitch": 0.0, "yaw": np.arctan2(x, z)}[_ROLES[order[2]]]
+    sign = 1.0 if (order[1] - order[0]) % 3 == 1 else -1.0
+    hips = HipJoints(tuple(order), sign, tuple(base.T @ axes[0]), (float(np.cos(skew)), float(np.sin(skew))))
+    return hips, float(skew)
 
 
 def _leg_roles(model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], limb: Limb) -> dict[str, int]:

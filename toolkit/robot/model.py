@@ -52,6 +52,28 @@ class LimbModel:
         return np.array([self.half_size[0], LINE]) if self.rolls else self.half_size
 
 
+class HipJoints(NamedTuple):
+    """How the three joints of a hip follow each other.
+
+    Attributes:
+        order: The axes that they turn about, from the base down: 0 roll (x), 1 pitch (y), 2 yaw (z).
+        sign: 1 where that order is cyclic (as yaw, roll, pitch), else -1.
+        first: Axis of the first joint, a unit vector in the axes of the base.
+        skew: Cosine and sine of the angle, about the pitch axis, from the line hip to knee to the thigh's axis of roll
+            or yaw, where the last joint turns about that; 1 and 0 where it is pitch.
+    """
+
+    order: tuple = (2, 0, 1)
+    sign: float = 1.0
+    first: tuple = (0.0, 0.0, 1.0)
+    skew: tuple = (1.0, 0.0)
+
+    @property
+    def numbers(self) -> list[float]:
+        """All of it as nine numbers, for arrays of parameters."""
+        return [*map(float, self.order), self.sign, *self.first, *self.skew]
+
+
 @dataclass(frozen=True)
 class LegGeometry:
     """A leg as two links between hip centre and ankle centre, for constraints on the CoM (derived on load).
@@ -65,6 +87,7 @@ class LegGeometry:
             Signs: roll about x, pitch about y, yaw about z of the base or sole; a flexed knee is positive. The ankle
             roll of a sole that rolls is how far its shapes let it roll.
         torques: Torque limits by the same roles, N m.
+        hips: How the hip's joints follow each other.
     """
 
     hip_in_com: np.ndarray
@@ -75,6 +98,7 @@ class LegGeometry:
     max_length: float
     ranges: dict[str, tuple[float, float]]
     torques: dict[str, float]
+    hips: HipJoints = HipJoints()
 
 
 class LegMass(NamedTuple):

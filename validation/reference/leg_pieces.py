@@ -8,7 +8,7 @@ import casadi as ca
 
 from toolkit.centroidal.stages.rows import MARGINS, TINY
 from toolkit.centroidal.stages.steps import WRENCH
-from toolkit.physics.leg import PLANNED, LegPosture, joint_torques, posture_between
+from toolkit.physics.leg import PLANNED, TORQUE_ROLES, LegPosture, hip_joints, joint_torques, posture_between
 from validation.reference.assembly import Parameters, Piece
 
 
@@ -28,16 +28,18 @@ def stretched(multiplier: ca.SX, reach: ca.SX, length: ca.SX, v: ca.SX) -> ca.SX
 
 
 def _posture(com: ca.SX, p: Parameters, offset: ca.SX) -> tuple[LegPosture, ca.SX]:
-    """Posture of a leg, whose hip yaw is not meaningful, and world_from_sole.
+    """Posture of a leg, and world_from_sole.
 
     Parameters: hip relative to the CoM in the world (3), ankle in the world (3), R of the sole (9, row-major), thigh,
-    shin. The sole is displaced by `offset` (2 or none) along its own axes.
+    shin, cosine and sine of the base's heading, numbers of the hip's joints (9). The sole is displaced by `offset` (2
+    or none) along its own axes.
     """
     if hasattr(ca.GlobalOptions, "setNumpyMode"):  # since CasADi 3.8: let NumPy's functions take symbols, silently
         ca.GlobalOptions.setNumpyMode(-1)
     hip_offset, ankle, rotation = p(3), p(3), ca.reshape(p(9), 3, 3).T
     hip, ankle = com + hip_offset, ankle + displacement(rotation, offset)
-    return posture_between(hip, ankle, rotation, (1.0, 0.0), p(), p(), TINY), rotation
+    thigh, shin, heading, joints = p(), p(), p(2), hip_joints(p(9))
+    return posture_between(hip, ankle, rotation, heading, thigh, shin, joints, TINY), rotation
 
 
 def leg(moving: bool) -> Piece:
@@ -65,22 +67,22 @@ def leg(moving: bool) -> Piece:
 def torque(moving: bool) -> Piece:
     """Joint torques of a stance leg in the middle of a step.
 
-    Parameters: half of dt; those of `_posture`; sole position (3); (5) torque limits of knee, hip pitch, hip roll,
-    ankle pitch, ankle roll in weights times 1 m; wanted part of the limits.
+    Parameters: half of dt; those of `_posture`; sole position (3); torque limits in the order of `TORQUE_ROLES` in
+    weights times 1 m; wanted part of the limits.
     """
     p = Parameters()
     com, velocity, wrench = ca.SX.sym("c", 3), ca.SX.sym("v", 3), ca.SX.sym("w", WRENCH)
     slack, half_dt = ca.SX.sym("s"), p()
     middle, offset = ca.SX.sym("middle", 3), ca.SX.sym("d", 2 * moving)
     posture, rotation = _posture(middle, p, offset)
-    sole, limits, wanted = p(3) + displacement(rotation, offset), p(5), p()
+    sole, limits, wanted = p(3) + displacement(rotation, offset), p(len(TORQUE_ROLES)), p()
     force, moment = rotation @ wrench[:3], rotation @ wrench[3:]
-    ratio = ca.vertcat(*joint_torques(posture, sole, rotation, force, moment, TINY)) / limits
+    ratio = ca.vertcat(*joint_torques(posture, sole, rotation, force, moment)) / limits
     reduced = ca.vertcat(middle, wrench, offset)
     slope = ca.jacobian(ratio, reduced)
     by_offset = slope[:, 9:]
     slope = ca.horzcat(slope[:, :3], half_dt * slope[:, :3], slope[:, 3:9])  # the middle is com + dt / 2 velocity
-    part, gain = wanted + (1 - wanted) * slack, ca.repmat(1 - wanted, 5, 1)
+    part, gain = wanted + (1 - wanted) * slack, ca.repmat(1 - wanted, len(TORQUE_ROLES), 1)
     rows = ca.vertcat(part - ratio, part + ratio)
     jacobian = ca.vertcat(ca.horzcat(-slope, gain, -by_offset), ca.horzcat(slope, gain, by_offset))
     rows, jacobian = ca.substitute([rows, jacobian], [middle], [com + half_dt * velocity])

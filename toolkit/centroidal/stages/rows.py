@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.compiled import compiled
-from toolkit.physics.leg import PLANNED, LegPosture, joint_torques, posture_between, turned
+from toolkit.physics.leg import PLANNED, TORQUE_ROLES, LegPosture, hip_joints, joint_torques, posture_between, turned
 from toolkit.physics.wrench import SIGNS, pressure_rows, yaw_row
 
 SHARPNESS, STRETCH = 10.0, 5.0
@@ -26,19 +26,20 @@ EVEN = 0.1  # part of a slack's price that is on its square, so that slacks are 
 UNLOADED = 0.01  # weights added to a normal force under a CoP: an unloaded contact has none
 CONE, FIRST_YAW = 0, 7
 CONTACT_ROWS = FIRST_YAW + 2 * len(SIGNS)
-LEG_ROWS, TORQUE_ROWS, DISTANCE_ROWS, FINAL_ROWS = 2 * len(PLANNED), 10, 2, 6
+LEG_ROWS, TORQUE_ROWS, DISTANCE_ROWS, FINAL_ROWS = 2 * len(PLANNED), 2 * len(TORQUE_ROLES), 2, 6
 MARGINS = tuple(dict.fromkeys(limit.margin for limit in PLANNED))
 _QUANTITY = tuple(LegPosture._fields.index(limit.quantity) for limit in PLANNED)
 _MARGIN = tuple(MARGINS.index(limit.margin) for limit in PLANNED)
 _FACTOR = tuple(STRETCH if limit.quantity == "length" else 1.0 for limit in PLANNED)
 _LENGTH = next(number for number, limit in enumerate(PLANNED) if limit.quantity == "length")
-_FORWARD = (1.0, 0.0)  # a heading; the angles that depend on it are not planned
 
 # Parameters of a contact.
 _MU, _HALF, _WANTED, _COP, _YAW = 0, 1, 3, 4, 6
 _LEAST, _LEAST_COP, _LEAST_YAW, _WEIGHTS, _LOAD, _PRICE = 7, 8, 10, 11, 17, 18
-# Parameters of a leg's posture: hip from the CoM, ankle, rotation of the sole, thigh, shin.
-_HIP, _ANKLE, _TURN, _LINKS, POSTURE = 0, 3, 6, 15, 17
+# Parameters of a leg's posture: hip from the CoM, ankle, rotation of the sole, thigh, shin, cosine and sine of the
+# base's heading, numbers of the hip's joints.
+_HIP, _ANKLE, _TURN, _LINKS, _HEADING, _JOINTS, POSTURE = 0, 3, 6, 15, 17, 19, 28
+_LIMITS, _TORQUES = POSTURE + 3, len(TORQUE_ROLES)  # of torques, after those and the place of the sole
 
 
 @compiled(reordered=True)
@@ -201,9 +202,9 @@ def scatter(local, force, index, hessian, gradient):
 
 @compiled(reordered=True)
 def posture(p, turn, x, y, z):
-    """Posture of a leg whose hip is at (x, y, z); the angle of its yaw has no meaning."""
-    ankle = p[_ANKLE], p[_ANKLE + 1], p[_ANKLE + 2]
-    return posture_between((x, y, z), ankle, turn, _FORWARD, p[_LINKS], p[_LINKS + 1], TINY)
+    """Posture of a leg whose hip is at (x, y, z)."""
+    ankle, heading = (p[_ANKLE], p[_ANKLE + 1], p[_ANKLE + 2]), (p[_HEADING], p[_HEADING + 1])
+    return posture_between((x, y, z), ankle, turn, heading, p[_LINKS], p[_LINKS + 1], hip_joints(p[_JOINTS:]), TINY)
 
 
 @compiled(reordered=True)
@@ -341,38 +342,38 @@ def fill_torques(block, y):
     """Joint torques of stance legs in the middle of steps.
 
     Variables: CoM (3), velocity (3), wrench (6), slack of the body, displacement of the sole (2 or none). Parameters:
-    half of dt; the posture's; sole (3); limits of knee, hip pitch, hip roll, ankle pitch, ankle roll in weights times
-    1 m; wanted part of the limits.
+    half of dt; the posture's; sole (3); limits in the order of `TORQUE_ROLES` in weights times 1 m; wanted part of
+    the limits.
     """
-    slopes, hip, com = np.empty((5, 9)), np.empty(3), np.empty(3)
+    slopes, hip, com = np.empty((_TORQUES, 9)), np.empty(3), np.empty(3)
     for i in range(block.stage.shape[0]):
         p, half, t, index = block.parameters[i, 1:], block.parameters[i, 0], block.stage[i], block.variables[i]
         turn, offset, wrench = p[_TURN : _TURN + 9].reshape(3, 3), index[13:], y[t, index[6] :]
-        sole, limits, wanted = p[POSTURE : POSTURE + 3], p[POSTURE + 3 : POSTURE + 8], p[POSTURE + 8]
+        sole, limits, wanted = p[POSTURE:_LIMITS], p[_LIMITS : _LIMITS + _TORQUES], p[_LIMITS + _TORQUES]
         for a in range(3):
             com[a] = y[t, a] + half * y[t, 3 + a]
         hip_of(p, turn, y, t, com, offset, hip)
         now = posture(p, turn, hip[0], hip[1], hip[2])
         for k in range(3):  # linear in the wrench
             axis = turn[0, k], turn[1, k], turn[2, k]
-            by_force = joint_torques(now, sole, turn, axis, (0.0, 0.0, 0.0), TINY)
-            by_moment = joint_torques(now, sole, turn, (0.0, 0.0, 0.0), axis, TINY)
-            for q in range(5):
+            by_force = joint_torques(now, sole, turn, axis, (0.0, 0.0, 0.0))
+            by_moment = joint_torques(now, sole, turn, (0.0, 0.0, 0.0), axis)
+            for q in range(_TORQUES):
                 slopes[q, 3 + k], slopes[q, 6 + k] = by_force[q] / limits[q], by_moment[q] / limits[q]
         force, moment = turned(turn, wrench), turned(turn, wrench[3:])
-        here = joint_torques(now, sole, turn, force, moment, TINY)
+        here = joint_torques(now, sole, turn, force, moment)
         for a in range(3):
             hip[a] += NUDGE
-            beside = joint_torques(posture(p, turn, hip[0], hip[1], hip[2]), sole, turn, force, moment, TINY)
+            beside = joint_torques(posture(p, turn, hip[0], hip[1], hip[2]), sole, turn, force, moment)
             hip[a] -= NUDGE
-            for q in range(5):
+            for q in range(_TORQUES):
                 slopes[q, a] = (beside[q] - here[q]) / NUDGE / limits[q]
         part = wanted + (1.0 - wanted) * y[t, index[12]]
-        for q in range(5):
+        for q in range(_TORQUES):
             block.value[i, q] = part - here[q] / limits[q]
-            block.value[i, 5 + q] = part + here[q] / limits[q]
+            block.value[i, _TORQUES + q] = part + here[q] / limits[q]
             for side in range(2):
-                sign, out = (-1.0 if side == 0 else 1.0), block.slope[i, 5 * side + q]
+                sign, out = (-1.0 if side == 0 else 1.0), block.slope[i, _TORQUES * side + q]
                 for a in range(3):
                     out[a], out[3 + a] = sign * slopes[q, a], sign * half * slopes[q, a]
                 for k in range(6):
