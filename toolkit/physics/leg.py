@@ -88,7 +88,9 @@ class LegPosture(NamedTuple):
         length: m; hip to ankle. Where the two links are too short, the angles are those of a nearly straight leg.
         ankle_pitch, ankle_roll, hip_pitch, hip_roll, hip_yaw, knee: rad.
         pitch_axis: Unit vector; axis of knee and ankle pitch in the world.
-        hip_axes: Unit vectors; axes of hip roll, pitch and yaw in the world.
+        thigh_axes: Unit vectors; x, y and z axis of the thigh that the last hip joint turns, in the axes of the base.
+        heading: Cosine and sine of the base's.
+        hips: How the hip's joints follow each other.
         hip_point, knee_point, ankle_point: m.
     """
 
@@ -100,7 +102,9 @@ class LegPosture(NamedTuple):
     hip_yaw: Any
     knee: Any
     pitch_axis: tuple
-    hip_axes: tuple
+    thigh_axes: tuple
+    heading: tuple
+    hips: HipJoints
     hip_point: tuple
     knee_point: tuple
     ankle_point: tuple
@@ -126,9 +130,8 @@ def turned(rotation, v):
 @law
 def hip_at(com, heading, hip_in_com):
     """Hip in m in the world, of a CoM in m, cosine and sine of the base's heading, and the hip in the base's frame."""
-    c, s = heading[0], heading[1]
-    x, y = c * hip_in_com[0] - s * hip_in_com[1], s * hip_in_com[0] + c * hip_in_com[1]
-    return com[0] + x, com[1] + y, com[2] + hip_in_com[2]
+    x, y, z = _from_base(hip_in_com, heading)
+    return com[0] + x, com[1] + y, com[2] + z
 
 
 @law
@@ -152,10 +155,10 @@ def _kept(cosine):
 
 
 @law
-def hip_joints(numbers):
-    """`HipJoints` of their nine `numbers`, which may be symbols."""
-    n = numbers
-    return HipJoints((n[0], n[1], n[2]), n[3], (n[4], n[5], n[6]), (n[7], n[8]))
+def hip_joints(p, at):
+    """`HipJoints` of their nine `numbers`, which may be symbols, from an index of p on."""
+    order, first = (p[at], p[at + 1], p[at + 2]), (p[at + 4], p[at + 5], p[at + 6])
+    return HipJoints(order, p[at + 3], first, (p[at + 7], p[at + 8]))
 
 
 @law
@@ -200,6 +203,25 @@ def _in_base(v, heading):
 
 
 @law
+def _from_base(v, heading):
+    """A vector in the axes of a base with that heading, in the world."""
+    c, s = heading[0], heading[1]
+    return c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
+
+
+@law
+def _thigh_axes(across, line, thigh, joints):
+    """Axes x, y and z of the frame of the thigh that the last hip joint turns, of its pitch axis and its line in m."""
+    x, y, z = _cross(across, line)
+    k, q = joints.skew[0] / thigh, joints.skew[1] / thigh
+    return (
+        (k * x - q * line[0], k * y - q * line[1], k * z - q * line[2]),
+        across,
+        (k * line[0] + q * x, k * line[1] + q * y, k * line[2] + q * z),
+    )
+
+
+@law
 def _hip_angles(thigh, joints):
     """Angles of hip roll, pitch and yaw in rad of the thigh's axes x, y and z in the axes of the base.
 
@@ -220,14 +242,12 @@ def _hip_angles(thigh, joints):
 
 
 @law
-def _hip_axes(thigh, heading, joints, tiny):
-    """Axes of hip roll, pitch and yaw in the world, of the thigh's axes x, y and z in the world.
+def _hip_axes(thigh, joints, tiny):
+    """Axes of hip roll, pitch and yaw, of the thigh's axes x, y and z; unit vectors in the axes of the base.
 
     The first joint turns with the base, the last one with the thigh, and the one between is normal to both.
     """
-    c, s, base = heading[0], heading[1], joints.first
-    first = (c * base[0] - s * base[1], s * base[0] + c * base[1], base[2])
-    last = _picked_vector(joints.order[2], thigh)
+    first, last = joints.first, _picked_vector(joints.order[2], thigh)
     x, y, z = _cross(last, first)
     scale = joints.sign / np.sqrt(x * x + y * y + z * z + tiny)
     middle = (scale * x, scale * y, scale * z)
@@ -258,16 +278,13 @@ def posture_between(hip, ankle, rotation, heading, thigh, shin, joints, tiny=0.0
     across = turned(r, (0.0, np.cos(roll), -np.sin(roll)))
     ux, uy, uz = turned(r, (np.sin(lean), np.sin(roll) * np.cos(lean), np.cos(roll) * np.cos(lean)))
     knee = (ankle[0] + shin * ux, ankle[1] + shin * uy, ankle[2] + shin * uz)
-    up = ((hip[0] - knee[0]) / thigh, (hip[1] - knee[1]) / thigh, (hip[2] - knee[2]) / thigh)
-    ahead = _cross(across, up)
-    k, q = joints.skew
-    axes = (
-        (k * ahead[0] - q * up[0], k * ahead[1] - q * up[1], k * ahead[2] - q * up[2]),
-        across,
-        (k * up[0] + q * ahead[0], k * up[1] + q * ahead[1], k * up[2] + q * ahead[2]),
+    axes = _thigh_axes(
+        _in_base(across, heading),
+        _in_base((hip[0] - knee[0], hip[1] - knee[1], hip[2] - knee[2]), heading),
+        thigh,
+        joints,
     )
-    inside = (_in_base(axes[0], heading), _in_base(axes[1], heading), _in_base(axes[2], heading))
-    hip_roll, hip_pitch, hip_yaw = _hip_angles(inside, joints)
+    hip_roll, hip_pitch, hip_yaw = _hip_angles(axes, joints)
     return LegPosture(
         length,
         -lean,
@@ -277,7 +294,9 @@ def posture_between(hip, ankle, rotation, heading, thigh, shin, joints, tiny=0.0
         hip_yaw,
         np.pi - at_knee,
         across,
-        _hip_axes(axes, heading, joints, tiny),
+        axes,
+        heading,
+        joints,
         (hip[0], hip[1], hip[2]),
         knee,
         (ankle[0], ankle[1], ankle[2]),
@@ -296,18 +315,19 @@ def _torque_about(axis, origin, point, force, moment):
 
 
 @law
-def joint_torques(posture, sole, rotation, force, moment):
+def joint_torques(posture, sole, rotation, force, moment, tiny=0.0):
     """Static torques of a stance leg about its joints, its own weight left out, in the order of `TORQUE_ROLES`.
 
     The sole is the position of its centre in m, and the rotation world_from_sole. The force in N acts on the sole, with
-    the moment in N m about its centre; all are in the world.
+    the moment in N m about its centre; all are in the world. `tiny` is as in `posture_between`.
     """
+    heading, hips = posture.heading, _hip_axes(posture.thigh_axes, posture.hips, tiny)
     ankle_roll = (rotation[0, 0], rotation[1, 0], rotation[2, 0])
     return (
         _torque_about(posture.pitch_axis, posture.knee_point, sole, force, moment),
-        _torque_about(posture.hip_axes[0], posture.hip_point, sole, force, moment),
-        _torque_about(posture.hip_axes[1], posture.hip_point, sole, force, moment),
-        _torque_about(posture.hip_axes[2], posture.hip_point, sole, force, moment),
+        _torque_about(_from_base(hips[0], heading), posture.hip_point, sole, force, moment),
+        _torque_about(_from_base(hips[1], heading), posture.hip_point, sole, force, moment),
+        _torque_about(_from_base(hips[2], heading), posture.hip_point, sole, force, moment),
         _torque_about(posture.pitch_axis, posture.ankle_point, sole, force, moment),
         _torque_about(ankle_roll, posture.ankle_point, sole, force, moment),
     )

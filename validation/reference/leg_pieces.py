@@ -38,7 +38,7 @@ def _posture(com: ca.SX, p: Parameters, offset: ca.SX) -> tuple[LegPosture, ca.S
         ca.GlobalOptions.setNumpyMode(-1)
     hip_offset, ankle, rotation = p(3), p(3), ca.reshape(p(9), 3, 3).T
     hip, ankle = com + hip_offset, ankle + displacement(rotation, offset)
-    thigh, shin, heading, joints = p(), p(), p(2), hip_joints(p(9))
+    thigh, shin, heading, joints = p(), p(), p(2), hip_joints(p(9), 0)
     return posture_between(hip, ankle, rotation, heading, thigh, shin, joints, TINY), rotation
 
 
@@ -77,7 +77,7 @@ def torque(moving: bool) -> Piece:
     posture, rotation = _posture(middle, p, offset)
     sole, limits, wanted = p(3) + displacement(rotation, offset), p(len(TORQUE_ROLES)), p()
     force, moment = rotation @ wrench[:3], rotation @ wrench[3:]
-    ratio = ca.vertcat(*joint_torques(posture, sole, rotation, force, moment)) / limits
+    ratio = ca.vertcat(*joint_torques(posture, sole, rotation, force, moment, TINY)) / limits
     reduced = ca.vertcat(middle, wrench, offset)
     slope = ca.jacobian(ratio, reduced)
     by_offset = slope[:, 9:]

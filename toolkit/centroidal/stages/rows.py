@@ -204,7 +204,7 @@ def scatter(local, force, index, hessian, gradient):
 def posture(p, turn, x, y, z):
     """Posture of a leg whose hip is at (x, y, z)."""
     ankle, heading = (p[_ANKLE], p[_ANKLE + 1], p[_ANKLE + 2]), (p[_HEADING], p[_HEADING + 1])
-    return posture_between((x, y, z), ankle, turn, heading, p[_LINKS], p[_LINKS + 1], hip_joints(p[_JOINTS:]), TINY)
+    return posture_between((x, y, z), ankle, turn, heading, p[_LINKS], p[_LINKS + 1], hip_joints(p, _JOINTS), TINY)
 
 
 @compiled(reordered=True)
@@ -356,15 +356,15 @@ def fill_torques(block, y):
         now = posture(p, turn, hip[0], hip[1], hip[2])
         for k in range(3):  # linear in the wrench
             axis = turn[0, k], turn[1, k], turn[2, k]
-            by_force = joint_torques(now, sole, turn, axis, (0.0, 0.0, 0.0))
-            by_moment = joint_torques(now, sole, turn, (0.0, 0.0, 0.0), axis)
+            by_force = joint_torques(now, sole, turn, axis, (0.0, 0.0, 0.0), TINY)
+            by_moment = joint_torques(now, sole, turn, (0.0, 0.0, 0.0), axis, TINY)
             for q in range(_TORQUES):
                 slopes[q, 3 + k], slopes[q, 6 + k] = by_force[q] / limits[q], by_moment[q] / limits[q]
         force, moment = turned(turn, wrench), turned(turn, wrench[3:])
-        here = joint_torques(now, sole, turn, force, moment)
+        here = joint_torques(now, sole, turn, force, moment, TINY)
         for a in range(3):
             hip[a] += NUDGE
-            beside = joint_torques(posture(p, turn, hip[0], hip[1], hip[2]), sole, turn, force, moment)
+            beside = joint_torques(posture(p, turn, hip[0], hip[1], hip[2]), sole, turn, force, moment, TINY)
             hip[a] -= NUDGE
             for q in range(_TORQUES):
                 slopes[q, a] = (beside[q] - here[q]) / NUDGE / limits[q]

@@ -33,8 +33,7 @@ class Legs(NamedTuple):
     Attributes:
         hip: (2, 3) m; hips in the CoM's frame with the heading of the base.
         ankle: (2, 3) m; ankles in the sole's frame.
-        links: (2, 2) m; lengths of thigh and shin.
-        joints: (2, 9); numbers of the `HipJoints`.
+        links: (22,); lengths of thigh and shin in m and numbers of the `HipJoints`, of one leg after the other.
         ranges: (2, k, 2) m or rad; least and greatest values in the order of `LIMITS`.
         toes: (2,) rad; least and greatest heading of the left sole less that of the right one. The base turns between
             the feet as it likes, so that only both hips' yaw together bounds them.
@@ -43,7 +42,6 @@ class Legs(NamedTuple):
     hip: np.ndarray
     ankle: np.ndarray
     links: np.ndarray
-    joints: np.ndarray
     ranges: np.ndarray
     toes: np.ndarray
 
@@ -56,8 +54,7 @@ def legs_of(robot: RobotModel, margins: ReachMargins) -> Legs:
     return Legs(
         hip=np.array([leg.hip_in_com for leg in legs]),
         ankle=np.array([leg.ankle_in_sole for leg in legs]),
-        links=np.array([[leg.thigh, leg.shin] for leg in legs]),
-        joints=np.array([leg.hips.numbers for leg in legs]),
+        links=np.array([[leg.thigh, leg.shin, *leg.hips.numbers] for leg in legs]).ravel(),
         ranges=np.array([[limit.range_of(leg) for limit in LIMITS] + inward for leg in legs]),
         toes=np.array([left[0] - right[1], left[1] - right[0]]),
     )
@@ -75,8 +72,9 @@ def reach(legs, side, com, yaw, position, rotation):
     length, nowhere = distance(hip, ankle), (0.0, 0.0, 0.0)
     if length < ranges[_LENGTH, 0] or length > ranges[_LENGTH, 1]:
         return OF_LIMIT[_LENGTH], (nowhere, nowhere, nowhere)
-    links, joints = legs.links[side], hip_joints(legs.joints[side])
-    posture = posture_between(hip, ankle, rotation, heading, links[0], links[1], joints)
+    at = side * (len(legs.links) // 2)
+    thigh, shin, joints = legs.links[at], legs.links[at + 1], hip_joints(legs.links, at + 2)
+    posture = posture_between(hip, ankle, rotation, heading, thigh, shin, joints)
     points = (posture.hip_point, posture.knee_point, posture.ankle_point)
     values = quantities(posture)
     for k in range(len(OF_LIMIT)):
