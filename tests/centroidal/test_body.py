@@ -111,7 +111,7 @@ def test_casadi_and_numpy_agree_about_torques(walker):
                 leg.hips.numbers,
                 position,
                 limits,
-                [0.8],
+                [0.8, 1.0],
             ]
         )
         variables = np.concatenate([com, velocity, rotation.T @ force, rotation.T @ moment, [0.5]])

@@ -31,11 +31,14 @@ class BodyMargins(ReachMargins):
         hip: rad; taken off both ends of hip roll and pitch.
         height: m; added to the least CoM height.
         torque: Part of each leg joint's torque that may be used.
+        most_torque: The same where nothing else helps, for optimisers; the rest is for the motion itself, and for
+            corrections.
     """
 
     ankle: float = 0.0
     height: float = 0.0
     torque: float = 1.0
+    most_torque: float = 1.0
 
     def scaled(self, factor: float) -> Self:
         """The same with its lengths multiplied by a factor."""

@@ -358,7 +358,7 @@ class Program:
                 _posture_parameters(leg, self._middle_heading[step], sole + rotation @ leg.ankle_in_sole, rotation),
                 sole,
                 np.tile(limits, (len(step), 1)),
-                np.full(len(step), self._body.torque),
+                np.tile([self._body.torque, self._body.most_torque], (len(step), 1)),
             ]
             parts.append((step, self.layout.torques(step, limb), np.column_stack(parameters)))
         return _joined(parts, TORQUE_ROWS)

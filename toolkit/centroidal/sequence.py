@@ -39,7 +39,7 @@ from toolkit.robot.model import RobotModel
 WANTED = Margins(friction=0.66, cop=(0.055, 0.045), yaw=0.6)
 CALM = Weights(angular_momentum=20.0, angular_momentum_rate=1.0)
 """The paper's weights except for the angular momentum: with the paper's, no body can follow fast swings."""
-WANTED_BODY = BodyMargins(length=0.015, ankle=0.1, hip=0.05, height=0.02, torque=0.85)
+WANTED_BODY = BodyMargins(length=0.015, ankle=0.1, hip=0.05, height=0.02, torque=0.75, most_torque=0.88)
 CONVERGED = "converged"
 STILL = 1e-9  # m; a smaller displacement of a landing point is none
 

@@ -68,7 +68,7 @@ def torque(moving: bool) -> Piece:
     """Joint torques of a stance leg in the middle of a step.
 
     Parameters: half of dt; those of `_posture`; sole position (3); torque limits in the order of `TORQUE_ROLES` in
-    weights times 1 m; wanted part of the limits.
+    weights times 1 m; the parts of the limits that are wanted, and allowed, at most.
     """
     p = Parameters()
     com, velocity, wrench = ca.SX.sym("c", 3), ca.SX.sym("v", 3), ca.SX.sym("w", WRENCH)
@@ -76,13 +76,14 @@ def torque(moving: bool) -> Piece:
     middle, offset = ca.SX.sym("middle", 3), ca.SX.sym("d", 2 * moving)
     posture, rotation = _posture(middle, p, offset)
     sole, limits, wanted = p(3) + displacement(rotation, offset), p(len(TORQUE_ROLES)), p()
+    more = p() - wanted
     force, moment = rotation @ wrench[:3], rotation @ wrench[3:]
     ratio = ca.vertcat(*joint_torques(posture, sole, rotation, force, moment, TINY)) / limits
     reduced = ca.vertcat(middle, wrench, offset)
     slope = ca.jacobian(ratio, reduced)
     by_offset = slope[:, 9:]
     slope = ca.horzcat(slope[:, :3], half_dt * slope[:, :3], slope[:, 3:9])  # the middle is com + dt / 2 velocity
-    part, gain = wanted + (1 - wanted) * slack, ca.repmat(1 - wanted, len(TORQUE_ROLES), 1)
+    part, gain = wanted + more * slack, ca.repmat(more, len(TORQUE_ROLES), 1)
     rows = ca.vertcat(part - ratio, part + ratio)
     jacobian = ca.vertcat(ca.horzcat(-slope, gain, -by_offset), ca.horzcat(slope, gain, by_offset))
     rows, jacobian = ca.substitute([rows, jacobian], [middle], [com + half_dt * velocity])

@@ -342,14 +342,15 @@ def fill_torques(block, y):
     """Joint torques of stance legs in the middle of steps.
 
     Variables: CoM (3), velocity (3), wrench (6), slack of the body, displacement of the sole (2 or none). Parameters:
-    half of dt; the posture's; sole (3); limits in the order of `TORQUE_ROLES` in weights times 1 m; wanted part of
-    the limits.
+    half of dt; the posture's; sole (3); limits in the order of `TORQUE_ROLES` in weights times 1 m; the parts of
+    the limits that are wanted, and allowed, at most.
     """
     slopes, hip, com = np.empty((_TORQUES, 9)), np.empty(3), np.empty(3)
     for i in range(block.stage.shape[0]):
         p, half, t, index = block.parameters[i, 1:], block.parameters[i, 0], block.stage[i], block.variables[i]
         turn, offset, wrench = p[_TURN : _TURN + 9].reshape(3, 3), index[13:], y[t, index[6] :]
-        sole, limits, wanted = p[POSTURE:_LIMITS], p[_LIMITS : _LIMITS + _TORQUES], p[_LIMITS + _TORQUES]
+        sole, limits = p[POSTURE:_LIMITS], p[_LIMITS : _LIMITS + _TORQUES]
+        wanted, more = p[_LIMITS + _TORQUES], p[_LIMITS + _TORQUES + 1] - p[_LIMITS + _TORQUES]
         for a in range(3):
             com[a] = y[t, a] + half * y[t, 3 + a]
         hip_of(p, turn, y, t, com, offset, hip)
@@ -368,7 +369,7 @@ def fill_torques(block, y):
             hip[a] -= NUDGE
             for q in range(_TORQUES):
                 slopes[q, a] = (beside[q] - here[q]) / NUDGE / limits[q]
-        part = wanted + (1.0 - wanted) * y[t, index[12]]
+        part = wanted + more * y[t, index[12]]
         for q in range(_TORQUES):
             block.value[i, q] = part - here[q] / limits[q]
             block.value[i, _TORQUES + q] = part + here[q] / limits[q]
@@ -378,7 +379,7 @@ def fill_torques(block, y):
                     out[a], out[3 + a] = sign * slopes[q, a], sign * half * slopes[q, a]
                 for k in range(6):
                     out[6 + k] = sign * slopes[q, 3 + k]
-                out[12] = 1.0 - wanted
+                out[12] = more
                 for k in range(offset.shape[0]):
                     along = slopes[q, 0] * turn[0, k] + slopes[q, 1] * turn[1, k] + slopes[q, 2] * turn[2, k]
                     out[13 + k] = -sign * along
