@@ -12,6 +12,7 @@ from tests.robot.samples import TOML, biped_mjcf, write_robot
 from tests.shipped_robots import OWN
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import FEET, Limb
+from toolkit.physics.leg import leg_posture, leg_torques
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.limits import sole_room
@@ -81,6 +82,39 @@ def test_leg_lengths_and_angles(robot: RobotModel) -> None:
             pitch = sum(angles.values())
             expected_sole = [[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]]
             np.testing.assert_allclose(base.T @ rotation, expected_sole, atol=1e-9)
+
+
+def test_angles_and_torques_whatever_the_order_of_a_hip(robot: RobotModel) -> None:
+    """On deeply bent legs too, where the order of the hip's joints tells most."""
+    model, data, rng = robot.mujoco_model, mujoco.MjData(robot.mujoco_model), np.random.default_rng(5)
+    jacobian = np.zeros((2, 3, model.nv))
+    for foot, leg in robot.legs.items():
+        joints = {role: model.joint(f"{foot.label.partition('_')[0]}_{role}") for role in leg.ranges}
+        for bend in np.linspace(0.0, 1.2, 20):
+            angles = dict(zip(joints, rng.uniform(-0.3, 0.3, 6), strict=True))
+            angles |= {"hip_pitch": angles["hip_pitch"] - bend, "knee": 0.5 + bend}
+            angles["ankle_pitch"] = 0.0  # the small robots' ankles roll above it, which is the same only so
+            data.qpos[:] = robot.home
+            mujoco.mj_kinematics(model, data)  # joints' directions are seen in it
+            for role, angle in angles.items():
+                if role.endswith(("roll", "yaw")):  # these have their plain zeros and signs in every variant
+                    data.qpos[joints[role].qposadr] = angle
+                else:
+                    _set(data, model, joints[role].id, angle, leg.ranges[role])
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            base, sole = data.xmat[1].reshape(3, 3), data.site(robot.limbs[foot].site)
+            com = data.xanchor[joints["hip_pitch"].id] - base @ leg.hip_in_com
+            place = sole.xpos[None], sole.xmat.reshape(1, 3, 3)
+            posture = leg_posture(leg, com[None], np.zeros(1), *place)
+            for role, angle in angles.items():
+                assert getattr(posture, role)[0] == pytest.approx(angle, abs=1e-6), role
+            force, moment = rng.normal(size=3) * [30, 30, 300], rng.normal(size=3) * 5
+            mujoco.mj_jacSite(model, data, jacobian[0], jacobian[1], sole.id)
+            expected = jacobian[0].T @ force + jacobian[1].T @ moment
+            for role, torque in leg_torques(posture, *place, force[None], moment[None]).items():
+                if not role.startswith("ankle"):
+                    assert abs(torque[0]) == pytest.approx(abs(expected[joints[role].dofadr[0]]), abs=1e-4), role
 
 
 def _set(data: mujoco.MjData, model: mujoco.MjModel, joint: int, angle: float, bounds: tuple[float, float]) -> None:
