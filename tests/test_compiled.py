@@ -145,6 +145,7 @@ from toolkit.search.moves.legs import Legs, reach
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.screen import Sole, screen_swings
 from toolkit.physics.leg import LIMITS
+from toolkit.robot.model import HipJoints
 
 zero, one = np.zeros(1, np.int64), np.ones(1, np.int64)
 table = SurfaceTable(
@@ -155,7 +156,8 @@ table = SurfaceTable(
 _fill(table, np.array([[0.0, 0.2, 0.1, 0.2]]), zero, np.array([[0, 1, 0, 1]]), 0.16, zero.copy())
 
 ranges = np.tile([-9.0, 9.0], (2, len(LIMITS), 1))
-legs = Legs(np.zeros((2, 3)), np.zeros((2, 3)), np.full((2, 2), 0.4), ranges, np.array([-1.0, 1.0]))
+links = np.tile([0.4, 0.4, *HipJoints().numbers], 2)
+legs = Legs(np.zeros((2, 3)), np.zeros((2, 3)), links, ranges, np.array([-1.0, 1.0]))
 reason, _ = reach(legs, 0, (0.0, 0.0, 0.7), 0.0, np.zeros(3), np.eye(3))
 
 codes = np.empty(1, np.int64)
@@ -216,7 +218,7 @@ def test_an_edit_below_a_kernel_turns_the_next_run_around(copy):
     assert first == {"results": [1, "NONE", "NONE"], "compiled": [1, 1, 1]}
     assert again == {"results": [1, "NONE", "NONE"], "compiled": [0, 0, 0]}
     copy.edit("toolkit/contacts/surface_table.py", "return np.hypot(", "return 1.0 + np.hypot(")
-    copy.edit("toolkit/physics/leg.py", "com[2] + hip_in_com[2]", "com[2] + hip_in_com[2] + 9.0")
+    copy.edit("toolkit/physics/leg.py", "com[1] + y, com[2] + z", "com[1] + y, com[2] + z + 9.0")
     copy.edit(
         "toolkit/search/moves/screen.py", "    dx, dy = bx - ax, by - ay\n", "    return True\n    dx, dy = 0, 0\n"
     )
