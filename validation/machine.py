@@ -8,7 +8,7 @@ import os
 import platform
 import resource
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -39,20 +39,25 @@ def code_fingerprint() -> str:
 
 def source_fingerprint(paths: Iterable[Path]) -> str:
     """Twelve hex digits of what modules under the project's root compute: comments and docstrings are no part of it."""
+    return _digest(ROOT, paths, _statements)
+
+
+def _digest(folder: Path, paths: Iterable[Path], content: Callable[[Path], bytes]) -> str:
+    """Twelve hex digits of the names of files in a folder and of what counts of their content."""
     digest = hashlib.sha256()
     for path in sorted(paths):
-        digest.update(path.relative_to(ROOT).as_posix().encode())
-        digest.update(_statements(path.read_text(encoding="utf-8")).encode())
+        digest.update(path.relative_to(folder).as_posix().encode())
+        digest.update(content(path))
     return digest.hexdigest()[:12]
 
 
-def _statements(source: str) -> str:
+def _statements(path: Path) -> bytes:
     """A module as a tree of statements, without strings that stand alone."""
-    tree = ast.parse(source)
+    tree = ast.parse(path.read_text(encoding="utf-8"))
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             node.body = [statement for statement in node.body if not _is_comment(statement)]
-    return ast.dump(tree)
+    return ast.dump(tree).encode()
 
 
 def _is_comment(statement: ast.stmt) -> bool:
@@ -66,11 +71,7 @@ def _is_comment(statement: ast.stmt) -> bool:
 
 def folder_fingerprint(folder: Path) -> str:
     """Twelve hex digits of every file of a robot's folder, networks included."""
-    digest = hashlib.sha256()
-    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
-        digest.update(str(path.relative_to(folder)).encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
+    return _digest(folder, (path for path in folder.rglob("*") if path.is_file()), Path.read_bytes)
 
 
 def memory() -> float:
