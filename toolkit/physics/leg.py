@@ -156,9 +156,16 @@ def _kept(cosine):
 
 @law
 def hip_joints(p, at):
-    """`HipJoints` of their nine `numbers`, which may be symbols, from an index of p on."""
-    order, first = (p[at], p[at + 1], p[at + 2]), (p[at + 4], p[at + 5], p[at + 6])
-    return HipJoints(order, p[at + 3], first, (p[at + 7], p[at + 8]))
+    """`HipJoints` of their eight `numbers`, which may be symbols, from an index of p on."""
+    order, first = (p[at], p[at + 1], p[at + 2]), (p[at + 3], p[at + 4], p[at + 5])
+    return HipJoints(order, first, (p[at + 6], p[at + 7]))
+
+
+@law
+def _sign(order):
+    """1 where the axes of a hip's joints are in cyclic order (x, y, z; y, z, x; z, x, y), else -1."""
+    step = order[1] - order[0]  # 1 or -2 where they are, -1 or 2 where not
+    return step * (3 - step * step) / 2
 
 
 @law
@@ -229,7 +236,7 @@ def _hip_angles(thigh, joints):
     tan(last) = -s R_ij / R_ii, with s = 1 where i, j, k are cyclic and -1 where they are not.
     """
     i, j, k = joints.order
-    last, s = _picked_vector(k, thigh), joints.sign
+    last, s = _picked_vector(k, thigh), _sign(joints.order)
     by_last, by_middle = _picked(i, last), _picked(i, _picked_vector(j, thigh))
     return _by_axis(
         joints.order,
@@ -249,7 +256,7 @@ def _hip_axes(thigh, joints, tiny):
     """
     first, last = joints.first, _picked_vector(joints.order[2], thigh)
     x, y, z = _cross(last, first)
-    scale = joints.sign / np.sqrt(x * x + y * y + z * z + tiny)
+    scale = _sign(joints.order) / np.sqrt(x * x + y * y + z * z + tiny)
     middle = (scale * x, scale * y, scale * z)
     a = _by_axis(joints.order, (first[0], middle[0], last[0]))
     b = _by_axis(joints.order, (first[1], middle[1], last[1]))

@@ -185,8 +185,7 @@ def _hip_joints(
     axes = axes * np.sign(np.sum(axes.T * base[:, order], 0))[:, None]
     x, z = axes[2] @ ahead, axes[2] @ up
     skew = {"roll": np.arctan2(-z, x), "pitch": 0.0, "yaw": np.arctan2(x, z)}[_ROLES[order[2]]]
-    sign = 1.0 if (order[1] - order[0]) % 3 == 1 else -1.0
-    hips = HipJoints(tuple(order), sign, tuple((base.T @ axes[0]).tolist()), (float(np.cos(skew)), float(np.sin(skew))))
+    hips = HipJoints(tuple(order), tuple((base.T @ axes[0]).tolist()), (float(np.cos(skew)), float(np.sin(skew))))
     return hips, float(skew)
 
 

@@ -57,21 +57,19 @@ class HipJoints(NamedTuple):
 
     Attributes:
         order: The axes that they turn about, from the base down: 0 roll (x), 1 pitch (y), 2 yaw (z).
-        sign: 1 where that order is cyclic (as yaw, roll, pitch), else -1.
         first: Axis of the first joint, a unit vector in the axes of the base.
         skew: Cosine and sine of the angle, about the pitch axis, from the line hip to knee to the thigh's axis of roll
             or yaw, where the last joint turns about that; 1 and 0 where it is pitch.
     """
 
     order: tuple = (2, 0, 1)
-    sign: float = 1.0
     first: tuple = (0.0, 0.0, 1.0)
     skew: tuple = (1.0, 0.0)
 
     @property
     def numbers(self) -> list[float]:
-        """All of it as nine numbers, for arrays of parameters."""
-        return [*map(float, self.order), self.sign, *self.first, *self.skew]
+        """All of it as eight numbers, for arrays of parameters."""
+        return [*map(float, self.order), *self.first, *self.skew]
 
 
 @dataclass(frozen=True)

@@ -31,14 +31,14 @@ def _posture(com: ca.SX, p: Parameters, offset: ca.SX) -> tuple[LegPosture, ca.S
     """Posture of a leg, and world_from_sole.
 
     Parameters: hip relative to the CoM in the world (3), ankle in the world (3), R of the sole (9, row-major), thigh,
-    shin, cosine and sine of the base's heading, numbers of the hip's joints (9). The sole is displaced by `offset` (2
+    shin, cosine and sine of the base's heading, numbers of the hip's joints (8). The sole is displaced by `offset` (2
     or none) along its own axes.
     """
     if hasattr(ca.GlobalOptions, "setNumpyMode"):  # since CasADi 3.8: let NumPy's functions take symbols, silently
         ca.GlobalOptions.setNumpyMode(-1)
     hip_offset, ankle, rotation = p(3), p(3), ca.reshape(p(9), 3, 3).T
     hip, ankle = com + hip_offset, ankle + displacement(rotation, offset)
-    thigh, shin, heading, joints = p(), p(), p(2), hip_joints(p(9), 0)
+    thigh, shin, heading, joints = p(), p(), p(2), hip_joints(p(8), 0)
     return posture_between(hip, ankle, rotation, heading, thigh, shin, joints, TINY), rotation
 
 

@@ -38,7 +38,7 @@ _MU, _HALF, _WANTED, _COP, _YAW = 0, 1, 3, 4, 6
 _LEAST, _LEAST_COP, _LEAST_YAW, _WEIGHTS, _LOAD, _PRICE = 7, 8, 10, 11, 17, 18
 # Parameters of a leg's posture: hip from the CoM, ankle, rotation of the sole, thigh, shin, cosine and sine of the
 # base's heading, numbers of the hip's joints.
-_HIP, _ANKLE, _TURN, _LINKS, _HEADING, _JOINTS, POSTURE = 0, 3, 6, 15, 17, 19, 28
+_HIP, _ANKLE, _TURN, _LINKS, _HEADING, _JOINTS, POSTURE = 0, 3, 6, 15, 17, 19, 27
 _LIMITS, _TORQUES = POSTURE + 3, len(TORQUE_ROLES)  # of torques, after those and the place of the sole
 
 

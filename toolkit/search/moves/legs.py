@@ -33,7 +33,7 @@ class Legs(NamedTuple):
     Attributes:
         hip: (2, 3) m; hips in the CoM's frame with the heading of the base.
         ankle: (2, 3) m; ankles in the sole's frame.
-        links: (22,); lengths of thigh and shin in m and numbers of the `HipJoints`, of one leg after the other.
+        links: (20,); lengths of thigh and shin in m and numbers of the `HipJoints`, of one leg after the other.
         ranges: (2, k, 2) m or rad; least and greatest values in the order of `LIMITS`.
         toes: (2,) rad; least and greatest heading of the left sole less that of the right one. The base turns between
             the feet as it likes, so that only both hips' yaw together bounds them.
