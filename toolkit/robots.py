@@ -125,13 +125,13 @@ def _inspect(console: Console, what: str, out: Path | None) -> int:
     from toolkit.robot.draft import draft
     from toolkit.robot.loader import load_robot
     from toolkit.robot.located import locate
-    from toolkit.robot.source import read_model
+    from toolkit.robot.upright import read_upright
 
     located = locate(what)
     if out is not None and (out / FILE_NAME).exists():
         raise InputError(f"--out {out}: has a {FILE_NAME} already; choose another folder")
-    source = read_model(located.path, lenient=True)
     try:
+        source = read_upright(located.path)
         found = draft(source, located.lines(out))
         tried = draft(source, located.lines(None)).text
     except ValueError as error:

@@ -81,6 +81,22 @@ def test_a_robot_whose_soles_are_collada_needs_nothing_by_hand(tmp_path: Path) -
     np.testing.assert_allclose(robot.legs[Limb.LEFT_FOOT].ankle_in_sole, [-0.02, 0, 0.08], atol=1e-6)
 
 
+@pytest.mark.parametrize("lies", [True, False])
+def test_shapes_that_lie_down_are_turned_where_the_masses_say_so(tmp_path: Path, lies: bool) -> None:
+    trunk = CORNERS * [1.0, 1.0, 15.0]  # around the pelvis' centre of mass, 0.15 m above its frame
+    if lies:
+        trunk = trunk[:, [0, 2, 1]] * [1.0, 1.0, -1.0]  # y points up
+    (tmp_path / "trunk.dae").write_text(collada(trunk, "Y_UP"))  # which many files say in which z does
+    shape = '<collision><geometry><mesh filename="trunk.dae"/></geometry></collision>'
+    file = tmp_path / "biped.urdf"
+    file.write_text(biped_urdf().replace("<visual>", shape + "<visual>"))
+    assert robots.main(["--inspect", str(file), "--out", str(tmp_path / "biped")]) == 0
+    assert ("up_axis = true" in (tmp_path / "biped" / "robot.toml").read_text()) == lies
+    model = load_robot(str(tmp_path / "biped")).mujoco_model
+    mesh = model.geom(int(model.body("pelvis").geomadr[0]))
+    np.testing.assert_allclose(mesh.pos, [0.0, 0.0, 0.15], atol=1e-6)
+
+
 def test_a_mesh_without_a_solid_names_its_link_and_the_remedy(tmp_path: Path) -> None:
     folder = write_robot(tmp_path / "a", with_sole_mesh(biped_urdf(), "sole.dae"), URDF_TOML, "robot.urdf")
     (folder / "sole.dae").write_text(collada(CORNERS * [1, 1, 0]))

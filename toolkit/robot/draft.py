@@ -49,7 +49,7 @@ def draft(source: ModelSource, where: Sequence[str]) -> Draft:
     Raises:
         ValueError: MuJoCo cannot compile the file.
     """
-    model, inertia = _compiled(source.spec)
+    model, inertia = compiled(source.spec)
     anatomy = find_anatomy(model)
     locked = _locked(model, anatomy)
     moved = [name for name in _joints(model) if name not in locked]
@@ -68,8 +68,8 @@ def draft(source: ModelSource, where: Sequence[str]) -> Draft:
     return Draft(text, tuple(missing), anatomy, model)
 
 
-def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, list[str]]:
-    """The compiled spec, and the lines of [mend] that it takes because of inertias which no body can have."""
+def compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, list[str]]:
+    """A compiled spec, and the lines of [mend] that it takes because of inertias which no body can have."""
     try:
         return spec.compile(), []
     except ValueError as error:
@@ -150,6 +150,8 @@ def _mend(model: mujoco.MjModel, source: ModelSource, anatomy: Anatomy, inertia:
     if anatomy.forward[0] < 0.98:
         x, y = np.round(anatomy.forward, 6) + 0.0
         lines.append(f"forward = [{float(x)}, {float(y)}]   # the knees say where the toes point")
+    if source.upright:
+        lines.append("up_axis = true   # so the shapes lie around the links' centres of mass")
     if source.unread:
         shapes = ", ".join(f'{_key(name)} = "none"' for name in source.unread)
         lines.append(f"collision = {{ {shapes} }}   # their files cannot be read; boxes [[centre], [size]] are better")

@@ -11,7 +11,7 @@ from toolkit.robot.reader import Reader
 
 _KEYS = (
     "rename_bodies", "rename_joints", "drop", "collision", "exclude", "forward", "balance_inertia", "least_mass",
-    "least_inertia",
+    "least_inertia", "up_axis",
 )  # fmt: skip
 _GROUP = re.compile(r"group ([0-5])")
 
@@ -42,6 +42,7 @@ class Mend:
         exclude: Pairs of patterns of bodies that do not collide with each other.
         forward: Direction (x, y) of the toes in the axes of the file's base body, or None for its x axis.
         balance_inertia: Whether inertias that no body can have are evened out.
+        up_axis: Whether COLLADA shapes are turned to have z up where their files say that y points up.
         least_mass, least_inertia: Least mass in kg, and least principal inertia in kg m^2, of every body.
     """
 
@@ -52,6 +53,7 @@ class Mend:
     exclude: tuple[tuple[str, str], ...]
     forward: tuple[float, float] | None
     balance_inertia: bool
+    up_axis: bool
     least_mass: float
     least_inertia: float
 
@@ -76,6 +78,7 @@ def read_mend(reader: Reader, data: dict) -> Mend:
         exclude=_pairs(reader, table),
         forward=forward,
         balance_inertia=reader.flag(table, "balance_inertia", "mend."),
+        up_axis=reader.flag(table, "up_axis", "mend."),
         least_mass=reader.numbers(table, "least_mass", "mend.", 1, default=(0.0,), lowest=0.0)[0],
         least_inertia=reader.numbers(table, "least_inertia", "mend.", 1, default=(0.0,), lowest=0.0)[0],
     )

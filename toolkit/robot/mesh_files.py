@@ -16,11 +16,11 @@ _STL_HEADER, _STL_FACE = 84, 50  # bytes of a binary STL
 _SAID = 80  # most letters of what the loader says
 
 
-def converted(file: Path) -> bytes | None:
+def converted(file: Path, *, upright: bool = False) -> bytes | None:
     """A mesh file as binary STL, in the file's own axes and before any scale of the model; None where MuJoCo reads it.
 
     A COLLADA file becomes the convex hull of all its parts, which is what MuJoCo collides with. Its unit counts, its
-    `up_axis` does not, as everywhere in ROS.
+    `up_axis` does not, as everywhere in ROS, but where `upright`: then y, if it is said to point up, becomes z.
 
     Raises:
         ValueError: The file holds no solid that can be read.
@@ -36,6 +36,8 @@ def converted(file: Path) -> bytes | None:
         try:
             points = np.asarray(coal.MeshLoader().load(str(file), np.ones(3)).vertices(), float)
             points = _unit(file) * points[ConvexHull(points).vertices]  # which raises where they lie in a plane
+            if upright and lies_down(file):
+                points = points[:, [0, 2, 1]] * (1.0, -1.0, 1.0)
             mesh = trimesh.convex.convex_hull(points)
         except (QhullError, ElementTree.ParseError, ValueError, RuntimeError) as error:
             raise ValueError(f"holds no solid ({one_line(error)[:_SAID]})") from None
@@ -46,8 +48,19 @@ def converted(file: Path) -> bytes | None:
 
 def _unit(file: Path) -> float:
     """Metres of a unit of a COLLADA file, which the loader leaves out."""
-    unit = next((item for item in ElementTree.parse(file).iter() if item.tag.rpartition("}")[2] == "unit"), None)
+    unit = _said(file, "unit")
     return 1.0 if unit is None else float(unit.get("meter", "1"))
+
+
+def lies_down(file: Path) -> bool:
+    """Whether a COLLADA file says that its y axis points up."""
+    up = _said(file, "up_axis")
+    return up is not None and (up.text or "").strip() == "Y_UP"
+
+
+def _said(file: Path, name: str) -> ElementTree.Element | None:
+    """The first element of a name in a COLLADA file."""
+    return next((item for item in ElementTree.parse(file).iter() if item.tag.rpartition("}")[2] == name), None)
 
 
 def _is_text(file: Path) -> bool:

@@ -16,7 +16,7 @@ from toolkit.errors import InputError, PackageError, RobotError
 from toolkit.mjcf import one_line, read_spec
 from toolkit.robot.description import RobotDescription
 from toolkit.robot.mend_table import Box, Mend
-from toolkit.robot.mesh_files import READABLE, converted
+from toolkit.robot.mesh_files import READABLE, converted, lies_down
 from toolkit.robot.reader import suggestion
 
 
@@ -29,12 +29,16 @@ class ModelSource:
         spec: Content of the file, including the files that it names.
         velocity: Velocity limits in a URDF by joint, rad/s; MuJoCo ignores them.
         unread: Links of a URDF whose collision shapes cannot be read and were left out.
+        lying: Whether it has COLLADA shapes whose files say that y points up.
+        upright: Whether these were turned to have z up.
     """
 
     path: Path
     spec: mujoco.MjSpec
     velocity: dict[str, float]
     unread: tuple[str, ...] = ()
+    lying: bool = False
+    upright: bool = False
 
 
 def find_model_file(description: RobotDescription) -> Path:
@@ -109,12 +113,13 @@ def file_of_module(where: str, name: str) -> Path:
     return Path(found).resolve()
 
 
-def read_model(path: Path, mend: Mend | None = None, *, lenient: bool = False) -> ModelSource:
+def read_model(path: Path, mend: Mend | None = None, *, lenient: bool = False, upright: bool = False) -> ModelSource:
     """Read an MJCF or URDF file.
 
     A URDF keeps its fixed links and loses visual shapes that MuJoCo cannot draw; its `package://` paths are resolved.
-    Collision shapes that `mend` replaces need not be readable; nothing else of it counts here. Where `lenient`, none
-    needs to be, and links that lose theirs are named.
+    Collision shapes that `mend` replaces need not be readable. Where `lenient`, none needs to be, and links that lose
+    theirs are named. Shapes that lie down are turned where `mend` says so, or where `upright`; nothing else of `mend`
+    counts here.
 
     Raises:
         RobotError: The file is not valid XML or neither MJCF nor URDF, a mesh is missing, or MuJoCo cannot parse it.
@@ -127,13 +132,14 @@ def read_model(path: Path, mend: Mend | None = None, *, lenient: bool = False) -
         raise RobotError(f"{path}: root element <{root.tag}>; expected <mujoco> (MJCF) or <robot> (URDF)")
     velocity: dict[str, float] = {}
     unread: list[str] = []
+    meshes = _Meshes(path, upright or (mend is not None and mend.up_axis))
     try:
         if root.tag == "mujoco":
             spec = read_spec(path)
         else:
             velocity = _velocity_limits(path, root)
-            unread, assets = _prepare_urdf(path, root, mend, lenient)
-            spec = read_spec(path, ElementTree.tostring(root, encoding="unicode"), assets)
+            unread = _prepare_urdf(path, root, mend, lenient, meshes)
+            spec = read_spec(path, ElementTree.tostring(root, encoding="unicode"), meshes.assets)
             spec.compiler.fusestatic = False
             for geom in spec.geoms:
                 geom.density = 0.0  # a link without <inertial> has no mass, whatever its shapes
@@ -143,7 +149,7 @@ def read_model(path: Path, mend: Mend | None = None, *, lenient: bool = False) -
         raise RobotError(f"{path}: {error}") from None
     except (ValueError, OSError) as error:
         raise RobotError(f"{path}: MuJoCo cannot load it: {one_line(error)}") from None
-    return ModelSource(path, spec, velocity, tuple(unread))
+    return ModelSource(path, spec, velocity, tuple(unread), meshes.lying, meshes.upright)
 
 
 def _velocity_limits(path: Path, root: ElementTree.Element) -> dict[str, float]:
@@ -162,17 +168,11 @@ def _velocity_limits(path: Path, root: ElementTree.Element) -> dict[str, float]:
 
 
 def _prepare_urdf(
-    path: Path, root: ElementTree.Element, mend: Mend | None, lenient: bool
-) -> tuple[list[str], dict[str, bytes]]:
-    """Make a URDF readable for MuJoCo.
-
-    Returns:
-        The links that lost a collision shape which cannot be read, and the content of the meshes that were converted,
-        by the names that the URDF now gives them.
-    """
+    path: Path, root: ElementTree.Element, mend: Mend | None, lenient: bool, meshes: _Meshes
+) -> list[str]:
+    """Make a URDF readable for MuJoCo; returns the links that lost a collision shape which cannot be read."""
     names: set[str] = set()
     unread: list[str] = []
-    meshes = _Meshes(path)
     for link in root.iter("link"):
         if mend is not None and _is_replaced(mend, link.get("name", "")):
             for shape in link.findall("collision"):
@@ -200,7 +200,7 @@ def _prepare_urdf(
         root.remove(extension)
     extension = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(extension, "compiler", strippath="false", fusestatic="false", discardvisual="false")
-    return list(dict.fromkeys(unread)), meshes.assets
+    return list(dict.fromkeys(unread))
 
 
 class _Meshes:
@@ -208,12 +208,16 @@ class _Meshes:
 
     Attributes:
         assets: Content of those that had to be converted, by new names.
+        lying: Whether some of them say that their y axis points up.
+        upright: Whether these are turned to have z up.
     """
 
-    def __init__(self, urdf: Path) -> None:
+    def __init__(self, urdf: Path, upright: bool) -> None:
         self._urdf = urdf
         self._names: dict[Path, str] = {}
         self.assets: dict[str, bytes] = {}
+        self.lying = False
+        self.upright = upright
 
     def name_of(self, name: str, drawn: bool) -> str:
         """What a mesh is called from now on: a path, or a name in `assets`.
@@ -228,7 +232,8 @@ class _Meshes:
         if ending not in READABLE or (drawn and ending == ".dae"):
             raise ValueError(f"is not one of {', '.join(sorted(READABLE))}")
         if file not in self._names:
-            content, self._names[file] = converted(file), str(file)
+            content, self._names[file] = converted(file, upright=self.upright), str(file)
+            self.lying |= ending == ".dae" and lies_down(file)
             if content is not None:
                 self._names[file] = f"{len(self._names)}_{file.stem}.stl"
                 self.assets[self._names[file]] = content
