@@ -65,6 +65,19 @@ def end_with_parent() -> None:
 
 
 @contextmanager
+def starting_processes() -> Iterator[None]:
+    """Keep interruptions from the processes that the block starts, from their first moment; one waits for its end."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which processes inherit
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, usual)
+
+
+@contextmanager
 def undisturbed() -> Iterator[None]:
     """Hold signals back while a short block runs; they take effect after it."""
     if threading.current_thread() is not threading.main_thread():

@@ -15,7 +15,6 @@ from toolkit.learning.terrain import tiles_and_walls
 from toolkit.prediction.features import CONTACT, feature_size
 from toolkit.robot.loader import load_robot
 from toolkit.world.loader import load_world
-from toolkit.world.timing import pace_of
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +43,7 @@ def test_a_shard_holds_labels_of_every_category_and_both_judgements(shard, confi
 
 
 def test_features_are_what_was_asked_for(shard, config):
-    pace = pace_of(load_robot(config.robot).com_height)
+    pace = load_robot(config.robot).pace
     for category, group in shard.items():
         shift, swing, friction = group.features[:, -3:].T
         low, high = np.minimum(config.shift, config.quick_shift)[0], np.maximum(config.shift, config.quick_shift)[1]

@@ -1,11 +1,13 @@
 """The planner's own choice of timings, with trained networks: slow where that is possible, quick where it must be."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.search.worlds import FLOOR, box, make_world
+from toolkit.geometry.limb import FEET
 from toolkit.pipeline import make_planner
 from toolkit.robot.loader import load_robot
 from toolkit.search.anytime.ana_star import AnaStarConfig
@@ -23,10 +25,21 @@ def test_what_is_asked_for_goes_before_the_world_and_the_world_before_the_own_ch
 
 
 def test_small_bodies_move_faster():
-    small, large = own_choice(0.25), own_choice(1.0)
+    small, large = own_choice(0.5), own_choice(1.0)
     for quick, slow in zip(small, large, strict=True):
         assert quick.swing == pytest.approx(slow.swing / 2, abs=1e-3)
     assert large[0].swing == max(timing.swing for timing in large)  # the calmest first
+
+
+def test_rotors_that_are_heavy_for_their_motors_slow_a_robot_down(robot):
+    legs = robot.carrying(FEET)
+    assert robot.rotor_factor == 1.0 and robot.pace == pytest.approx(robot.com_height**0.5)
+    heavy = replace(robot, armature=np.where(legs, 0.0625 * robot.torque_limit, robot.armature))
+    assert heavy.pace == pytest.approx(18.0 * 0.25)  # whatever its height
+    assert replace(robot, armature=np.where(legs, robot.armature, 1e3)).rotor_factor == 1.0  # arms do not count
+    own = make_world(FLOOR, goal=(1.2, 0, 0), timing="0.4 0.6")
+    slow = make_planner(heavy, own, "kinematic").timings()
+    assert slow == (Timing(0.4, 0.6).times(heavy.rotor_factor),) and slow[0].swing > 2.5
 
 
 def test_the_pace_yields_but_for_ground_that_slides(robot):
@@ -41,7 +54,7 @@ def test_the_pace_yields_but_for_ground_that_slides(robot):
 def test_judges_that_know_no_dynamics_walk_at_one_calm_pace(robot):
     world = make_world(FLOOR, goal=(1.2, 0, 0), timing=None)
     for kind in ("kinematic", "quasi-static"):
-        assert make_planner(robot, world, kind).timings() == own_choice(robot.com_height, 1)[:1]
+        assert make_planner(robot, world, kind).timings() == own_choice(robot.pace, 1)[:1]
 
 
 def swings(name, world):
@@ -54,7 +67,7 @@ def swings(name, world):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TRAINED)
 def test_walks_slowly_on_level_ground_and_not_on_a_steep_slope(name):
-    usual = own_choice(load_robot(name).com_height)
+    usual = own_choice(load_robot(name).pace)
     assert (swings(name, make_world(FLOOR, goal=(1.2, 0, 0))) == usual[0].swing).any()
     steep = box([0.82, 0, -0.2887], [0.577, 0.6, 0.02], (0, 30, 0), friction=0.5)  # 1 m across, nobody rests on it
     lower = box([2.4, 0, -0.62], [1.0, 0.6, 0.02], friction=0.5)

@@ -18,7 +18,7 @@ from multiprocessing import get_context
 from typing import TypeVar
 
 from toolkit.errors import WorkerError
-from toolkit.interruption import end_with_parent
+from toolkit.interruption import end_with_parent, starting_processes
 from toolkit.learning.cluster import cluster_executor
 
 Result = TypeVar("Result")
@@ -70,7 +70,8 @@ def run_jobs(
     try:
         while True:
             for job in islice(left, None if ahead is None else ahead - len(waiting)):
-                waiting.add(pool.submit(work, *job))
+                with starting_processes():
+                    waiting.add(pool.submit(work, *job))
             if not waiting:
                 return
             finished, waiting = wait(waiting, return_when=FIRST_COMPLETED)

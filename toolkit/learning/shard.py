@@ -28,7 +28,7 @@ from toolkit.prediction.networks import load_networks
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.world.scaling import Fit
-from toolkit.world.timing import Timing, pace_of
+from toolkit.world.timing import Timing
 
 WORLDS = 1000
 """Numbers of worlds that a shard may use: those of shard i begin with i times this."""
@@ -76,7 +76,7 @@ def _place(robot: RobotModel, quota: Quota, config: CollectConfig, rng: np.rando
     networks = {}
     if config.networks is not None:
         networks = _networks_of(config.robot, config.robots, config.networks, config.networks_digest)
-    fit, pace = Fit.of(robot), pace_of(robot.com_height)
+    fit, pace = Fit.of(robot), robot.pace
     walls = robot.arms and any(category.palms_before or not category.moving.is_foot for category in quota.lacking)
     kinds = list(WALLED) if rng.random() < (config.walled if walls else 0.2) else [*OPEN, STEEP]
     kind, friction = kinds[int(rng.integers(len(kinds)))], rng.uniform(*config.friction)

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from toolkit.compiled import is_kept, keep, kept_folder
-from toolkit.interruption import end_with_parent
+from toolkit.interruption import end_with_parent, starting_processes
 from toolkit.pipeline.observer import Observer
 
 KERNELS = Path(__file__).with_name("kernels.json")
@@ -82,7 +82,8 @@ def warm_up(observer: Observer) -> Iterator[None]:
     began, others = time.perf_counter(), set(active_children())
     workers = _workers(kernels)
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin) as pool:
-        jobs = {pool.submit(keep, kernel.name, kernel.arguments): kernel for kernel in kernels}
+        with starting_processes():
+            jobs = {pool.submit(keep, kernel.name, kernel.arguments): kernel for kernel in kernels}
         try:
             yield
             _wait(jobs, _ends([kernel.seconds for kernel in kernels], workers), observer, began)

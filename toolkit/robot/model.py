@@ -15,7 +15,7 @@ from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose
 from toolkit.robot.chain import arm_joints, bodies_above, joints_to, side_joints
 from toolkit.robot.mend import geom_points
-from toolkit.robot.scale import Scale
+from toolkit.robot.scale import Scale, pendulum_pace, rotor_factor
 
 _LATERAL = 0.5  # least |cosine| between the axis of a joint that turns about the lateral axis and that axis
 _SHOULDER = 3  # joints of a shoulder
@@ -203,6 +203,17 @@ class RobotModel:
     def scale(self) -> Scale:
         """Factors on lengths, times and forces that are written for a body of the usual size."""
         return Scale.of(float(np.mean([leg.thigh + leg.shin for leg in self.legs.values()])), self.mass)
+
+    @property
+    def pace(self) -> float:
+        """Factor on times of walking that are written for a body whose CoM is 1 m high and whose rotors are light."""
+        return pendulum_pace(self.com_height) * self.rotor_factor
+
+    @property
+    def rotor_factor(self) -> float:
+        """How many times as long it takes because of its legs' rotors; 1 where they are light. See `rotor_factor`."""
+        legs = self.carrying(FEET)
+        return rotor_factor(self.com_height, self.armature[legs], self.torque_limit[legs])
 
     def joints_to(self, limb: Limb) -> np.ndarray:
         """Indices (k,) int into `joint_names` of the joints from the base to a limb, in order."""

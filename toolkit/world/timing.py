@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
 LONGEST = 10.0
 """Longest shift and longest swing in s. Time and memory grow with them, and slower motions are no different ones."""
 
-_HEIGHT = 1.0  # m; CoM of a body for which the times below hold
 _PACES = (  # s, s; shifts and swings to choose from, the calmest first; where a pace fails, the next follows
     ((0.35, 0.6), (0.05, 0.3)),
     ((0.6, 0.8), (0.35, 0.6)),
@@ -29,29 +27,27 @@ class Timing:
     shift: float = 1.0
     swing: float = 1.0
 
+    def times(self, factor: float) -> Timing:
+        """It in other time, to the millisecond."""
+        return Timing(round(factor * self.shift, 3), round(factor * self.swing, 3))
+
 
 Timings = tuple[Timing, ...] | Literal["auto"]
 """Timings to choose from; "auto": those of `own_choice`; empty: the world's, or "auto" where it names none."""
 
 
-def pace_of(com_height: float) -> float:
-    """Factor on times for a body whose CoM is at a height in m: that of a pendulum of this height."""
-    return math.sqrt(com_height / _HEIGHT)
-
-
-def own_choice(com_height: float, calmer: int = 0) -> tuple[Timing, ...]:
+def own_choice(factor: float, calmer: int = 0) -> tuple[Timing, ...]:
     """The timings that a planner may choose from for every transition, the calmest first.
 
-    They scale with the height of the CoM, in m. The more often the pace has yielded (`calmer`), the
-    slower they are, down to the paper's.
+    They scale with the robot's factor on times (`RobotModel.pace`). The more often the pace has yielded (`calmer`),
+    the slower they are, down to the paper's.
     """
-    factor = pace_of(com_height)
     pace = _PACES[min(calmer, len(_PACES) - 1)]
-    return tuple(Timing(round(factor * shift, 3), round(factor * swing, 3)) for shift, swing in pace)
+    return tuple(Timing(*times).times(factor) for times in pace)
 
 
-def timings_of(asked: Timings, own: Timing | None, com_height: float, calmer: int = 0) -> tuple[Timing, ...]:
+def timings_of(asked: Timings, own: Timing | None, factor: float, calmer: int = 0) -> tuple[Timing, ...]:
     """The timings of a search: those `asked` for, else the world's `own`, else the planner's `own_choice`."""
     if isinstance(asked, tuple) and asked:
         return asked
-    return (own,) if own is not None and asked != "auto" else own_choice(com_height, calmer)
+    return (own,) if own is not None and asked != "auto" else own_choice(factor, calmer)
