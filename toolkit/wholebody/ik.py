@@ -46,7 +46,7 @@ class WholeBodyIK:
         angular momentum about the vertical.
         """
         self.robot, self.tick, self.avoidance, self.lean, self.turning = robot, tick, avoidance, lean, turning
-        self.pace, self.per_area = robot.scale.time, 1.0 / robot.scale.length**2
+        self.pace, self.per_area = robot.scale.time * robot.rotor_factor, 1.0 / robot.scale.length**2
         self.wrapper = placo_wrapper(robot)
         self.order = pinocchio_map(robot, self.wrapper.model)
         self.solver = self.wrapper.make_solver()
