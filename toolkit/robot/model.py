@@ -211,7 +211,7 @@ class RobotModel:
 
     @property
     def rotor_factor(self) -> float:
-        """How many times as long it takes because of its legs' rotors; 1 where they are light (`toolkit.robot.scale`)."""
+        """How many times as long it takes because of its rotors; 1 where they are light (`toolkit.robot.scale`)."""
         legs = self.carrying(FEET)
         return rotor_factor(self.com_height, self.armature[legs], self.torque_limit[legs])
 
