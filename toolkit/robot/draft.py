@@ -150,7 +150,7 @@ def _mend(model: mujoco.MjModel, source: ModelSource, anatomy: Anatomy, inertia:
     if anatomy.forward[0] < 0.98:
         x, y = np.round(anatomy.forward, 6) + 0.0
         lines.append(f"forward = [{float(x)}, {float(y)}]   # the knees say where the toes point")
-    if source.upright:
+    if source.turned:
         lines.append("up_axis = true   # so the shapes lie around the links' centres of mass")
     if source.unread:
         shapes = ", ".join(f'{_key(name)} = "none"' for name in source.unread)

@@ -29,16 +29,14 @@ class ModelSource:
         spec: Content of the file, including the files that it names.
         velocity: Velocity limits in a URDF by joint, rad/s; MuJoCo ignores them.
         unread: Links of a URDF whose collision shapes cannot be read and were left out.
-        lying: Whether it has COLLADA shapes whose files say that y points up.
-        upright: Whether these were turned to have z up.
+        turned: Whether COLLADA shapes whose files say that y points up were turned to have z up.
     """
 
     path: Path
     spec: mujoco.MjSpec
     velocity: dict[str, float]
     unread: tuple[str, ...] = ()
-    lying: bool = False
-    upright: bool = False
+    turned: bool = False
 
 
 def find_model_file(description: RobotDescription) -> Path:
@@ -149,7 +147,7 @@ def read_model(path: Path, mend: Mend | None = None, *, lenient: bool = False, u
         raise RobotError(f"{path}: {error}") from None
     except (ValueError, OSError) as error:
         raise RobotError(f"{path}: MuJoCo cannot load it: {one_line(error)}") from None
-    return ModelSource(path, spec, velocity, tuple(unread), meshes.lying, meshes.upright)
+    return ModelSource(path, spec, velocity, tuple(unread), meshes.turned)
 
 
 def _velocity_limits(path: Path, root: ElementTree.Element) -> dict[str, float]:
@@ -208,16 +206,15 @@ class _Meshes:
 
     Attributes:
         assets: Content of those that had to be converted, by new names.
-        lying: Whether some of them say that their y axis points up.
-        upright: Whether these are turned to have z up.
+        turned: Whether some of them lay down and were turned.
     """
 
     def __init__(self, urdf: Path, upright: bool) -> None:
         self._urdf = urdf
         self._names: dict[Path, str] = {}
         self.assets: dict[str, bytes] = {}
-        self.lying = False
-        self.upright = upright
+        self.turned = False
+        self._upright = upright
 
     def name_of(self, name: str, drawn: bool) -> str:
         """What a mesh is called from now on: a path, or a name in `assets`.
@@ -232,8 +229,8 @@ class _Meshes:
         if ending not in READABLE or (drawn and ending == ".dae"):
             raise ValueError(f"is not one of {', '.join(sorted(READABLE))}")
         if file not in self._names:
-            content, self._names[file] = converted(file, upright=self.upright), str(file)
-            self.lying |= ending == ".dae" and lies_down(file)
+            content, self._names[file] = converted(file, upright=self._upright), str(file)
+            self.turned |= self._upright and ending == ".dae" and lies_down(file)
             if content is not None:
                 self._names[file] = f"{len(self._names)}_{file.stem}.stl"
                 self.assets[self._names[file]] = content

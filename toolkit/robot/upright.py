@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import mujoco
 import numpy as np
 
+from toolkit.geometry.pose import Pose
 from toolkit.robot.draft import compiled
 from toolkit.robot.source import ModelSource, read_model
 
@@ -23,10 +23,10 @@ def read_upright(path: Path) -> ModelSource:
         RobotError: As `read_model`.
         ValueError: MuJoCo cannot compile the file.
     """
-    source = read_model(path, lenient=True)
-    if not source.lying:
-        return source
     turned = read_model(path, lenient=True, upright=True)
+    if not turned.turned:
+        return turned
+    source = read_model(path, lenient=True)
     return turned if _astray(turned) < _CLEARLY * _astray(source) else source
 
 
@@ -35,10 +35,8 @@ def _astray(source: ModelSource) -> float:
     model = compiled(source.spec)[0]
     astray = 0.0
     for geom in np.flatnonzero(model.geom_contype | model.geom_conaffinity):
-        body = int(model.geom_bodyid[geom])
-        turn = np.zeros(9)
-        mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-        local = turn.reshape(3, 3).T @ (model.body_ipos[body] - model.geom_pos[geom])
+        body, pose = model.geom_bodyid[geom], Pose.from_quaternion(model.geom_pos[geom], model.geom_quat[geom])
+        local = pose.rotation.T @ (model.body_ipos[body] - pose.position)
         centre, half = model.geom_aabb[geom].reshape(2, 3)
         outside = np.maximum(np.abs(local - centre) - half, 0.0)
         astray += float(model.body_mass[body]) * float(np.linalg.norm(outside))
