@@ -11,6 +11,7 @@ LAYERS = [
     "errors",
     "shipped",
     "interruption",
+    "processes",
     "drafts",
     "compiled",
     "mjcf",

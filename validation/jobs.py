@@ -12,7 +12,6 @@ from typing import Any, Protocol
 
 from rich.console import Console
 
-from toolkit.interruption import starting_processes
 from toolkit.learning.jobs import executor
 from toolkit.report.console import progress_bar
 
@@ -173,7 +172,6 @@ def _run_in_pool(
 def _submit(pool: Executor, job: Job) -> Future | None:
     """The job's future; None where the pool is broken."""
     try:
-        with starting_processes():
-            return pool.submit(run_job, job)
+        return pool.submit(run_job, job)
     except BrokenExecutor:
         return None

@@ -9,17 +9,15 @@ from concurrent.futures import (
     CancelledError,
     Executor,
     Future,
-    ProcessPoolExecutor,
     wait,
 )
 from contextlib import contextmanager
 from itertools import islice
-from multiprocessing import get_context
 from typing import TypeVar
 
 from toolkit.errors import WorkerError
-from toolkit.interruption import end_with_parent, starting_processes
 from toolkit.learning.cluster import cluster_executor
+from toolkit.processes import Processes
 
 Result = TypeVar("Result")
 
@@ -40,7 +38,7 @@ def executor(workers: int, cluster: str | None = None, *, unencrypted: bool = Fa
         with cluster_executor(cluster, unencrypted=unencrypted) as pool:
             yield pool
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=end_with_parent) as pool:
+    with Processes(workers) as pool:
         yield pool
 
 
@@ -70,8 +68,7 @@ def run_jobs(
     try:
         while True:
             for job in islice(left, None if ahead is None else ahead - len(waiting)):
-                with starting_processes():
-                    waiting.add(pool.submit(work, *job))
+                waiting.add(pool.submit(work, *job))
             if not waiting:
                 return
             finished, waiting = wait(waiting, return_when=FIRST_COMPLETED)

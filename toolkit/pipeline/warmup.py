@@ -10,18 +10,18 @@ import gc
 import json
 import math
 import os
-import signal
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children
 from pathlib import Path
 from typing import NamedTuple
 
 from toolkit.compiled import is_kept, keep, kept_folder
-from toolkit.interruption import end_with_parent, starting_processes
+from toolkit.interruption import end_with_parent
 from toolkit.pipeline.observer import Observer
+from toolkit.processes import Processes
 
 KERNELS = Path(__file__).with_name("kernels.json")
 STAGE = "compiling"
@@ -81,9 +81,8 @@ def warm_up(observer: Observer) -> Iterator[None]:
         return
     began, others = time.perf_counter(), set(active_children())
     workers = _workers(kernels)
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin) as pool:
-        with starting_processes():
-            jobs = {pool.submit(keep, kernel.name, kernel.arguments): kernel for kernel in kernels}
+    with Processes(workers, _begin) as pool:
+        jobs = {pool.submit(keep, kernel.name, kernel.arguments): kernel for kernel in kernels}
         try:
             yield
             _wait(jobs, _ends([kernel.seconds for kernel in kernels], workers), observer, began)
@@ -100,8 +99,7 @@ def _workers(kernels: Sequence[Kernel]) -> int:
 
 
 def _begin() -> None:
-    """Prepare a process that compiles: it is short-lived, and leaves the answer to an interruption to its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Prepare a process that compiles, which is short-lived."""
     end_with_parent()
     gc.disable()  # a tenth of the time
 
