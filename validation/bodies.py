@@ -13,6 +13,7 @@ from toolkit.world.scaling import Fit
 from validation import goals, options
 from validation.cases import SCALED, kind_of, make_cases
 from validation.goals import Goal
+from validation.growing import add_growing_options, earlier_trials, stamped, state_of, states_note
 from validation.jobs import Job, Record, run_jobs
 from validation.run_trial import execution_trial
 from validation.tables import (
@@ -115,30 +116,40 @@ def main(argv: list[str] | None = None) -> int:
     parser = options.parser("bodies", DESCRIPTION, list(SCALED), 25)
     parser.epilog = options.GOAL_CODES
     cli.add_execution_options(parser)
+    add_growing_options(parser)
     parser.set_defaults(timing="auto")
     args = parser.parse_args(argv)
     console = make_console()
     settings = options.settings_of(args)
     robot = load_robot(args.robot, args.robots)
     fit = Fit.of(robot)
-    cases = make_cases(args.kinds, args.trials, args.seed_offset, fit)
+    cases = {case.name: case for case in make_cases(args.kinds, args.trials, args.seed_offset, fit)}
+    described = {**settings.described(), "trials": args.trials, "seed_offset": args.seed_offset}
     store = TrialFile(args.out / f"{robot.name}.jsonl", settings.deciding())
-    jobs = [Job(case.name, execution_trial, (settings, case)) for case in cases]
-    records = run_jobs(jobs, store, options.pool_of(args), console, "trials")
-    rows = [summarise(kind, [r for r, c in zip(records, cases, strict=True) if c.kind == kind]) for kind in args.kinds]
+    if args.grow:
+        for record in earlier_trials(args.results / f"bodies_{robot.name}.json", described, cases):
+            store.records.setdefault(record["name"], record)
+    jobs = [Job(name, execution_trial, (settings, case)) for name, case in cases.items()]
+    found = run_jobs(jobs, store, options.pool_of(args), console, "trials", args.minutes)
+    records = stamped(found, state_of(settings))
+    rows = [summarise(kind, [r for r in records if cases[r["name"]].kind == kind]) for kind in args.kinds]
     body = f"Lengths are {fit.factor:.2f} times the usual ones; tiles are at most {fit.tilt:.0f} degrees steep."
-    found = goals_of(rows)
+    goals_found = goals_of(rows)
     path = write_results(
         args.results,
         f"bodies_{robot.name}",
         title=f"What {robot.name} gets through",
-        sections=[("Terrain", body), ("Table", table(rows)), ("Failures", failure_section(records))],
+        sections=[
+            ("Terrain", body),
+            ("Table", f"{table(rows)}\n\n{states_note(records)}".strip()),
+            ("Failures", failure_section(records)),
+        ],
         content={"table": rows, "trials": records},
-        goals=found,
-        settings={**settings.described(), "trials": args.trials, "seed_offset": args.seed_offset},
+        goals=goals_found,
+        settings=described,
     )
     show_results(console, path)
-    return options.goal_code(found)
+    return options.goal_code(goals_found)
 
 
 if __name__ == "__main__":

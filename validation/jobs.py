@@ -81,7 +81,14 @@ def failed_record(reason: str, trace: str = "") -> Record:
     return {"stage": "error", "passed": False, "reason": reason, "traceback": trace}
 
 
-def run_jobs(jobs: Sequence[Job], store: Store, options: PoolOptions, console: Console, title: str) -> list[Record]:
+def run_jobs(
+    jobs: Sequence[Job],
+    store: Store,
+    options: PoolOptions,
+    console: Console,
+    title: str,
+    minutes: float | None = None,
+) -> list[Record]:
     """Run the jobs that have no record yet.
 
     Args:
@@ -90,10 +97,12 @@ def run_jobs(jobs: Sequence[Job], store: Store, options: PoolOptions, console: C
         options: where to run.
         console: shows progress.
         title: of the progress bar.
+        minutes: no job is started later than that; None for no end.
 
     Returns:
-        Records of all jobs, in order.
+        Records of the jobs that have one, in order: of all of them where there was time.
     """
+    end = time.monotonic() + (float("inf") if minutes is None else 60.0 * minutes)
     waiting = [job for job in jobs if job.name not in store.records]
     known = len(jobs) - len(waiting)
     if known or store.others:
@@ -114,43 +123,46 @@ def run_jobs(jobs: Sequence[Job], store: Store, options: PoolOptions, console: C
 
             if options.workers == 0:
                 for job in waiting:
-                    keep(run_job(job))
+                    if time.monotonic() < end:
+                        keep(run_job(job))
             elif waiting:
-                _run_in_pools(waiting, options, keep)
+                _run_in_pools(waiting, options, keep, end)
     finally:
         for name, value in before.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-    return [store.records[job.name] for job in jobs]
+    return [store.records[job.name] for job in jobs if job.name in store.records]
 
 
-def _run_in_pools(jobs: list[Job], options: PoolOptions, keep: Callable[[Record], None]) -> None:
+def _run_in_pools(jobs: list[Job], options: PoolOptions, keep: Callable[[Record], None], end: float) -> None:
     """Run jobs in a pool; what was under way when a process died runs again alone, and fails if it dies again."""
     size = _BATCH * max(options.workers, 1)
     suspects: list[tuple[Job, bool]] = []
     for first in range(0, len(jobs), size):
-        suspects += _run_in_pool(jobs[first : first + size], options, options.workers, keep)
+        suspects += _run_in_pool(jobs[first : first + size], options, options.workers, keep, end)
     while suspects:
         doubtful = [suspect for suspect in suspects if suspect[1]]
         for job, _ in doubtful:
-            if _run_in_pool([job], options, 1, keep):
+            if _run_in_pool([job], options, 1, keep, end):
                 keep({"name": job.name, **failed_record("its process died"), "load": 0.0, "wall_seconds": 0.0})
-        suspects = _run_in_pool([job for job, at_work in suspects if not at_work], options, options.workers, keep)
+        suspects = _run_in_pool([job for job, at_work in suspects if not at_work], options, options.workers, keep, end)
 
 
 def _run_in_pool(
-    jobs: list[Job], options: PoolOptions, workers: int, keep: Callable[[Record], None]
+    jobs: list[Job], options: PoolOptions, workers: int, keep: Callable[[Record], None], end: float
 ) -> list[tuple[Job, bool]]:
-    """Run jobs in one pool; returns those without a record because it broke, and whether each was under way."""
-    if not jobs:
+    """Run jobs in one pool, none after `end`; returns those lost because it broke, and whether each was under way."""
+    if not jobs or time.monotonic() >= end:
         return []
     left = list(jobs)[::-1]
     with executor(workers, options.cluster, unencrypted=options.unencrypted) as pool:
         running: dict[Future, Job] = {}
         lost: list[Job] = []
         while left or running:
+            if time.monotonic() >= end:
+                left.clear()
             while left and len(running) < max(workers, 1):
                 job = left.pop()
                 future = _submit(pool, job)

@@ -10,6 +10,7 @@ from toolkit.drafts import write_whole
 from toolkit.report.console import make_console
 from validation import goals, map_families, map_worlds, options
 from validation.goals import Goal
+from validation.growing import add_growing_options, earlier_trials, stamped, state_of, states_note
 from validation.jobs import Job, run_jobs
 from validation.machine import source_fingerprint
 from validation.map_families import FAMILIES, QUICK, SEEDS, Cell, cells_of
@@ -31,6 +32,8 @@ was: --out has a small file for each cell.
   python -m validation.map --quick                {QUICK} worlds of all families
   python -m validation.map --families gap beam    two families, every value, {SEEDS} seeds
   python -m validation.map --add-results          everything, into validation/results
+  python -m validation.map --add-results --grow --minutes 60
+                                                  an hour more of it: the results that are there grow
 """
 
 
@@ -48,15 +51,15 @@ def goals_of(rows: list[dict[str, Any]]) -> list[Goal]:
     ]
 
 
-def keep_worlds(folder: Path, cells: list[Cell], records: list[dict[str, Any]]) -> None:
+def keep_worlds(folder: Path, cells: dict[str, Cell], records: list[dict[str, Any]]) -> None:
     """Write the worlds of cells that did not pass, to run them again.
 
     Raises:
         InputError: They cannot be written.
     """
-    for cell, record in zip(cells, records, strict=True):
+    for record in records:
         if not record["passed"] and record["stage"] != "error":
-            write_whole(folder / f"{cell.name}.xml", cell.mjcf().encode())
+            write_whole(folder / f"{record['name']}.xml", cells[record["name"]].mjcf().encode())
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -83,18 +86,31 @@ def main(argv: list[str] | None = None) -> int:
         "--add-results", action="store_true", help="that is validation/results; the default is OUT/results"
     )
     cli.add_execution_options(parser)
+    add_growing_options(parser)
     parser.epilog = options.GOAL_CODES
     args = parser.parse_args(argv)
     console = make_console()
     settings = options.trial_settings(args)
     families = list(dict.fromkeys(args.families))
-    cells = cells_of(families, quick=args.quick, seeds=args.seeds, first=args.seed_offset)
-    deciding = settings.deciding() | {"worlds": worlds_fingerprint(), "candidates": CANDIDATES}
-    store = TrialFolder(args.out / "cells", deciding)
-    jobs = [Job(cell.name, map_trial, (settings, cell)) for cell in cells]
-    records = completed(run_jobs(jobs, store, options.pool_of(args), console, "cells"), cells)
-    keep_worlds(args.out / "worlds", cells, records)
+    cells = {cell.name: cell for cell in cells_of(families, quick=args.quick, seeds=args.seeds, first=args.seed_offset)}
     results = args.results or (options.RESULTS if args.add_results else args.out / "results")
+    worlds = worlds_fingerprint()
+    described = {
+        **settings.described(),
+        "candidates": CANDIDATES,
+        "worlds": worlds,
+        "quick": args.quick,
+        "seeds": args.seeds,
+        "seed_offset": args.seed_offset,
+    }
+    store = TrialFolder(args.out / "cells", settings.deciding() | {"worlds": worlds, "candidates": CANDIDATES})
+    if args.grow:
+        for record in earlier_trials(results / "map.json", described, cells):
+            store.records.setdefault(record["name"], record)
+    jobs = [Job(name, map_trial, (settings, cell)) for name, cell in cells.items()]
+    found = run_jobs(jobs, store, options.pool_of(args), console, "cells", args.minutes)
+    records = stamped(completed(found, cells), state_of(settings))
+    keep_worlds(args.out / "worlds", cells, records)
     by_family = {name: [record for record in records if record["family"] == name] for name in families}
     for name, own in by_family.items():
         draw_map(results / "map" / f"{name}.png", FAMILIES[name], own)
@@ -104,7 +120,7 @@ def main(argv: list[str] | None = None) -> int:
         "map",
         title="Where plans hold",
         sections=[
-            ("Table", f"{table(rows)}\n\n{NOTE}"),
+            ("Table", "\n\n".join(filter(None, (table(rows), _how_many(records, cells), states_note(records), NOTE)))),
             ("Holes", hole_table(rows)),
             ("Pictures", "\n\n".join(f"![{name}](map/{name}.png)" for name in families)),
             ("Failures", failure_section([record for record in records if record["outcome"] != IMPOSSIBLE])),
@@ -112,16 +128,16 @@ def main(argv: list[str] | None = None) -> int:
         ],
         content={"table": rows, "trials": records},
         goals=goals_of(rows),
-        settings={
-            **settings.described(),
-            "candidates": CANDIDATES,
-            "quick": args.quick,
-            "seeds": args.seeds,
-            "seed_offset": args.seed_offset,
-        },
+        settings=described,
     )
     show_results(console, path)
     return options.goal_code(goals_of(rows))
+
+
+def _how_many(records: list[dict[str, Any]], cells: dict[str, Cell]) -> str:
+    """A sentence where cells have not been run."""
+    missing = len(cells) - len(records)
+    return f"{missing} of {len(cells)} cells have not been run yet." if missing else ""
 
 
 NOTE = (

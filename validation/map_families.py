@@ -112,6 +112,9 @@ class Cell:
 def cells_of(names: Sequence[str], *, quick: bool, seeds: int | None = None, first: int = 0) -> list[Cell]:
     """Cells of some families, which take turns; those of a quick sweep are among those of the whole one.
 
+    Every value comes once before any comes with another seed, and the first ones lie far apart (the hardest, the
+    easiest, ...), so that a sweep that is not over yet shows the whole range.
+
     Args:
         names: Of families.
         quick: Whether to take `QUICK` worlds in all.
@@ -124,8 +127,21 @@ def cells_of(names: Sequence[str], *, quick: bool, seeds: int | None = None, fir
         values = FAMILIES[name].values()
         if quick:
             values = _some(FAMILIES[name], values, max(1, QUICK // (len(names) * seeds)))
-        sweeps.append([[Cell(name, each, first + seed) for seed in range(seeds)] for each in values])
-    return [cell for turn in zip_longest(*sweeps, fillvalue=[]) for cells in turn for cell in cells]
+        sweeps.append(_spread(values) if len(FAMILIES[name].axes) == 1 else values)
+    turns = [
+        [(name, each) for name, each in zip(names, turn, strict=True) if each is not None]
+        for turn in zip_longest(*sweeps)
+    ]
+    return [Cell(name, each, first + seed) for seed in range(seeds) for turn in turns for name, each in turn]
+
+
+def _spread(values: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    """Evenly spaced values, the last one first, in an order in which each is as far as possible from those before."""
+    order = [len(values) - 1]
+    while len(order) < len(values):
+        left = (index for index in range(len(values)) if index not in order)
+        order.append(max(left, key=lambda index: min(abs(index - other) for other in order)))
+    return [values[index] for index in order]
 
 
 def _some(family: Family, values: list[tuple[float, ...]], count: int) -> list[tuple[float, ...]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Any
 
 from toolkit import pipeline
@@ -53,9 +54,9 @@ def map_trial(settings: TrialSettings, cell: Cell) -> Record:
     return found
 
 
-def completed(records: list[Record], cells: list[Cell]) -> list[Record]:
+def completed(records: list[Record], cells: Mapping[str, Cell]) -> list[Record]:
     """Records of cells with their reasons in short words, and with what those lack that ended in an error."""
-    whole = [{**_record(cell, ERROR, "error", ""), **record} for record, cell in zip(records, cells, strict=True)]
+    whole = [{**_record(cells[record["name"]], ERROR, "error", ""), **record} for record in records]
     return [record | {"short": in_short(record["outcome"], record["reason"])} for record in whole]
 
 

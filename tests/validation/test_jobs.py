@@ -52,6 +52,15 @@ def test_an_interrupted_experiment_goes_on_where_it_stopped(tmp_path):
     assert len(path.read_text().splitlines()) == 3
 
 
+@pytest.mark.parametrize("workers", [0, 1])
+def test_no_trial_starts_when_the_time_is_up(tmp_path, workers):
+    store = TrialFile(tmp_path / "trials.jsonl", {"x": 1})
+    here = PoolOptions(workers=workers)
+    run_jobs([job("bb")], store, PoolOptions(workers=0), quiet(), "")
+    found = run_jobs([job("a", broken), job("bb")], store, here, quiet(), "", minutes=1e-9)
+    assert [record["name"] for record in found] == ["bb"]
+
+
 def test_a_line_cut_short_is_run_again(tmp_path):
     path = tmp_path / "trials.jsonl"
     store = TrialFile(path, {})

@@ -8,9 +8,11 @@ import pytest
 from rich.console import Console
 
 from tests.validation.test_programs import result
+from toolkit.errors import InputError
 from toolkit.world.loader import load_world
 from validation import map as program
 from validation import map_worlds, options
+from validation.growing import state_of
 from validation.jobs import Job, PoolOptions, run_jobs
 from validation.map_families import FAMILIES, QUICK, SEEDS, Cell, cells_of
 from validation.map_picture import draw_map
@@ -80,6 +82,14 @@ def test_a_quick_sweep_is_a_part_of_the_whole_one_and_families_take_turns():
     few = cells_of(["gap", "beam"], quick=True, seeds=10, first=5)
     assert len(few) == QUICK
     assert {cell.seed for cell in few} == set(range(5, 15))
+
+
+def test_a_sweep_shows_the_whole_range_before_it_is_over():
+    cells = cells_of(["gap"], quick=False)
+    assert [cell.seed for cell in cells] == sorted(cell.seed for cell in cells)
+    widths = [cell.values[0] for cell in cells]
+    assert widths[:3] == [0.5, 0.05, 0.275]
+    assert max(np.diff(sorted(widths[:9]))) < 0.07
 
 
 def test_a_world_is_moved_as_a_whole():
@@ -297,14 +307,16 @@ def settings_of(tmp_path, *arguments):
 
 def test_a_gap_as_wide_as_a_road_is_impossible(tmp_path):
     cell = Cell("gap", (3.0,), 0)
-    (found,) = completed([{"name": cell.name, **map_trial(settings_of(tmp_path), cell)}], [cell])
+    (found,) = completed([{"name": cell.name, **map_trial(settings_of(tmp_path), cell)}], {cell.name: cell})
     assert (found["outcome"], found["passed"]) == (IMPOSSIBLE, False)
     assert "ground" in found["short"]
 
 
 def test_an_error_of_the_program_is_an_outcome():
     cell = Cell("gap", (0.1,), 0)
-    (found,) = completed([{"name": cell.name, "stage": "error", "passed": False, "reason": "ValueError: 1"}], [cell])
+    (found,) = completed(
+        [{"name": cell.name, "stage": "error", "passed": False, "reason": "ValueError: 1"}], {cell.name: cell}
+    )
     assert (found["outcome"], found["family"], found["short"]) == (ERROR, "gap", "ValueError: #")
 
 
@@ -320,6 +332,30 @@ def test_a_tiny_sweep_writes_its_results_and_resumes(tmp_path, monkeypatch, caps
     capsys.readouterr()
     assert program.main(command) == 0
     assert "1 of 1 trials known from before" in capsys.readouterr().out
+
+
+def test_results_grow_on_another_machine(tmp_path, monkeypatch, capsys):
+    cells = [Cell("turn", (180.0,), 0)]
+    monkeypatch.setattr(program, "cells_of", lambda names, **_: cells)
+    results = ["--workers", "0", "--results", str(tmp_path / "results")]
+    command = ["--families", "turn", "--expansions", "1", "--planner", "kinematic", *results]
+    assert program.main([*command, "--out", str(tmp_path / "one")]) == 0
+    file = tmp_path / "results" / "map.json"
+    earlier = json.loads(file.read_text())
+    assert state_of(settings_of(tmp_path, *command[2:6])) == earlier["trials"][0]["state"]
+    earlier["trials"][0]["state"] = "0123 with robot 4567"
+    file.write_text(json.dumps(earlier))
+    cells.append(Cell("turn", (0.0,), 0))
+    capsys.readouterr()
+    more = [*command, "--grow", "--out", str(tmp_path / "two")]
+    assert program.main([*more, "--minutes", "1e-9"]) == 0
+    assert "1 of 2 cells have not been run yet" in capsys.readouterr().out
+    assert program.main(more) == 0
+    (row,) = result(results, "map")["table"]
+    assert row["cells"] == 2
+    assert "Trials by the code that made them: 1 0123 with robot 4567, 1 " in capsys.readouterr().out
+    with pytest.raises(InputError, match=r"other settings \(planner\)"):
+        program.main([*more, "--planner", "quasi-static"])
 
 
 @pytest.mark.slow

@@ -1,0 +1,78 @@
+"""Experiments that outgrow a sitting: they end when their time is up, and go on from the results that are there."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from toolkit import cli
+from toolkit.errors import InputError
+from validation.jobs import Record
+from validation.options import TrialSettings
+
+_FREE = {"quick", "seeds", "seed_offset", "trials"}  # settings that choose trials and do not change them
+
+
+def add_growing_options(target: argparse.ArgumentParser) -> None:
+    """Add `--minutes` and `--grow`."""
+    target.add_argument(
+        "--minutes",
+        type=cli.positive(float),
+        metavar="M",
+        help="start no trial later than that, and write the results of those that ended (default: all of them)",
+    )
+    target.add_argument(
+        "--grow",
+        action="store_true",
+        help="take over the trials of the results that are there, with whatever code they were made; "
+        "the results say how many were made with which",
+    )
+
+
+def state_of(settings: TrialSettings) -> str:
+    """The state of the code and of the robot's files that records are made with."""
+    deciding = settings.deciding()
+    return f"{deciding['code']} with robot {deciding['robot_files']}"
+
+
+def stamped(records: Iterable[Record], state: str) -> list[Record]:
+    """Records that say what they were made with; those that say so already are left as they are."""
+    return [{"state": state, **record} for record in records]
+
+
+def earlier_trials(path: Path, settings: dict[str, Any], names: Iterable[str]) -> list[Record]:
+    """Trials of results that are there, which say what they were made with.
+
+    Args:
+        path: The results' JSON file; there are no trials where there is no file.
+        settings: Those of the results to come; apart from what chooses the trials they have to be the same.
+        names: Of the trials that are wanted.
+
+    Raises:
+        InputError: The file cannot be read, or was made with other settings.
+    """
+    if not path.exists():
+        return []
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        theirs, trials = content["settings"], content["trials"]
+        code = content["code"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: holds no results to go on from ({error}); leave out --grow") from error
+    differ = sorted(name for name in (set(settings) | set(theirs)) - _FREE if settings.get(name) != theirs.get(name))
+    if differ:
+        raise InputError(f"{path}: was made with other settings ({', '.join(differ)}); leave out --grow")
+    wanted = set(names)
+    return stamped((trial for trial in trials if trial["name"] in wanted), f"{code} with robot files unrecorded")
+
+
+def states_note(records: Sequence[Record]) -> str:
+    """A sentence on how many trials were made with which state of the code; "" where all were made with one."""
+    counts = Counter(record["state"] for record in records)
+    if len(counts) < 2:
+        return ""
+    return "Trials by the code that made them: " + ", ".join(f"{n} {state}" for state, n in counts.most_common()) + "."
