@@ -18,7 +18,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.legs import legs_of, stances_violated
-from toolkit.search.moves.limits import drops, margins
+from toolkit.search.moves.limits import SHIFTS, drops, margins
 from toolkit.search.moves.shanks import shanks_of
 
 _ADVANCE = 0.1  # m for a leg of 0.8 m; landing places of the table that lead farther are enough
@@ -81,13 +81,19 @@ class DrawnSteps:
 
 
 def longest_step(robot: RobotModel) -> float:
-    """The longest step in m that the legs reach on level ground, with the CoM as low as a search lets it be."""
+    """The longest step in m that the legs reach on level ground, with the CoM as low as a search lets it be.
+
+    The CoM may be anywhere between the feet where the screens look for it.
+    """
     leg = robot.legs[Limb.LEFT_FOOT]
     along = np.arange(0.1, 2.0, 0.01) * (leg.thigh + leg.shin)
     beside = abs(robot.legs[Limb.LEFT_FOOT].hip_in_com[1] - robot.legs[Limb.RIGHT_FOOT].hip_in_com[1])
     left = np.column_stack([along, np.full(len(along), beside), np.zeros(len(along))])
     right, turn = np.zeros_like(left), np.tile(np.eye(3), (len(along), 1, 1))
-    com = left / 2 + [0.0, 0.0, robot.com_height]
     legs, shanks = legs_of(robot, margins(robot)), shanks_of(robot)
-    codes = stances_violated(legs, shanks, com, drops(robot), np.zeros(len(along)), left, turn, right, turn)
-    return float(along[codes == 0].max(initial=0.0))
+    soles, heading = (left, turn, right, turn), np.zeros(len(along))
+    reached = np.zeros(len(along), bool)
+    for shift in SHIFTS:
+        com = (0.5 + shift) * left + [0.0, 0.0, robot.com_height]
+        reached |= stances_violated(legs, shanks, com, drops(robot), heading, *soles) == 0
+    return float(along[reached].max(initial=0.0))

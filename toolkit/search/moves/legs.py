@@ -25,6 +25,7 @@ from toolkit.search.moves.shanks import legs_apart
 
 _FIELD = tuple(LegPosture._fields.index(limit.quantity) for limit in LIMITS)  # field of each limit's quantity
 _LENGTH = [limit.quantity for limit in LIMITS].index("length")
+_BARELY = 1e-6  # m; what a leg is bent more than at its greatest length, against rounding
 
 
 class Legs(NamedTuple):
@@ -85,6 +86,24 @@ def reach(legs, side, com, yaw, position, rotation):
 
 
 @compiled
+def least_drop(legs, com, yaw, left, left_rotation, right, right_rotation):
+    """By how many m a CoM has to be lower for both legs to reach their soles, bent as little as they may be.
+
+    Below 0 where it may be higher, infinite where they do not reach at any height; arguments: see `reach`.
+    """
+    heading, least = (np.cos(yaw), np.sin(yaw)), -np.inf
+    for side in range(2):
+        position, rotation = (left, left_rotation) if side == 0 else (right, right_rotation)
+        hip, ankle = hip_at(com, heading, legs.hip[side]), ankle_at(position, rotation, legs.ankle[side])
+        longest = legs.ranges[side, _LENGTH, 1] - _BARELY
+        upright = longest**2 - (hip[0] - ankle[0]) ** 2 - (hip[1] - ankle[1]) ** 2
+        if upright <= 0.0:
+            return np.inf
+        least = max(least, hip[2] - ankle[2] - np.sqrt(upright))
+    return least
+
+
+@compiled
 def _heading(rotation):
     """Heading in rad of a sole with the rotation (3, 3)."""
     return np.arctan2(rotation[1, 0], rotation[0, 0])
@@ -94,7 +113,8 @@ def _heading(rotation):
 def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, right_rotation):
     """(n,) int; why the legs cannot take each of n stances with the first drop, 0 where they can with some drop.
 
-    The CoMs com (n, 3) m may be lower by any of the drops (k,) m; yaw (n,) rad is the heading of the base. The centres
+    The CoMs com (n, 3) m may be lower by any of the rising drops (k,) m, and by what the legs need to reach (see
+    `least_drop`), which comes first where it lies between them; yaw (n,) rad is the heading of the base. The centres
     left and right (n, 3) m of the soles come with their rotations (n, 3, 3); shanks: see `Body`.
     """
     result = np.zeros(len(com), np.int64)
@@ -104,8 +124,17 @@ def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, 
         if toes < legs.toes[0] or toes > legs.toes[1]:
             result[row] = Reason.HIP_YAW
             continue
-        for k in range(len(drops)):
-            place = (com[row, 0], com[row, 1], com[row, 2] - drops[k])
+        soles = (left[row], left_rotation[row], right[row], right_rotation[row])
+        place = (com[row, 0], com[row, 1], com[row, 2])
+        first = max(drops[0], least_drop(legs, place, yaw[row], *soles))
+        if first > drops[-1]:
+            result[row] = OF_LIMIT[_LENGTH]
+            continue
+        for k in range(-1, len(drops)):
+            drop = first if k < 0 else drops[k]
+            if k >= 0 and drop <= first:
+                continue
+            place = (com[row, 0], com[row, 1], com[row, 2] - drop)
             reason, a = reach(legs, 0, place, yaw[row], left[row], left_rotation[row])
             if reason == 0:
                 reason, b = reach(legs, 1, place, yaw[row], right[row], right_rotation[row])
@@ -114,6 +143,6 @@ def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, 
             if reason == 0:
                 result[row] = 0
                 break
-            if k == 0:
+            if k < 0:
                 result[row] = reason
     return result

@@ -8,6 +8,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.physics.leg import ReachMargins
 from toolkit.robot.model import RobotModel
 
+SHIFTS = (0.0, -0.25, 0.25)  # parts of the way from one sole to the other, from their middle, where the CoM may be
 _DROP = 0.25  # part of its height at home by which the CoM may be lower
 # Margins of the legs of a body of the usual size (`toolkit.robot.scale`). The hips' is negative, as the base, which the
 # closed form keeps upright, may help them.

@@ -11,13 +11,11 @@ import numpy as np
 
 from toolkit.compiled import compiled
 from toolkit.geometry.heading import mean_heading, wrapped
-from toolkit.search.moves.legs import Legs, reach
+from toolkit.search.moves.legs import Legs, least_drop, reach
+from toolkit.search.moves.limits import SHIFTS
 from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free, lowest_drop
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.shanks import Shanks, leg_free, legs_apart
-
-_SHIFTS = (0.0, -0.25, 0.25)  # parts of the way from one sole to the other, from their middle, where the CoM may be
-
 
 class Soles(NamedTuple):
     """New soles.
@@ -94,21 +92,33 @@ def rectangles_overlap(ax, ay, ayaw, bx, by, byaw, hx, hy):
 def _legs_code(body, limits, least, side, position, rotation, stand, heading):
     """Why the legs cannot stand on a new sole and a standing one with any allowed CoM; 0 where they can.
 
-    Of the drops of the CoM only those from number `least` on are allowed.
+    Of the drops of the CoM only those from number `least` on are allowed, and what the legs need to reach between them.
     """
     p, q = position, stand.position
     x, y, z = (p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2 + limits.com_height
-    code = 0
-    for m in range(len(_SHIFTS)):
-        cx, cy = x + _SHIFTS[m] * (p[0] - q[0]), y + _SHIFTS[m] * (p[1] - q[1])
-        for k in range(least, len(limits.drops)):
-            com = (cx, cy, z - limits.drops[k])
+    drops, code = limits.drops, 0
+    for m in range(len(SHIFTS)):
+        cx, cy = x + SHIFTS[m] * (p[0] - q[0]), y + SHIFTS[m] * (p[1] - q[1])
+        if side == 0:
+            needed = least_drop(body.legs, (cx, cy, z), heading, p, rotation, q, stand.rotation)
+        else:
+            needed = least_drop(body.legs, (cx, cy, z), heading, q, stand.rotation, p, rotation)
+        first = max(drops[least], needed)
+        if first > drops[-1]:
+            if m == 0:
+                code = Reason.LEG_LENGTH
+            continue
+        for k in range(least - 1, len(drops)):
+            drop = first if k < least else drops[k]
+            if k >= least and drop <= first:
+                continue
+            com = (cx, cy, z - drop)
             broken, new = reach(body.legs, side, com, heading, p, rotation)
             old = new
             if broken == 0:
                 broken, old = reach(body.legs, 1 - side, com, heading, q, stand.rotation)
             if broken > 0:
-                if m == 0 and k == least:
+                if m == 0 and k < least:
                     code = broken
             elif not legs_apart(body.shanks, new, old):
                 code = Reason.KNEES
