@@ -17,6 +17,7 @@ from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free, lowest
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.shanks import Shanks, leg_free, legs_apart
 
+
 class Soles(NamedTuple):
     """New soles.
 
