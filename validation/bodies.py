@@ -13,7 +13,7 @@ from toolkit.world.scaling import Fit
 from validation import goals, options
 from validation.cases import SCALED, kind_of, make_cases
 from validation.goals import Goal
-from validation.growing import add_growing_options, earlier_trials, stamped, state_of, states_note
+from validation.growing import add_growing_options, earlier_trials, growth_note, stamped, state_of
 from validation.jobs import Job, Record, run_jobs
 from validation.run_trial import execution_trial
 from validation.tables import (
@@ -141,7 +141,7 @@ def main(argv: list[str] | None = None) -> int:
         title=f"What {robot.name} gets through",
         sections=[
             ("Terrain", body),
-            ("Table", f"{table(rows)}\n\n{states_note(records)}".strip()),
+            ("Table", f"{table(rows)}\n\n{growth_note(records, len(cases), state_of(settings))}".strip()),
             ("Failures", failure_section(records)),
         ],
         content={"table": rows, "trials": records},

@@ -60,6 +60,7 @@ def earlier_trials(path: Path, settings: dict[str, Any], names: Iterable[str]) -
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         theirs, trials = content["settings"], content["trials"]
+        trials = list(trials.values()) if isinstance(trials, dict) else trials
         code = content["code"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: holds no results to go on from ({error}); leave out --grow") from error
@@ -70,9 +71,13 @@ def earlier_trials(path: Path, settings: dict[str, Any], names: Iterable[str]) -
     return stamped((trial for trial in trials if trial["name"] in wanted), f"{code} with robot files unrecorded")
 
 
-def states_note(records: Sequence[Record]) -> str:
-    """A sentence on how many trials were made with which state of the code; "" where all were made with one."""
-    counts = Counter(record["state"] for record in records)
-    if len(counts) < 2:
-        return ""
-    return "Trials by the code that made them: " + ", ".join(f"{n} {state}" for state, n in counts.most_common()) + "."
+def growth_note(records: Sequence[Record], wanted: int, state: str) -> str:
+    """How many of the wanted trials are missing, and what made the others where not all are of the present state."""
+    missing, counts = wanted - len(records), Counter(record["state"] for record in records)
+    states = ", ".join(f"{count} {state}" for state, count in counts.most_common())
+    return " ".join(
+        [
+            *([f"{missing} of {wanted} trials have not been run yet."] if missing else []),
+            *([f"Trials by the code that made them: {states}."] if set(counts) - {state} else []),
+        ]
+    )

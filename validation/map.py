@@ -10,7 +10,7 @@ from toolkit.drafts import write_whole
 from toolkit.report.console import make_console
 from validation import goals, map_families, map_worlds, options
 from validation.goals import Goal
-from validation.growing import add_growing_options, earlier_trials, stamped, state_of, states_note
+from validation.growing import add_growing_options, earlier_trials, growth_note, stamped, state_of
 from validation.jobs import Job, run_jobs
 from validation.machine import source_fingerprint
 from validation.map_families import FAMILIES, QUICK, SEEDS, Cell, cells_of
@@ -120,7 +120,10 @@ def main(argv: list[str] | None = None) -> int:
         "map",
         title="Where plans hold",
         sections=[
-            ("Table", "\n\n".join(filter(None, (table(rows), _how_many(records, cells), states_note(records), NOTE)))),
+            (
+                "Table",
+                "\n\n".join(filter(None, (table(rows), growth_note(records, len(cells), state_of(settings)), NOTE))),
+            ),
             ("Holes", hole_table(rows)),
             ("Pictures", "\n\n".join(f"![{name}](map/{name}.png)" for name in families)),
             ("Failures", failure_section([record for record in records if record["outcome"] != IMPOSSIBLE])),
@@ -132,12 +135,6 @@ def main(argv: list[str] | None = None) -> int:
     )
     show_results(console, path)
     return options.goal_code(goals_of(rows))
-
-
-def _how_many(records: list[dict[str, Any]], cells: dict[str, Cell]) -> str:
-    """A sentence where cells have not been run."""
-    missing = len(cells) - len(records)
-    return f"{missing} of {len(cells)} cells have not been run yet." if missing else ""
 
 
 NOTE = (

@@ -20,6 +20,7 @@ from toolkit.report.files import read_json
 from toolkit.robot.loader import load_robot
 from validation import goals, options
 from validation.cases import Case
+from validation.growing import add_growing_options, earlier_trials, growth_note, stamped, state_of
 from validation.jobs import Job, Record, run_jobs
 from validation.machine import ROOT
 from validation.options import TrialSettings
@@ -170,11 +171,13 @@ def picture_text(records: dict[str, Record], pictures: Path, folder: Path, drawn
     """The pictures, copied beside the page."""
     parts = [f"{words}\n\n![{words}](paper/{name}.png)" for name, words in drawn]
     for picture in PICTURES:
-        record = records[f"picture-{picture.name}"]
+        record = records.get(f"picture-{picture.name}", {"passed": False})
         verdict = "every wanted stage passed" if record["passed"] else record.get("reason") or "it was not drawn"
         for name, words in picture.files:
-            if (pictures / f"{name}.png").is_file():
-                shutil.copyfile(pictures / f"{name}.png", folder / f"{name}.png")
+            drawn_now, kept = pictures / f"{name}.png", folder / f"{name}.png"
+            if drawn_now.is_file():
+                shutil.copyfile(drawn_now, kept)
+            if kept.is_file() and record.get("stage") == "done":
                 count = record.get("transitions")
                 parts.append(f"{words} {count} transitions; {verdict}.\n\n![{words}](paper/{name}.png)")
             else:
@@ -229,6 +232,7 @@ def arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.epilog = "exit codes: 0 the page is written, 2 bad input"
     parser.set_defaults(planner="learned", expansions=None)
     parser.add_argument("--quick", action="store_true", help="few worlds, short limits")
+    add_growing_options(parser)
     parser.add_argument("--trials", type=cli.positive(int), metavar="N", help="worlds of each kind")
     parser.add_argument("--rival-trials", type=cli.positive(int), metavar="N", help="worlds for the rivals")
     parser.add_argument("--mixed-seconds", type=cli.positive(float), metavar="S", help="limit of an integer program")
@@ -262,9 +266,18 @@ def main(argv: list[str] | None = None) -> int:
         name = f"picture-{picture.name}"
         if store.records.get(name, {}).get("stage") == "done" and not (pictures / f"{picture.name}.png").is_file():
             del store.records[name]
-    found = run_jobs(jobs, store, options.pool_of(args), console, "trials")
-    records = {job.name: without_folders(record) for job, record in zip(jobs, found, strict=True)}
-    _write(args, size, settings, solvers, records, known, folder, console)
+    described = {
+        **settings.described(),
+        "trials": size.trials,
+        "quick": args.quick,
+        "seed_offset": args.seed_offset,
+    }
+    if args.grow:
+        for record in earlier_trials(args.results / "paper.json", described, [job.name for job in jobs]):
+            store.records.setdefault(record["name"], record)
+    found = stamped(run_jobs(jobs, store, options.pool_of(args), console, "trials", args.minutes), state_of(settings))
+    records = {record["name"]: without_folders(record) for record in found}
+    _write(args, size, settings, described, solvers, records, len(jobs), known, folder, console)
     return 0
 
 
@@ -272,8 +285,10 @@ def _write(
     args: argparse.Namespace,
     size: Size,
     settings: TrialSettings,
+    described: dict[str, Any],
     solvers: Sequence[str],
     records: dict[str, Record],
+    wanted: int,
     known: dict[str, dict[str, Any]],
     folder: Path,
     console: Console,
@@ -288,20 +303,22 @@ def _write(
     worse = [line for section in sections for line in section.worse]
     compared = [row for section in sections for row in _rows(section.content)]
     bad = sum(row["worse"] for row in compared)
+    made = [run_text(size, args.quick, solvers, values(records.values(), "load"))]
+    made.append(growth_note(list(records.values()), wanted, state_of(settings)))
     path = write_results(
         args.results,
         "paper",
         title="The paper on one page",
         sections=[
             ("Where ours is worse", "\n".join(worse) or "Nowhere."),
-            ("How this page was made", run_text(size, args.quick, solvers, values(records.values(), "load"))),
+            ("How this page was made", "\n\n".join(filter(None, made))),
             *((section.title, section.text) for section in sections),
             ("Figures", picture_text(records, args.out / "pictures", folder, drawn)),
             ("Trials that failed", failure_section(list(records.values()))),
         ],
         content={"worse": worse, **{section.title: section.content for section in sections}, "trials": records},
         goals=[goals.every("figures of the paper that ours are no worse than", len(compared) - bad, len(compared))],
-        settings={**settings.described(), "trials": size.trials, "quick": args.quick, "seed_offset": args.seed_offset},
+        settings=described,
     )
     show_results(console, path)
 

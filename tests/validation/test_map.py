@@ -345,11 +345,11 @@ def test_results_grow_on_another_machine(tmp_path, monkeypatch, capsys):
     assert state_of(settings_of(tmp_path, *command[2:6])) == earlier["trials"][0]["state"]
     earlier["trials"][0]["state"] = "0123 with robot 4567"
     file.write_text(json.dumps(earlier))
-    cells.append(Cell("turn", (0.0,), 0))
+    cells.append(Cell("turn", (171.0,), 0))
     capsys.readouterr()
     more = [*command, "--grow", "--out", str(tmp_path / "two")]
     assert program.main([*more, "--minutes", "1e-9"]) == 0
-    assert "1 of 2 cells have not been run yet" in capsys.readouterr().out
+    assert "1 of 2 trials have not been run yet" in capsys.readouterr().out
     assert program.main(more) == 0
     (row,) = result(results, "map")["table"]
     assert row["cells"] == 2
