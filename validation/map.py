@@ -115,6 +115,7 @@ def main(argv: list[str] | None = None) -> int:
     for name, own in by_family.items():
         draw_map(results / "map" / f"{name}.png", FAMILIES[name], own)
     rows = [summarise(name, own) for name, own in by_family.items()]
+    growth = growth_note(records, len(cells), state_of(settings))
     path = write_results(
         results,
         "map",
