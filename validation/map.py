@@ -121,10 +121,7 @@ def main(argv: list[str] | None = None) -> int:
         "map",
         title="Where plans hold",
         sections=[
-            (
-                "Table",
-                "\n\n".join(filter(None, (table(rows), growth_note(records, len(cells), state_of(settings)), NOTE))),
-            ),
+            ("Table", "\n\n".join(filter(None, (table(rows), growth, NOTE)))),
             ("Holes", hole_table(rows)),
             ("Pictures", "\n\n".join(f"![{name}](map/{name}.png)" for name in families)),
             ("Failures", failure_section([record for record in records if record["outcome"] != IMPOSSIBLE])),
