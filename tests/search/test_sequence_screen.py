@@ -109,6 +109,8 @@ def test_limbs_must_reach_in_the_motion(robot, found):
 def test_steps_of_a_stance_are_those_of_the_search(found, sequence):
     stance, timing = sequence.start, sequence.transitions[0].timing
     for foot in FEET:
-        steps = found.screen.steps(stance, foot, timing)
-        assert len(steps) > 5 and all(step.limb == foot and step.timing == timing for step in steps)
-        assert all(found.screen.passes(ContactSequence(stance, (step,))) for step in steps)
+        (numbers,) = found.screen.numbers(ContactSequence(stance, ()))
+        steps = [found.screen.table.contact(int(number)) for number in found.screen.steps(numbers, foot, timing)]
+        assert len(steps) > 5 and all(step.limb == foot for step in steps)
+        made = (ContactTransition(foot, step, timing) for step in steps)
+        assert all(found.screen.passes(ContactSequence(stance, (step,))) for step in made)

@@ -7,6 +7,8 @@ sequence that is already optimised gives the scale.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
@@ -49,27 +51,71 @@ def travel(sequence: ContactSequence, pace: float = 1.0) -> float:
 
     `pace` is the factor on the robot's times.
     """
-    n, rest = len(sequence.transitions), pace * _REST
-    feet = np.array([[contact.pose.position for contact in sequence.start.feet]] * (n + 1))
-    standing, times, now, held = np.full(n, -1), np.empty(n + 2), 0.0, set(sequence.start.palms)
-    over = np.full(n, _HELD)
-    times[0] = -rest
-    for index, transition in enumerate(sequence.transitions):
-        if not held:
-            over[index] = _OVER
-        if transition.contact is None:
-            held.discard(transition.limb)
-        elif transition.limb.is_foot:
-            feet[index + 1 :, transition.limb] = transition.contact.pose.position
-            standing[index] = transition.limb.mirrored
-        else:
-            held.add(transition.limb)
-        times[index + 1] = now + transition.timing.shift + transition.timing.swing / 2
-        now += transition.timing.shift + transition.timing.swing
-    times[-1] = now + rest
-    middle = feet.mean(1)
-    places = np.empty((n + 2, 3))
-    places[0], places[-1], places[1:-1] = middle[0], middle[-1], (middle[:-1] + middle[1:]) / 2
-    steps = np.flatnonzero(standing >= 0)
-    places[1 + steps] += over[steps, None] * (feet[steps, standing[steps]] - places[1 + steps])
-    return float(((np.diff(places, axis=0) ** 2).sum(1) / np.diff(times)).sum())
+    return float(Walk.of(sequence).travel(pace))
+
+
+class Walk(NamedTuple):
+    """Where the feet stand in a sequence of n transitions, or in several that differ in places and feet only.
+
+    Attributes:
+        feet: (..., n + 1, 2, 3) m; their places in each stance.
+        standing: (..., n) int; the foot that stands while the other one swings, -1 while a palm moves.
+        over: (n,); part of the way from the middle of the feet to the standing one, in the middle of a swing.
+        times: (n, 2) s; shift and swing.
+    """
+
+    feet: np.ndarray
+    standing: np.ndarray
+    over: np.ndarray
+    times: np.ndarray
+
+    @classmethod
+    def of(cls, sequence: ContactSequence) -> Walk:
+        """The walk of one sequence."""
+        n, held = len(sequence.transitions), set(sequence.start.palms)
+        feet = np.array([[contact.pose.position for contact in sequence.start.feet]] * (n + 1))
+        standing, over, times = np.full(n, -1), np.full(n, _HELD), np.empty((n, 2))
+        for index, transition in enumerate(sequence.transitions):
+            times[index] = transition.timing.shift, transition.timing.swing
+            if not held:
+                over[index] = _OVER
+            if transition.contact is None:
+                held.discard(transition.limb)
+            elif transition.limb.is_foot:
+                feet[index + 1 :, transition.limb] = transition.contact.pose.position
+                standing[index] = transition.limb.mirrored
+            else:
+                held.add(transition.limb)
+        return cls(feet, standing, over, times)
+
+    def linked(self, first: int, last: int, feet: np.ndarray, standing: np.ndarray) -> Walk:
+        """Walks, m of them, in which k steps stand for those from one stance to a later one.
+
+        Args:
+            first: Number of the stance; only feet move from there on
+            last: to this one.
+            feet: (m, k - 1, 2, 3) m; places of the feet in the stances in between.
+            standing: (m, k) int; the feet that stand.
+        """
+        many, steps = standing.shape
+        ends = [np.broadcast_to(part, (many, *part.shape)) for part in (self.feet[: first + 1], self.feet[last:])]
+        limbs = [np.broadcast_to(part, (many, *part.shape)) for part in (self.standing[:first], self.standing[last:])]
+        return Walk(
+            np.concatenate([ends[0], feet, ends[1]], axis=1),
+            np.concatenate([limbs[0], standing, limbs[1]], axis=1),
+            np.concatenate([self.over[:first], np.repeat(self.over[first], steps), self.over[last:]]),
+            np.concatenate([self.times[:first], np.repeat(self.times[first : first + 1], steps, 0), self.times[last:]]),
+        )
+
+    def travel(self, pace: float) -> np.ndarray:
+        """(...); see `travel`."""
+        rest, spans = pace * _REST, self.times.sum(1)
+        begins = np.concatenate([[0.0], np.cumsum(spans)])
+        times = np.concatenate([[-rest], begins[:-1] + self.times[:, 0] + self.times[:, 1] / 2, begins[-1:] + rest])
+        middle = self.feet.mean(-2)
+        swings = (middle[..., :-1, :] + middle[..., 1:, :]) / 2
+        foot = np.maximum(self.standing, 0)[..., None, None]
+        stands = np.take_along_axis(self.feet[..., :-1, :, :], foot, axis=-2)[..., 0, :]
+        swings = swings + np.where(self.standing >= 0, self.over, 0.0)[..., None] * (stands - swings)
+        places = np.concatenate([middle[..., :1, :], swings, middle[..., -1:, :]], axis=-2)
+        return ((np.diff(places, axis=-2) ** 2).sum(-1) / np.diff(times)).sum(-1)

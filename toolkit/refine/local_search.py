@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.centroidal.plan import MotionPlan, keeps_margins
 from toolkit.contacts.room import RoomConfig
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.refine.foresight import Foresight, travel
+from toolkit.refine.foresight import Foresight
 from toolkit.refine.variants import left_out, relinked, swapped, without_palms
 from toolkit.search.costs.edge_cost import CostConfig, arrival_radius
 from toolkit.search.costs.plan_cost import PlanCost, plan_cost
@@ -150,11 +150,12 @@ class LocalSearch:
         """Variants that pass the screens, those that are guessed to be the cheapest first."""
         guess = Foresight(plan.sequence, cost, self._cost, plan.world.goal, plan.robot.scale)
         fewer = {each.identity: each for each in (*without_palms(sequence, screen), *left_out(sequence, screen))}
-        groups = chain(relinked(sequence, screen), ([each] for each in swapped(sequence, screen))) if all_kinds else ()
+        swaps = (iter([each]) for each in swapped(sequence, screen))
+        groups = chain(relinked(sequence, screen), swaps) if all_kinds else ()
         most = cost.total * (1.0 + self._config.prospect)
         others: dict[bytes, ContactSequence] = {}
         for group in groups:
-            best = min(group, key=travel, default=sequence)  # those of a group take equally long
+            best = next(group, sequence)  # those of a group take equally long, and the others travel more
             if best.identity not in fewer and guess(best) <= most:
                 others[best.identity] = best
         others.pop(sequence.identity, None)

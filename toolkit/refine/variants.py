@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
-from toolkit.contacts.stance import Stance
 from toolkit.geometry.heading import wrapped
 from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.refine.foresight import Walk
 from toolkit.search.sequence_screen import SequenceScreen
+from toolkit.world.timing import Timing
 
 _APART = 3  # transitions; two that are farther apart can be left out together if each of them can be left out alone
 _WINDOW = 7  # most transitions that are replaced together
@@ -67,28 +70,23 @@ def swapped(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[Conta
             yield variant
 
 
-def relinked(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[list[ContactSequence]]:
+def relinked(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[Iterator[ContactSequence]]:
     """Sequences in which other steps lead from one stance to a later one: fewer, as many or a few more.
 
-    Those with as many steps between the same stances come together, since they differ little.
-
-    New contacts in between are steps that the search itself would consider, near the straight way of their foot.
+    Those with as many steps between the same stances come together, since they differ little, the one on which the CoM
+    travels least first. New contacts in between are steps that the search itself would consider, near the straight way
+    of their foot.
     """
-    transitions, stances = sequence.transitions, sequence.stances
+    transitions, links = sequence.transitions, _Links(sequence, screen)
     for first in range(len(transitions)):
+        if not transitions[first].limb.is_foot:
+            continue
         for last in range(first + 2, min(first + _WINDOW, len(transitions)) + 1):
-            window = transitions[first:last]
-            if not window[-1].limb.is_foot:
+            if not transitions[last - 1].limb.is_foot:
                 break
-            for count in range(max(1, len(window) - _LESS), min(len(window) + _MORE, _STEPS) + 1):
-                before = transitions[first - 1].limb if first else None
-                group = []
-                for chain in _chains(stances[first], before, stances[last], count, window, screen):
-                    changed = ContactSequence(stances[first], (*chain, *transitions[last : last + 1]))
-                    if screen.passes(changed, before):
-                        made = (*transitions[:first], *chain, *transitions[last:])
-                        group.append(replace(sequence, transitions=made))
-                yield group
+            steps = last - first
+            for count in range(max(1, steps - _LESS), min(steps + _MORE, _STEPS) + 1):
+                yield links.between(first, last, count)
 
 
 def _without(sequence: ContactSequence, dropped: set[int]) -> ContactSequence:
@@ -97,57 +95,89 @@ def _without(sequence: ContactSequence, dropped: set[int]) -> ContactSequence:
     return replace(sequence, transitions=tuple(kept))
 
 
-def _chains(
-    start: Stance,
-    moved_last: Limb | None,
-    end: Stance,
-    count: int,
-    window: tuple[ContactTransition, ...],
-    screen: SequenceScreen,
-) -> Iterator[tuple[ContactTransition, ...]]:
-    """Chains of `count` steps from one stance to the feet of another, in place of the transitions of a window."""
-    if any(not item.limb.is_foot for item in window):
-        return
-    timing = window[0].timing
-    for foot in FEET:
-        if foot == moved_last:
-            continue
-        limbs = [foot if index % 2 == 0 else foot.mirrored for index in range(count)]
-        if count == 1 and _moved(start, end, foot.mirrored):
-            continue
-        free = max(count - 2, 0)
-        total = {limb: limbs.count(limb) for limb in FEET}
-        beam: list[tuple[Stance, tuple[ContactTransition, ...]]] = [(start, ())]
-        for index in range(free):
-            limb = limbs[index]
-            share = (limbs[: index + 1].count(limb)) / total[limb]
-            beam = [
-                (step.apply(stance), (*chain, step))
-                for stance, chain in beam
-                for step in _nearest(screen.steps(stance, limb, timing), start, end, limb, share, screen.scale.length)
+class _Links:
+    """Chains of steps from one stance of a sequence to a later one.
+
+    Args:
+        sequence: The sequence.
+        screen: The screens of its search.
+    """
+
+    def __init__(self, sequence: ContactSequence, screen: SequenceScreen):
+        self._sequence, self._screen, self._stances = sequence, screen, sequence.stances
+        self._numbers, self._walk = screen.numbers(sequence), Walk.of(sequence)
+
+    def between(self, first: int, last: int, count: int) -> Iterator[ContactSequence]:
+        """Sequences with chains of `count` steps from the stance `first` to the stance `last`, between feet alone."""
+        transitions, end = self._sequence.transitions, self._stances[last]
+        timing, before = transitions[first].timing, transitions[first - 1].limb if first else None
+        chains: list[tuple[tuple[Limb, ...], np.ndarray]] = []
+        for foot in FEET:
+            limbs = tuple(foot if index % 2 == 0 else foot.mirrored for index in range(count))
+            follows = last == len(transitions) or transitions[last].limb != limbs[-1]
+            if foot != before and follows:
+                chains += [(limbs, rows) for rows in self._chains(first, last, limbs)]
+        for limbs, rows in self._shortest_first(first, last, chains):
+            ends, table = max(count - 2, 0), self._screen.table
+            if any(
+                self._screen.code(rows[index], limbs[index], int(rows[index + 1, limbs[index]]), timing)
+                for index in range(ends, count)
+            ):
+                continue
+            contacts = [
+                end[limb] if index >= ends else table.contact(int(rows[index + 1, limb]))
+                for index, limb in enumerate(limbs)
             ]
-        for _, chain in beam:
-            ends = tuple(ContactTransition(limb, end[limb], timing) for limb in limbs[free:])
-            yield (*chain, *ends)
+            chain = tuple(map(ContactTransition, limbs, contacts, [timing] * count))
+            changed = ContactSequence(self._stances[first], (*chain, *transitions[last : last + 1]))
+            if self._screen.passes(changed, before):
+                yield replace(self._sequence, transitions=(*transitions[:first], *chain, *transitions[last:]))
+
+    def _chains(self, first: int, last: int, limbs: tuple[Limb, ...]) -> list[np.ndarray]:
+        """Chains of steps of some feet, to the feet of the later stance: (steps + 1, 4) contact numbers each."""
+        start, end, position = self._numbers[first], self._numbers[last], self._screen.table.position
+        timing = self._sequence.transitions[first].timing
+        if len(limbs) == 1:
+            other = limbs[0].mirrored
+            if (position[start[other]] != position[end[other]]).any():
+                return []
+        ends = limbs[max(len(limbs) - 2, 0) :]
+        beam = [start[None]]
+        for index, limb in enumerate(limbs[: -len(ends)]):
+            share = limbs[: index + 1].count(limb) / limbs.count(limb)
+            beam = [
+                _moved(rows, limb, number)
+                for rows in beam
+                for number in self._nearest(rows[-1], limb, timing, int(start[limb]), int(end[limb]), share)
+            ]
+        for limb in ends:
+            beam = [_moved(rows, limb, int(end[limb])) for rows in beam]
+        return beam
+
+    def _nearest(self, row: np.ndarray, limb: Limb, timing: Timing, first: int, last: int, share: float) -> list[int]:
+        """The steps out of a stance that are nearest to a share of the straight way between two contacts."""
+        table, steps = self._screen.table, self._screen.steps(row, limb, timing)
+        place = table.position[first] + share * (table.position[last] - table.position[first])
+        yaw = table.yaw[first] + share * wrapped(table.yaw[last] - table.yaw[first])
+        away = np.linalg.norm(table.position[steps] - place, axis=1)
+        turn = self._screen.scale.length * _TURN * np.abs((table.yaw[steps] - yaw + np.pi) % (2 * np.pi) - np.pi)
+        return steps[np.argsort(away + turn, kind="stable")[:_BEAM]].tolist()
+
+    def _shortest_first(
+        self, first: int, last: int, chains: list[tuple[tuple[Limb, ...], np.ndarray]]
+    ) -> list[tuple[tuple[Limb, ...], np.ndarray]]:
+        """Chains of as many steps each, in the order of what the CoM travels on them."""
+        if len(chains) < 2:
+            return chains
+        between = np.array([rows[1:-1, : len(FEET)] for _, rows in chains])
+        standing = np.array([[limb.mirrored for limb in limbs] for limbs, _ in chains])
+        walks = self._walk.linked(first, last, self._screen.table.position[between], standing)
+        order = np.argsort(walks.travel(self._screen.scale.time), kind="stable")
+        return [chains[index] for index in order]
 
 
-def _moved(start: Stance, end: Stance, foot: Limb) -> bool:
-    """Whether a foot stands elsewhere in another stance."""
-    return bool((start[foot].pose.position != end[foot].pose.position).any())
-
-
-def _nearest(
-    steps: list[ContactTransition], start: Stance, end: Stance, foot: Limb, share: float, scale: float
-) -> list[ContactTransition]:
-    """The steps nearest to a share of the straight way of a foot between two stances; `scale` is that of lengths."""
-    first, last = start[foot].pose, end[foot].pose
-    place = first.position + share * (last.position - first.position)
-    yaw = first.yaw + share * wrapped(last.yaw - first.yaw)
-
-    def miss(step: ContactTransition) -> float:
-        assert step.contact is not None
-        pose = step.contact.pose
-        away = pose.position - place
-        return float((away @ away) ** 0.5 + scale * _TURN * abs(wrapped(pose.yaw - yaw)))
-
-    return sorted(steps, key=miss)[:_BEAM]
+def _moved(rows: np.ndarray, limb: Limb, number: int) -> np.ndarray:
+    """Stances (k, 4) and the one after a limb has moved, as contact numbers (k + 1, 4)."""
+    longer = np.concatenate([rows, rows[-1:]])
+    longer[-1, limb] = number
+    return longer

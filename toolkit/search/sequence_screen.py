@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from toolkit.centroidal.plan import MotionPlan
-from toolkit.contacts.sequence import ContactSequence, ContactTransition
-from toolkit.contacts.stance import Contact, Stance
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.search.moves.candidates import SWING_SPEED, Candidates
 from toolkit.search.moves.moves import MoveGenerator
@@ -31,13 +31,15 @@ class SequenceScreen:
 
     Attributes:
         scale: The robot's size.
+        table: The contacts that the search has met.
     """
 
     def __init__(self, moves: MoveGenerator, palms: Sequence[Limb]):
         self._moves, self._palms = moves, palms
-        self.scale = moves.robot.scale
+        self.scale, self.table = moves.robot.scale, moves.table
         self._speed, self._at = self.scale.speed * SWING_SPEED, self.scale.length * _AT
         self._known: dict[tuple, int] = {}
+        self._steps: dict[tuple, np.ndarray] = {}
         self._numbers: dict[int, tuple[Contact, int]] = {}  # by the contact's id, which stays its own while it is kept
 
     def numbers(self, sequence: ContactSequence) -> np.ndarray:
@@ -124,13 +126,14 @@ class SequenceScreen:
             codes.append(reach.codes(numbers[index], com, velocity, step, end[None], end_velocity[None])[0])
         return np.array(codes, int)
 
-    def steps(self, stance: Stance, limb: Limb, timing: Timing) -> list[ContactTransition]:
-        """All steps of a foot out of a stance that the search would consider."""
-        numbers = self.numbers(ContactSequence(stance, ()))[0]
-        standing = int(numbers[limb.mirrored])
-        found = self._moves.steps(limb, standing).numbers
-        if not len(found):
-            return []
-        codes = self._moves.swings(limb, found, int(numbers[limb]), standing, self._speed * timing.swing)
-        table = self._moves.table
-        return [ContactTransition(limb, table.contact(int(number)), timing) for number in found[codes == 0]]
+    def steps(self, before: np.ndarray, limb: Limb, timing: Timing) -> np.ndarray:
+        """(n,) contact numbers of the steps of a foot that the search would consider from a stance of numbers (4,)."""
+        standing, old = int(before[limb.mirrored]), int(before[limb])
+        key = (standing, old, limb, timing.swing)
+        if key not in self._steps:
+            if len(self._steps) >= _KEPT:
+                self._steps.clear()
+            found = self._moves.steps(limb, standing).numbers
+            codes = self._moves.swings(limb, found, old, standing, self._speed * timing.swing)
+            self._steps[key] = found[codes == 0]
+        return self._steps[key]

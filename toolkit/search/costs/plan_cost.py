@@ -6,6 +6,7 @@ or leaves out, the plan costs the same.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.projection import Projected
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
+from toolkit.geometry.limb import Limb
 from toolkit.robot.scale import USUAL, Scale
 from toolkit.search.costs.edge_cost import CostConfig, TransitionCost
 from toolkit.search.moves.candidates import Candidates
@@ -94,7 +96,7 @@ def _transitions(
     contacts = [*sequence.start.contacts, *made]
     # Each contact stands for a surface of its own, so that none is rounded to another and each keeps its friction.
     table = ContactTable(np.array([contact.friction for contact in contacts]), scale.length)
-    numbers = [_entered(table, contact, index) for index, contact in enumerate(contacts)]
+    numbers = _entered(table, contacts)
     stances = np.full((len(sequence.transitions) + 1, 4), -1)
     for contact, number in zip(sequence.start.contacts, numbers, strict=False):
         stances[:, contact.limb] = number
@@ -108,7 +110,14 @@ def _transitions(
     return TransitionCost(config, table, tuple(timings), goal, scale), candidates
 
 
-def _entered(table: ContactTable, contact: Contact, surface: int) -> int:
-    """Number of a contact, entered as one on a surface of this index."""
-    pose = contact.pose
-    return int(table.add(contact.limb, Projected(np.array([surface]), pose.position[None], pose.rotation[None]))[0])
+def _entered(table: ContactTable, contacts: Sequence[Contact]) -> list[int]:
+    """Numbers of contacts, entered limb by limb, each as one on a surface with its own index."""
+    numbers = np.empty(len(contacts), np.int64)
+    limbs = np.array([contact.limb for contact in contacts])
+    position = np.array([contact.pose.position for contact in contacts])
+    rotation = np.array([contact.pose.rotation for contact in contacts])
+    for limb in Limb:
+        (own,) = np.nonzero(limbs == limb)
+        if len(own):
+            numbers[own] = table.add(limb, Projected(own, position[own], rotation[own]))
+    return numbers.tolist()
