@@ -13,6 +13,7 @@ from toolkit.pipeline import Source, loop, trial
 from toolkit.refine import RefineConfig
 from toolkit.robot.scale import USUAL
 from toolkit.wholebody.plan import LEVEL, WIDE, Manner
+from toolkit.world.timing import Timing
 
 
 def solution(name, *limbs, start=(), seconds=0.0):
@@ -25,6 +26,7 @@ def solution(name, *limbs, start=(), seconds=0.0):
     sequence = SimpleNamespace(
         name=name, identity=name.encode(), transitions=transitions, stances=stances, start=stances[0]
     )
+    sequence.timed = lambda timing: SimpleNamespace(name=f"{name} calm")
     return SimpleNamespace(name=name, sequence=sequence, seconds=seconds)
 
 
@@ -33,6 +35,7 @@ class Planner:
 
     hasty = 0
     paces = 1
+    calm: list | None = None  # what the searches after the first find; None for the same again
 
     def __init__(self, with_palms, without):
         self.found, self.calls, self.exclusions = {True: with_palms, False: without}, [], []
@@ -42,7 +45,7 @@ class Planner:
         self.pace = calmer
         self.exclusions.append(len(exclusions))
         return SimpleNamespace(
-            solutions=self.found[palms],
+            solutions=self.found[palms] if not calmer or self.calm is None else self.calm,
             reason="",
             warning="",
             seconds=1.0,
@@ -50,7 +53,7 @@ class Planner:
             expansions=1,
             hasty=self.hasty,
             slides=False,
-            may_yield=calmer + 1 < self.paces,
+            calmer=Timing() if calmer + 1 < self.paces else None,
             screen=SimpleNamespace(),
         )
 
@@ -87,6 +90,9 @@ class Run:
                 optimised.append(sequence.name)
                 failure = Failure("no motion", since, 0) if cost.get(sequence.name, 0.0) == np.inf else None
                 return SimpleNamespace(name=sequence.name, sequence=sequence), failure
+
+            def motion_of(self, sequence):
+                return SimpleNamespace(name=sequence.name, motion=SimpleNamespace(feasible=sequence.name in cost))
 
             def settled(self, plan):
                 return plan
@@ -162,6 +168,25 @@ def test_the_pace_yields_at_once_where_joints_cannot_keep_it(monkeypatch):
     # the other sequence of the same pace is not tested, no transition is excluded, and palms stay
     assert run.tested == ["hurried"] and planner.pace == 1
     assert planner.calls[:2] == [True, True] and planner.exclusions[:2] == [0, 0]
+
+
+def test_the_pace_yields_where_a_calmer_one_costs_clearly_less(monkeypatch):
+    planner = Planner([solution("fast", FOOT)], [])
+    planner.paces, planner.calm = 2, [solution("slow", FOOT)]
+    run = Run(planner, {"fast", "slow"}, monkeypatch, {"fast": 10.0, "fast calm": 8.0, "slow": 7.0})
+    assert run.tested == ["slow"] and planner.pace == 1 and planner.calls == [True, True]
+    for cost in (9.5, np.inf):  # no more than a local search saves, and no motion at all
+        planner = Planner([solution("fast", FOOT)], [])
+        planner.paces, planner.calm = 2, [solution("slow", FOOT)]
+        assert Run(planner, {"fast"}, monkeypatch, {"fast": 10.0, "fast calm": cost}).tested == ["fast"]
+
+
+@pytest.mark.parametrize("calm", [[], [solution("slow", FOOT)]])
+def test_what_a_faster_pace_found_counts_where_a_calmer_one_finds_nothing_cheaper(calm, monkeypatch):
+    planner = Planner([solution("fast", FOOT)], [])
+    planner.paces, planner.calm = 2, calm
+    run = Run(planner, {"fast", "slow"}, monkeypatch, {"fast": 10.0, "fast calm": 8.0, "slow": 11.0})
+    assert run.tested == ["fast"] and planner.pace == 1 and run.result.passed
 
 
 def test_a_pace_that_may_not_yield_is_kept(monkeypatch):

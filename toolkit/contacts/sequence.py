@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,6 +59,10 @@ class ContactSequence:
         for transition in self.transitions:
             stances.append(transition.apply(stances[-1]))
         return tuple(stances)
+
+    def timed(self, timing: Timing) -> ContactSequence:
+        """The same contacts with one timing for all transitions."""
+        return replace(self, transitions=tuple(replace(each, timing=timing) for each in self.transitions))
 
     @property
     def contacts(self) -> tuple[Contact, ...]:

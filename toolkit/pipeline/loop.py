@@ -28,6 +28,7 @@ from toolkit.search.result import SearchResult, Solution
 from toolkit.world.world import World
 
 _SAME = 2  # equal failures where nothing has moved yet, after which no other sequence is tried
+_WORTH = 0.9  # of a cost, below which a calmer pace is worth a search; a local search saves less at any pace
 
 
 @dataclass(frozen=True)
@@ -131,15 +132,20 @@ class _Run:
 
     def result(self) -> PipelineResult:
         """Search and test until a trial passes, or nothing is left to try."""
-        palms = True
+        palms, aside = True, []
         while True:
             search = self._search(palms)
             found = self._optimised(search)
-            passed = self._tried(found)
+            if _least(aside) < _least(found):
+                found += aside  # what was found at a faster pace
+            if self._calmer_pays(found):
+                aside = found
+                continue
+            passed, aside = self._tried(found), []
             failed_with_palms = any(candidate.uses_palms for candidate in found)
             if passed or self._spent():
                 break
-            if not search.may_yield and (not found or not (self._blame.exclusions or failed_with_palms)):
+            if search.calmer is None and (not found or not (self._blame.exclusions or failed_with_palms)):
                 break
             palms = palms and (self._too_fast or not failed_with_palms)
         return self._concluded()
@@ -222,6 +228,22 @@ class _Run:
         self._observer.finished("dynamics", any(c.feasible for c in found), time.perf_counter() - began, _told(found))
         return found
 
+    def _calmer_pays(self, found: list[Candidate]) -> bool:
+        """Whether the cheapest candidate costs clearly less with the timing of the next pace: then that is searched."""
+        timing = self._searches[-1].calmer
+        best = min((candidate for candidate in found if candidate.feasible), key=_rank, default=None)
+        if timing is None or best is None:
+            return False
+        began = time.perf_counter()
+        self._observer.started("dynamics")
+        plan = self._tester.motion_of(best.plan.sequence.timed(timing))
+        cost = plan_cost(plan, self._weights).total if plan.motion.feasible else np.inf
+        pays = cost < _WORTH * best.cost.total
+        detail = f"true cost {best.cost.total:.0f}, and {cost:.0f} with {timing.shift:g} s + {timing.swing:g} s"
+        detail += "; a calmer search follows" if pays else ""
+        self._observer.finished("dynamics", True, time.perf_counter() - began, detail)
+        return pays
+
     def _new(self, sequence: ContactSequence) -> bool:
         """Whether a sequence comes for the first time."""
         known = len(self._known)
@@ -283,7 +305,7 @@ class _Run:
     def _too_fast(self) -> bool:
         """Whether the last trial asked too much of the joints at a pace that may yield."""
         failure = self._trials[-1].failure if self._trials else None
-        return failure is not None and failure.too_fast and self._searches[-1].may_yield
+        return failure is not None and failure.too_fast and self._searches[-1].calmer is not None
 
     def _improved(self, candidate: Candidate) -> list[Candidate]:
         """What the local search makes of a candidate without transitions that failed; nothing where none is better."""
@@ -315,6 +337,11 @@ class _Run:
         """Whether one more trial may be made; half of them are for the feet alone."""
         most = 0 if self._hopeless else self._config.candidates
         return len(self._trials) < (max(1, most // 2) if candidate.uses_palms else most)
+
+
+def _least(found: list[Candidate]) -> float:
+    """The least true cost of feasible candidates."""
+    return min((candidate.cost.total for candidate in found if candidate.feasible), default=np.inf)
 
 
 def _rank(candidate: Candidate) -> tuple[float, int]:

@@ -122,7 +122,8 @@ class ContactPlanner:
         blame = Blame(exclusions, _STRIKES, scale=scale)
         parts = self._parts(way, strategy, timings, tally, blame.exclusions, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
-        unit, may_yield = parts.cost.unit, self.timings(calmer + 1, slides=way.slides) != timings
+        unit, after = parts.cost.unit, self.timings(calmer + 1, slides=way.slides)
+        may_yield = after != timings
         patient = replace(strategy.patient, unit=unit)
         if may_yield or way.slides:  # a calmer search follows, or the strategy has extended the limit
             patient = replace(patient, persistence=1)
@@ -147,7 +148,7 @@ class ContactPlanner:
             reason="" if result.paths else self._reason(result, tally),
             warning=_UNTRAINED if tally.untrained else "",
             slides=way.slides,
-            may_yield=may_yield,
+            calmer=after[0] if may_yield else None,
             screen=parts.screen,
         )
 

@@ -12,6 +12,7 @@ from toolkit.search.moves.reasons import Reason
 from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import CONTACTS, is_pending, unpack
+from toolkit.world.timing import Timing
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,8 @@ class SearchResult:
         warning: One line where the judgements are less reliable, else "".
         hasty: Number of first solutions that only had to come soon; better ones follow.
         slides: Whether no way leads over resting ground alone; see `CostConfig.on_ground`.
-        may_yield: Whether a calmer pace is left to search with, where the pace is the planner's to choose.
+        calmer: The calmest timing of the next pace to search with; None where the pace is not the planner's to choose,
+            or none is left.
         screen: The screens of the search, for sequences that are made from what it found; None where there are none.
     """
 
@@ -88,7 +90,7 @@ class SearchResult:
     warning: str = ""
     hasty: int = 0
     slides: bool = False
-    may_yield: bool = False
+    calmer: Timing | None = None
     screen: SequenceScreen | None = field(default=None, repr=False, compare=False)
 
 
