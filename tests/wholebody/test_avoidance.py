@@ -101,7 +101,7 @@ def test_rows_of_arms_are_derivatives_of_the_distance(robot, hand):
     found, direction = dampers(avoidance, robot.home), np.random.default_rng(0).normal(size=len(robot.joint_names))
     after = dampers(avoidance, moved(robot, h * direction, None))
     # bound = tick sqrt(2 braking (distance - safe)), and a row is minus the distance's gradient; sorted both times
-    nearest = np.flatnonzero(found.weight == ARM.weight)[0]
+    nearest = np.flatnonzero(found.weight <= ARM.weight)[0]
     change = (after.bound**2 - found.bound**2)[nearest] / (2.0 * ARM.braking * TICK**2) / h
     np.testing.assert_allclose(change, -found.matrix[nearest] @ direction, rtol=0.05, atol=1e-3)
 
@@ -116,6 +116,12 @@ def test_rows_of_legs_are_derivatives_of_the_distance_as_the_base_moves_over_the
     nearest = np.flatnonzero(found.weight == BODY.weight)[0]
     change = (after.bound - found.bound)[nearest] * BODY.time / TICK / h
     np.testing.assert_allclose(change, -found.matrix[nearest] @ direction, rtol=0.05, atol=1e-3)
+
+
+def test_comfort_weighs_less_than_what_is_about_to_touch():
+    assert ARM.share(-1e-3) == ARM.share(0.0) == ARM.share(ARM.firm) == 1.0
+    assert ARM.share(ARM.safe_world) < ARM.share(0.5 * ARM.safe_world) < 0.2
+    assert BODY.share(1.0) == 1.0
 
 
 def test_a_root_that_moves_carries_its_links_along(robot):

@@ -40,7 +40,8 @@ class Damper:
         time: s; tau above: longer than a tick, shorter than a swing.
         weight: Per squared m by which a pair comes nearer in a tick than it may.
         braking: m/s^2; a above, 0 for the first law at all distances.
-        firm: m; wanted distances beyond this are comfort: what is missing of them counts as the same share of this one.
+        firm: m; wanted distances beyond this are comfort: what is missing of them counts as the same share of this one,
+            and a damper weighs less the more of it there is, so that comfort gives way to what is about to touch.
     """
 
     safe_world: float
@@ -63,6 +64,10 @@ class Damper:
             return float(np.sqrt(2.0 * self.braking * room)) if self.braking else room / self.time
         firm = min(safe, self.firm)
         return (firm * room / safe if distance > 0.0 else distance - firm) / self.time
+
+    def share(self, distance: float) -> float:
+        """Share of the weight that a damper has at a distance in m."""
+        return min(self.firm / distance, 1.0) ** 2 if distance > 0.0 else 1.0
 
     def scaled(self, scale: Scale) -> Damper:
         """The damper for a body of another size."""
@@ -167,7 +172,13 @@ class Avoidance:
                 if damper is self.arms:  # arms get out of the way of legs, never the other way round
                     known += float(rate[self.legs] @ drift[6:][self.legs])
                     rate[self.legs] = 0.0
-                found.append((-rate, damper.speed(pair.distance, safe) * tick + known, damper.weight))
+                found.append(
+                    (
+                        -rate,
+                        damper.speed(pair.distance, safe) * tick + known,
+                        damper.weight * damper.share(pair.distance),
+                    )
+                )
         matrix = np.array([row for row, _, _ in found]).reshape(len(found), len(drift) - 6)
         bound, weight = np.array([bound for _, bound, _ in found]), np.array([weight for _, _, weight in found])
         size = np.maximum(np.linalg.norm(matrix, axis=1), 1e-9)
