@@ -41,7 +41,7 @@ def outermost(robot, qpos):
 
 def of_world(avoidance):
     """The same without pairs of the robot's own links."""
-    avoidance.at_home.update(dict.fromkeys(avoidance.at_home, -1.0))
+    avoidance.at_home[np.isfinite(avoidance.at_home)] = -1.0
     return avoidance
 
 
@@ -119,9 +119,10 @@ def test_rows_of_legs_are_derivatives_of_the_distance_as_the_base_moves_over_the
 
 
 def test_comfort_weighs_less_than_what_is_about_to_touch():
-    assert ARM.share(-1e-3) == ARM.share(0.0) == ARM.share(ARM.firm) == 1.0
-    assert ARM.share(ARM.safe_world) < ARM.share(0.5 * ARM.safe_world) < 0.2
-    assert BODY.share(1.0) == 1.0
+    touching, halfway, far = ARM.share(np.array([[-1e-3, 0.0, ARM.firm], 3 * [0.03], 3 * [0.06]]))
+    assert (touching == 1.0).all()
+    assert (far < halfway).all() and (halfway < 0.2).all()
+    assert BODY.share(np.array([1.0])) == 1.0
 
 
 def test_a_root_that_moves_carries_its_links_along(robot):
@@ -143,24 +144,22 @@ def test_feet_are_left_to_their_paths(robot):
     avoidance = Avoidance(robot, compose_scene(robot, world_of("")))
     avoidance._place(robot.home)
     feet = {int(body) for limb, body in avoidance.body.items() if limb.is_foot}
-    bodies = [
-        {int(avoidance.model.geom_bodyid[geom]) for geom in pair[:2]}
-        for pair in avoidance._near(set())
-        if avoidance._of_world(pair)
-    ]
-    assert not any(pair & feet for pair in bodies)
+    pairs = avoidance._near(set())
+    bodies = avoidance.model.geom_bodyid[pairs.geoms[avoidance._of_world(pairs)]]
+    assert not np.isin(bodies, list(feet)).any()
 
 
 def test_links_that_are_near_at_home_are_noticed_when_they_come_nearer(robot):
     """Neighbours need not part at home, whatever their distance, and are kept at half of it."""
     avoidance = Avoidance(robot, compose_scene(robot, world_of("")))
-    near = {bodies: apart for bodies, apart in avoidance.at_home.items() if 0.0 < apart < BODY.safe_self + BODY.room}
-    if not near:
+    near = (avoidance.at_home > 0.0) & (avoidance.at_home < BODY.safe_self + BODY.room)
+    if not near.any():
         pytest.skip("no neighbours near each other")
     assert (dampers(avoidance, robot.home).bound > 0.0).all()
-    avoidance.at_home.update({bodies: 2.0 * apart for bodies, apart in near.items()})
+    apart = avoidance.at_home[near]
+    avoidance.at_home[near] = 2.0 * apart
     found = dampers(avoidance, robot.home)
-    least = min(apart - min(BODY.safe_self, apart) for apart in near.values())
+    least = (apart - np.minimum(BODY.safe_self, apart)).min()
     assert found.bound.min() * BODY.time / TICK <= least + 1e-9
 
 
@@ -199,7 +198,7 @@ def test_boxes_are_seen_edge_to_edge(robot, hand):
     avoidance._place(robot.home)
     model, data, post = avoidance.model, avoidance.data, avoidance.model.geom("world/post").id
     pairs = avoidance._near_boxes(np.zeros(model.ngeom, bool))
-    seen = {sum(pair[:2]) - post: pair for pair in pairs if post in pair[:2]}
+    seen = {sum(geoms) - post: row for row, geoms in enumerate(pairs.geoms.tolist()) if post in geoms}
     boxes = [g for g in np.flatnonzero(avoidance.arm) if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX]
     if not boxes:
         pytest.skip("arms without boxes")
@@ -207,7 +206,7 @@ def test_boxes_are_seen_edge_to_edge(robot, hand):
         distance = mujoco.mj_geomDistance(model, data, int(geom), post, 1.0, None)
         assert (geom in seen) == (distance < ARM.notice)
         if geom in seen:
-            first, second, apart, normal, _ = seen[geom]
+            (first, second), apart, normal, _ = (each[seen[geom]] for each in pairs)
             assert apart == pytest.approx(distance, abs=1e-6)
             np.testing.assert_allclose(np.linalg.norm(normal), 1.0, atol=1e-6)
             assert normal @ (data.geom_xpos[second] - data.geom_xpos[first]) > 0.0

@@ -15,7 +15,6 @@ of the feet, and of palms that reach, are left to the paths of these limbs.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -25,7 +24,6 @@ import numpy as np
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.robot.scale import Scale
-from toolkit.wholebody.collision import body_pair
 
 MAX_ROWS = 24  # most dampers at a time, of the pairs nearest to their bound: each costs solver time, and few are active
 
@@ -52,22 +50,21 @@ class Damper:
     braking: float = 0.0
     firm: float = np.inf
 
-    def speed(self, distance: float, safe: float) -> float:
-        """Speed in m/s at which a pair may come nearer, negative where it has to part.
+    def speed(self, distance: np.ndarray, safe: np.ndarray) -> np.ndarray:
+        """(k,) m/s; speeds at which pairs may come nearer, negative where they have to part.
 
         Args:
-            distance: Of the pair, in m.
-            safe: Its wanted distance in m.
+            distance: (k,) m; of the pairs.
+            safe: (k,) m; their wanted distances, greater than 0.
         """
-        room = distance - safe
-        if room > 0.0:
-            return float(np.sqrt(2.0 * self.braking * room)) if self.braking else room / self.time
-        firm = min(safe, self.firm)
-        return (firm * room / safe if distance > 0.0 else distance - firm) / self.time
+        room, firm = distance - safe, np.minimum(safe, self.firm)
+        away = np.sqrt(2.0 * self.braking * np.maximum(room, 0.0)) if self.braking else room / self.time
+        near = np.where(distance > 0.0, firm * room / safe, distance - firm) / self.time
+        return np.where(room > 0.0, away, near)
 
-    def share(self, distance: float) -> float:
-        """Share of the weight that a damper has at a distance in m."""
-        return min(self.firm / distance, 1.0) ** 2 if distance > 0.0 else 1.0
+    def share(self, distance: np.ndarray) -> np.ndarray:
+        """(k,) shares of the weight that dampers have at distances (k,) m."""
+        return np.minimum(self.firm / np.maximum(distance, 1e-9), 1.0) ** 2
 
     def scaled(self, scale: Scale) -> Damper:
         """The damper for a body of another size."""
@@ -99,14 +96,24 @@ _BELOW = 0.8  # least vertical part of the normal to what is below a link, as th
 _SAFE_SHARE = 0.5  # of a pair's distance at home, where it is safe at no more than that
 
 
-class _Pair(NamedTuple):
-    """Two geoms near each other: their distance in m, the normal from the first to the second, and a point between."""
+class _Pairs(NamedTuple):
+    """Pairs of geoms near each other.
 
-    first: int
-    second: int
-    distance: float
+    Attributes:
+        geoms: (k, 2) int; the first and the second of each.
+        distance: (k,) m.
+        normal: (k, 3) from the first to the second.
+        point: (k, 3) m; between the two.
+    """
+
+    geoms: np.ndarray
+    distance: np.ndarray
     normal: np.ndarray
     point: np.ndarray
+
+    def of(self, chosen: np.ndarray) -> _Pairs:
+        """The chosen ones."""
+        return _Pairs(*(each[chosen] for each in self))
 
 
 class Dampers(NamedTuple):
@@ -144,9 +151,10 @@ class Avoidance:
         np.maximum.at(model.body_margin, model.geom_bodyid, model.geom_margin)  # where collisions are looked for at all
         self.box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
         self.box_pairs = _box_pairs(model, self.static)
-        self.jacobians = [np.zeros((3, model.nv)) for _ in range(3)]
-        self.at_home, self.height = self._distances(robot.home), np.zeros(model.nbody)
-        self._set_heights()
+        self.at_home = np.full((model.nbody, model.nbody), np.inf)
+        self._place(robot.home)
+        self._set_distances()
+        self.height = self._heights()
 
     def dampers(
         self, qpos: np.ndarray, drift: np.ndarray, tick: float, reaching: set[Limb], standing: Limb | None
@@ -161,59 +169,57 @@ class Avoidance:
             standing: A foot that stands; None where there is none.
         """
         self._place(qpos)
+        pairs = self._near(reaching)
+        world, arms, at_home = self._of_world(pairs), self._of_arms(pairs), self._home_distance(pairs)
+        safe, room = np.empty((2, len(arms)))
+        for damper, mine in ((self.arms, arms), (self.others, ~arms)):
+            safe[mine] = np.where(world[mine], damper.safe_world, damper.safe_self)
+            room[mine] = damper.room
+        safe = np.minimum(safe, _SAFE_SHARE * at_home)
+        near = (at_home > 0.0) & (pairs.distance < safe + room)
+        pairs, arms, safe = pairs.of(near), arms[near], safe[near]
         stand = self.base if standing is None else self.body[standing]
-        found = []
-        for pair in self._near(reaching):
-            damper, at_home = self._damper(pair), self._home_distance(pair)
-            wanted = damper.safe_world if self._of_world(pair) else damper.safe_self
-            safe = min(wanted, _SAFE_SHARE * at_home)
-            if at_home > 0.0 and pair.distance < safe + damper.room:
-                rate, known = self._rate(pair, self.base if damper is self.arms else stand, drift)
-                if damper is self.arms:  # arms get out of the way of legs, never the other way round
-                    known += float(rate[self.legs] @ drift[6:][self.legs])
-                    rate[self.legs] = 0.0
-                found.append(
-                    (
-                        -rate,
-                        damper.speed(pair.distance, safe) * tick + known,
-                        damper.weight * damper.share(pair.distance),
-                    )
-                )
-        matrix = np.array([row for row, _, _ in found]).reshape(len(found), len(drift) - 6)
-        bound, weight = np.array([bound for _, bound, _ in found]), np.array([weight for _, _, weight in found])
-        size = np.maximum(np.linalg.norm(matrix, axis=1), 1e-9)
-        kept = np.argsort((bound - matrix @ drift[6:]) / size, kind="stable")[:MAX_ROWS]
-        return Dampers(matrix[kept], bound[kept], weight[kept])
+        rate, bound = self._rates(pairs, np.where(arms, self.base, stand), drift)
+        legs = np.flatnonzero(self.legs)
+        bound[arms] += rate[np.ix_(arms, legs)] @ drift[6:][legs]  # arms get out of the way of legs,
+        rate[np.ix_(arms, legs)] = 0.0  # never the other way round
+        weight = np.empty(len(arms))
+        for damper, mine in ((self.arms, arms), (self.others, ~arms)):
+            distance = pairs.distance[mine]
+            bound[mine] += damper.speed(distance, safe[mine]) * tick
+            weight[mine] = damper.weight * damper.share(distance)
+        size = np.maximum(np.linalg.norm(rate, axis=1), 1e-9)
+        kept = np.argsort((bound + rate @ drift[6:]) / size, kind="stable")[:MAX_ROWS]
+        return Dampers(-rate[kept], bound[kept], weight[kept])
 
-    def _damper(self, pair: _Pair) -> Damper:
-        return self.arms if self.arm[pair.first] or self.arm[pair.second] else self.others
+    def _of_arms(self, pairs: _Pairs) -> np.ndarray:
+        """(k,) bool; which pairs have a link of an arm."""
+        return np.any(self.arm[pairs.geoms], axis=1)
 
-    def _of_world(self, pair: _Pair) -> bool:
-        return bool(self.static[pair.first] or self.static[pair.second])
+    def _of_world(self, pairs: _Pairs) -> np.ndarray:
+        """(k,) bool; which pairs have a geom of the world."""
+        return np.any(self.static[pairs.geoms], axis=1)
 
-    def _home_distance(self, pair: _Pair) -> float:
-        """Distance in m of a pair's links at home, or of a link from the ground below; -inf where links touch."""
-        if self._of_world(pair):
-            if abs(pair.normal[2]) < _BELOW:
-                return np.inf
-            link = pair.second if self.static[pair.first] else pair.first
-            return float(self.height[self.model.geom_bodyid[link]])
-        at_home = self.at_home.get(body_pair(self.model, pair.first, pair.second), np.inf)
-        return at_home if at_home > 0.0 else -np.inf
+    def _home_distance(self, pairs: _Pairs) -> np.ndarray:
+        """(k,) m; distances of pairs' links at home, or of links from the ground below; -inf where links touch."""
+        bodies, static = self.model.geom_bodyid[pairs.geoms], self.static[pairs.geoms]
+        at_home = self.at_home[bodies[:, 0], bodies[:, 1]]
+        above = self.height[np.where(static[:, 0], bodies[:, 1], bodies[:, 0])]
+        from_world = np.where(np.abs(pairs.normal[:, 2]) < _BELOW, np.inf, above)
+        return np.where(static.any(1), from_world, np.where(at_home > 0.0, at_home, -np.inf))
 
-    def _rate(self, pair: _Pair, root: int, drift: np.ndarray) -> tuple[np.ndarray, float]:
-        """(n,) derivative of a pair's distance by the joints beyond a root, and what the root's own motion adds."""
-        model, (before, after, rooted) = self.model, self.jacobians
-        rate, known = np.zeros(model.nv), 0.0
-        for geom, jacobian, sign in ((pair.first, before, -1.0), (pair.second, after, 1.0)):
-            if not self.static[geom]:
-                mujoco.mj_jac(model, self.data, jacobian, None, pair.point, int(model.geom_bodyid[geom]))
-                rate += (sign * pair.normal) @ jacobian
-        if self._of_world(pair):  # two links move as one with any root
-            mujoco.mj_jac(model, self.data, rooted, None, pair.point, root)
-            carried = pair.normal @ rooted if self.static[pair.first] else -pair.normal @ rooted
-            rate, known = rate - carried, float(carried @ drift)
-        return rate[6:], known
+    def _rates(self, pairs: _Pairs, roots: np.ndarray, drift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(k, n) derivatives of distances by the joints beyond roots (k,), and (k,) m that the roots' motion adds."""
+        model, data = self.model, self.data
+        bodies = np.column_stack([model.geom_bodyid[pairs.geoms], roots])
+        jacobian = np.empty((*bodies.shape, 3, model.nv))
+        for row, (each, point) in enumerate(zip(bodies.tolist(), pairs.point, strict=True)):
+            for column, body in enumerate(each):
+                mujoco.mj_jac(model, data, jacobian[row, column], None, point, body)
+        before, after, rooted = np.einsum("ki,kcij->ckj", pairs.normal, jacobian)
+        static = self.static[pairs.geoms]  # two links move as one with any root
+        carried = (static[:, :1] * 1.0 - static[:, 1:]) * rooted
+        return (after - before - carried)[:, 6:], carried @ drift
 
     def _place(self, qpos: np.ndarray) -> None:
         self.data.qpos[:] = qpos
@@ -221,59 +227,60 @@ class Avoidance:
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_collision(self.model, self.data)
 
-    def _near(self, reaching: set[Limb]) -> Iterator[_Pair]:
+    def _near(self, reaching: set[Limb]) -> _Pairs:
         """Pairs of geoms within their notice, without those whose distance is left to the paths of limbs."""
         contact, free = self.data.contact, self.static.copy()
         for limb in reaching.union(FEET):
             free |= self.of[limb]
-        geoms, distances = contact.geom, contact.dist
-        rows = np.flatnonzero(~(self._left(geoms[:, 0], geoms[:, 1], free) | self.box[geoms].all(1)))
-        seen: set[tuple[int, int]] = set()
-        for index in rows[np.argsort(distances[rows])].tolist():
-            first, second = geoms[index].tolist()
-            pair = _Pair(first, second, float(distances[index]), contact.frame[index, :3], contact.pos[index])
-            if (first, second) not in seen and pair.distance < self._damper(pair).notice:
-                seen.add((first, second))
-                yield pair
-        yield from self._near_boxes(free)
+        geoms, distance = contact.geom, contact.dist
+        noticed = distance < self._notice(geoms)
+        rows = np.flatnonzero(noticed & ~(self._left(geoms, free) | self.box[geoms].all(1)))
+        rows = rows[np.argsort(distance[rows])]
+        _, first = np.unique(geoms[rows] @ [self.model.ngeom, 1], return_index=True)  # the nearest points of each pair
+        rows = rows[np.sort(first)]
+        found = _Pairs(geoms[rows], distance[rows], contact.frame[rows, :3], contact.pos[rows])
+        return _Pairs(*(np.concatenate(each) for each in zip(found, self._near_boxes(free), strict=True)))
 
-    def _left(self, first: np.ndarray, second: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """(k,) bool; which pairs of geoms are of the world and a link that is free to touch it."""
-        return (self.static[first] | self.static[second]) & free[first] & free[second]
+    def _notice(self, geoms: np.ndarray) -> np.ndarray:
+        """(k,) m; distances at which pairs (k, 2) of geoms are noticed."""
+        return np.where(self.arm[geoms].any(1), self.arms.notice, self.others.notice)
 
-    def _near_boxes(self, free: np.ndarray) -> Iterator[_Pair]:
+    def _left(self, geoms: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """(k,) bool; which pairs (k, 2) of geoms are of the world and a link that is free to touch it."""
+        return self.static[geoms].any(1) & free[geoms].all(1)
+
+    def _near_boxes(self, free: np.ndarray) -> _Pairs:
         """The same for pairs of boxes; MuJoCo's collision function finds those apart only if two faces are opposite."""
-        model, data, ends = self.model, self.data, np.zeros(6)
+        model, data, notice = self.model, self.data, self._notice(self.box_pairs)
         first, second = self.box_pairs.T
-        notice = np.where(self.arm[first] | self.arm[second], self.arms.notice, self.others.notice)
         apart = np.linalg.norm(data.geom_xpos[first] - data.geom_xpos[second], axis=1)
         near = apart < notice + model.geom_rbound[first] + model.geom_rbound[second]
-        near &= ~self._left(first, second, free)
-        for row in np.flatnonzero(near).tolist():
-            a, b = int(first[row]), int(second[row])
-            distance = mujoco.mj_geomDistance(model, data, a, b, float(notice[row]), ends)
-            if distance < notice[row] and abs(distance) > 1e-9:
-                yield _Pair(a, b, distance, (ends[3:] - ends[:3]) / distance, 0.5 * (ends[:3] + ends[3:]))
+        rows = np.flatnonzero(near & ~self._left(self.box_pairs, free))
+        geoms, distance, ends = self.box_pairs[rows], np.empty(len(rows)), np.empty((len(rows), 6))
+        for row, (a, b) in enumerate(geoms.tolist()):
+            distance[row] = mujoco.mj_geomDistance(model, data, a, b, float(notice[rows[row]]), ends[row])
+        found = (distance < notice[rows]) & (np.abs(distance) > 1e-9)
+        geoms, distance, ends = geoms[found], distance[found], ends[found]
+        normal = (ends[:, 3:] - ends[:, :3]) / distance[:, None]
+        return _Pairs(geoms, distance, normal, 0.5 * (ends[:, :3] + ends[:, 3:]))
 
-    def _distances(self, qpos: np.ndarray) -> dict[tuple[int, int], float]:
-        """Least distances in m between bodies of the robot that are near each other in a posture."""
-        self._place(qpos)
-        apart: dict[tuple[int, int], float] = {}
-        for pair in self._near(set()):
-            if not self._of_world(pair):
-                bodies = body_pair(self.model, pair.first, pair.second)
-                apart[bodies] = min(apart.get(bodies, np.inf), pair.distance)
-        return apart
+    def _set_distances(self) -> None:
+        """Least distances between bodies of the robot that are near each other in the posture as it is placed."""
+        pairs = self._near(set())
+        pairs = pairs.of(~self._of_world(pairs))
+        first, second = self.model.geom_bodyid[pairs.geoms].T
+        for a, b in ((first, second), (second, first)):
+            np.minimum.at(self.at_home, (a, b), pairs.distance)
 
-    def _set_heights(self) -> None:
-        """Heights of all links above the soles in the posture at which they are placed."""
-        model, data = self.model, self.data
-        self.height[:] = np.inf
+    def _heights(self) -> np.ndarray:
+        """(nbody,) m; heights of all links above the soles in the posture as it is placed."""
+        model, data, height = self.model, self.data, np.full(self.model.nbody, np.inf)
         for geom in np.flatnonzero(~self.static).tolist():
             upward, body = data.geom_xmat[geom].reshape(3, 3)[2], int(model.geom_bodyid[geom])
             lowest = data.geom_xpos[geom, 2] + upward @ model.geom_aabb[geom, :3]
             lowest -= np.abs(upward) @ model.geom_aabb[geom, 3:]
-            self.height[body] = max(min(self.height[body], lowest), 0.0)
+            height[body] = max(min(height[body], lowest), 0.0)
+        return height
 
 
 def _box_pairs(model: mujoco.MjModel, static: np.ndarray) -> np.ndarray:
