@@ -118,11 +118,14 @@ def test_rows_of_legs_are_derivatives_of_the_distance_as_the_base_moves_over_the
     np.testing.assert_allclose(change, -found.matrix[nearest] @ direction, rtol=0.05, atol=1e-3)
 
 
-def test_comfort_weighs_less_than_what_is_about_to_touch():
-    touching, halfway, far = ARM.share(np.array([[-1e-3, 0.0, ARM.firm], 3 * [0.03], 3 * [0.06]]))
-    assert (touching == 1.0).all()
-    assert (far < halfway).all() and (halfway < 0.2).all()
-    assert BODY.share(np.array([1.0])) == 1.0
+def test_weights_of_arms_go_with_the_inverse_square_of_the_distance():
+    """Comfort gives way to what is about to touch; what touches already weighs no more than what nearly does."""
+    distance = np.array([-1e-3, 0.0, ARM.firm / 6.0, ARM.firm / 3.0, ARM.firm, 0.03, ARM.safe_world])
+    shares = ARM.share(distance)
+    assert (shares[:4] == shares[0]).all()
+    assert (np.diff(shares[3:]) < 0.0).all()
+    np.testing.assert_allclose((shares * distance**2)[3:], ARM.firm**2)
+    assert (BODY.share(distance) == 1.0).all()
 
 
 def test_a_root_that_moves_carries_its_links_along(robot):

@@ -124,6 +124,19 @@ def test_foot_goes_around_the_standing_foot():
     np.testing.assert_allclose(path.sample(0.8).pose.position, end, atol=1e-12)
 
 
+def test_foot_goes_around_the_shin_where_it_leans_over_the_standing_foot():
+    """Over a tilted sole the shin is aside of it: a foot keeps the same gap from there."""
+    other, start, end = (Pose.from_yaw(np.array([0.2, -0.08, 0.0]), 0.0), HALF), [-0.1, 0.1, 0.0], [0.5, 0.1, 0.0]
+    shin = np.array([0.0, 0.04, 0.0])
+    level = plan_swing(task_of(start, end, other=other), free(None))
+    path = plan_swing(task_of(start, end, other=other, shin=shin), free(None))
+    leaning = corners((other[0].position + shin)[None], other[0].rotation[None], HALF)[0]
+    u = np.linspace(0, 1, 101)
+    gap = [gaps(corners(p.positions(u), p.rotations(u), HALF), leaning).min() for p in (level, path)]
+    assert gap[0] < 0.6 * GAP
+    assert gap[1] > GAP - 2e-3
+
+
 def test_palm_retracts_and_approaches_along_the_normal():
     normal = np.array([0.0, -1.0, 0.0])
     rotation = np.stack([[0, 0, 1.0], np.cross(normal, [0, 0, 1.0]), normal], 1)

@@ -38,8 +38,8 @@ class Damper:
         time: s; tau above: longer than a tick, shorter than a swing.
         weight: Per squared m by which a pair comes nearer in a tick than it may.
         braking: m/s^2; a above, 0 for the first law at all distances.
-        firm: m; wanted distances beyond this are comfort: what is missing of them counts as the same share of this one,
-            and a damper weighs less the more of it there is, so that comfort gives way to what is about to touch.
+        firm: m; wanted distances beyond this are comfort: what is missing of them counts as the same share of this one.
+            Weights go with the inverse square of the distance, so that a link between others finds the middle.
     """
 
     safe_world: float
@@ -64,7 +64,9 @@ class Damper:
 
     def share(self, distance: np.ndarray) -> np.ndarray:
         """(k,) shares of the weight that dampers have at distances (k,) m."""
-        return np.minimum(self.firm / np.maximum(distance, 1e-9), 1.0) ** 2
+        if np.isinf(self.firm):
+            return np.ones(len(distance))
+        return (self.firm / np.maximum(distance, self.firm / _PRESSED)) ** 2
 
     def scaled(self, scale: Scale) -> Damper:
         """The damper for a body of another size."""
@@ -92,6 +94,7 @@ FAR = replace(BODY, safe_world=0.035)
 """The same for motions that touched the world in execution."""
 CLOSE = replace(BODY, safe_world=0.003, safe_self=0.003, room=0.015)
 """The same for motions that are too fast to keep more than clear."""
+_PRESSED = 3.0  # at a distance of `firm` over this and less, weights are this squared
 _BELOW = 0.8  # least vertical part of the normal to what is below a link, as the ground is
 _SAFE_SHARE = 0.5  # of a pair's distance at home, where it is safe at no more than that
 
@@ -183,13 +186,13 @@ class Avoidance:
         legs = np.flatnonzero(self.legs)
         bound[arms] += rate[np.ix_(arms, legs)] @ drift[6:][legs]  # arms get out of the way of legs,
         rate[np.ix_(arms, legs)] = 0.0  # never the other way round
-        weight = np.empty(len(arms))
+        weight, slack = np.empty(len(arms)), bound + rate @ drift[6:]
         for damper, mine in ((self.arms, arms), (self.others, ~arms)):
-            distance = pairs.distance[mine]
-            bound[mine] += damper.speed(distance, safe[mine]) * tick
+            distance, wanted = pairs.distance[mine], safe[mine]
+            bound[mine] += damper.speed(distance, wanted) * tick
+            slack[mine] += damper.speed(distance, np.minimum(wanted, damper.firm)) * tick  # comfort crowds nothing out
             weight[mine] = damper.weight * damper.share(distance)
-        size = np.maximum(np.linalg.norm(rate, axis=1), 1e-9)
-        kept = np.argsort((bound + rate @ drift[6:]) / size, kind="stable")[:MAX_ROWS]
+        kept = np.argsort(slack / np.maximum(np.linalg.norm(rate, axis=1), 1e-9), kind="stable")[:MAX_ROWS]
         return Dampers(-rate[kept], bound[kept], weight[kept])
 
     def _of_arms(self, pairs: _Pairs) -> np.ndarray:

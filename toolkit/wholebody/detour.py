@@ -1,4 +1,4 @@
-"""How a swinging foot gets around the standing one, seen from above."""
+"""How a swinging foot gets around the standing one and the shin above it, seen from above."""
 
 from __future__ import annotations
 
@@ -21,12 +21,14 @@ def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath]) -> np.nd
     if task.other is None:
         return np.zeros(3)
     pose, half_size = task.other
-    standing = corners(pose.position[None], pose.rotation[None], half_size)[0]
+    sole = corners(pose.position[None], pose.rotation[None], half_size)[0]
+    standing = (sole, sole + task.shin[:2]) if np.any(task.shin) else (sole,)
     u = np.linspace(0.0, 1.0, SAMPLES)
 
     def gap(bump: np.ndarray) -> tuple[float, float]:
         path = path_of(bump)
-        apart = gaps(corners(path.positions(u), path.rotations(u), task.half_size), standing)
+        moving = corners(path.positions(u), path.rotations(u), task.half_size)
+        apart = np.min([gaps(moving, each) for each in standing], axis=0)
         return float(apart.min()), float(min(apart[0], apart[-1]))
 
     free, at_ends = gap(np.zeros(3))

@@ -171,10 +171,11 @@ def _swing(
 
     start = old.pose if old is not None else free(index - 1 if index > 0 else index, phase.start)
     end = new.pose if new is not None else free(min(index + 1, len(phases) - 1), phase.end)
-    other = leg = None
+    other, leg, shin = None, None, np.zeros(3)
     standing = _contact(phase, limb.mirrored) if limb.is_foot else None
     if standing is not None:
         other = standing.pose, robot.half_sizes[limb.mirrored]
+        shin[:2] = robot.legs[limb.mirrored].ankle_in_sole[2] * standing.pose.normal[:2]
         u = np.linspace(0.0, 1.0, SAMPLES)
         com = np.array([motion.sample(phase.start + share * phase.duration)[0] for share in u])
         leg = SwingingLeg(robot.legs[limb], u, com, standing.pose.yaw)
@@ -182,7 +183,7 @@ def _swing(
     size, scale = robot.half_sizes[limb], robot.scale
     lift = scale.length * (foot_lift if limb.is_foot else LIFT)
     ends = start, end, size, limb.is_foot, free_start, free_end
-    task = SwingTask(phase.start, phase.duration, *ends, other, leg, lift, scale, robot.passing_gap)
+    task = SwingTask(phase.start, phase.duration, *ends, other, leg, lift, scale, robot.passing_gap, shin)
     return Segment(phase.start, phase.end, phase.transition, None, plan_swing(task, collide), free_start, free_end)
 
 

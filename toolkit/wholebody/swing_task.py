@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -85,6 +85,8 @@ class SwingTask:
         lift: m; guarded motion along the surface normal at both ends.
         scale: The robot's size.
         passing: Gap in m between the soles at which the legs pass each other.
+        shin: (3,) m; horizontal way of the standing leg's shin from where it is over a level sole: it keeps the gap
+            too, since a foot passes it there, and not the sole.
     """
 
     begin: float
@@ -100,6 +102,7 @@ class SwingTask:
     lift: float = LIFT
     scale: Scale = USUAL
     passing: float = 0.0
+    shin: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def margin(self) -> float:
