@@ -99,3 +99,14 @@ def test_the_mean_of_the_last_feet_stays_at_the_goal(robot):
     assert 0.05 < room[1, 0] < 0.2 - config.arrival - 0.1 + 1e-9
     (room,) = landing_room(robot, surfaces, sequence, config, Goal(centre - [0.195, 0.0, 0.0], 0.2))
     assert room[1, 0] < 1e-6  # planned closer to the edge than wanted: no farther
+
+
+def test_feet_land_only_where_they_touch_nothing_beside_their_soles(robot):
+    """Something stands 5 cm ahead of where a foot may land, and nothing of the room leads there."""
+    sequence, surfaces = step(robot, 0.1, 4 * robot.half_sizes[0, 1], size=4.0)
+    (room,) = landing_room(
+        robot, surfaces, sequence, hits=lambda position, rotation: position[:, 0] > 0.1 + 0.05 + 1e-9
+    )
+    np.testing.assert_allclose(room[:, 0], [-RoomConfig().reach[0], 0.05], atol=1e-9)
+    (room,) = landing_room(robot, surfaces, sequence, hits=lambda position, rotation: np.ones(len(position), bool))
+    assert not room.any()

@@ -101,7 +101,8 @@ def slid(
         The new plan; `motion.feasible` says whether there is a motion. None where no contact has room to move.
     """
     robot, world, schedule, problem = plan.robot, plan.world, plan.schedule, plan.motion.problem
-    room = landing_room(robot, world.surfaces, plan.sequence, landing, world.goal)
+    hits = None if surroundings is None else surroundings.foot_hits
+    room = landing_room(robot, world.surfaces, plan.sequence, landing, world.goal, hits)
     if share is not None:
         room *= share[:, None, None]
     if not room.any():

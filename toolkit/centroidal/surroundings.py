@@ -1,8 +1,10 @@
-"""Surroundings: how a world limits where the body may be, as the optimiser of motions needs it."""
+"""Surroundings: how a world limits where body and feet may be, as the optimiser of motions needs it."""
 
 from __future__ import annotations
 
 from typing import Protocol
+
+import numpy as np
 
 from toolkit.centroidal.problem import CentroidalProblem, ComRoom
 from toolkit.contacts.stance import Stance
@@ -17,4 +19,8 @@ class Surroundings(Protocol):
 
     def room(self, problem: CentroidalProblem) -> ComRoom | None:
         """The room of the CoM in a motion over the contacts of a problem; None where the world does not limit it."""
+        ...
+
+    def foot_hits(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        """(n,) bool; whether feet whose soles are at (n, 3) m and (n, 3, 3) touch what stands beside them."""
         ...

@@ -49,6 +49,7 @@ def landing_room(
     sequence: ContactSequence,
     config: RoomConfig = RoomConfig(),
     goal: Goal | None = None,
+    hits: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> np.ndarray:
     """Box of displacements along each new contact's own axes that keep a sole on its surface and off the other sole.
 
@@ -58,6 +59,7 @@ def landing_room(
         sequence: The planned contacts.
         config: Settings.
         goal: The goal at which the feet must stay in the end; None where they may leave it.
+        hits: Whether feet whose soles are at (n, 3) m and (n, 3, 3) touch what stands beside them; None: none do.
 
     Returns:
         (transitions, 2, 2) m; the lowest and the highest displacement along x and y, zeros for palms.
@@ -76,12 +78,14 @@ def landing_room(
         for sole in (other, *following[:1]):
             if sole is not None:
                 box = _apart(box, contact, sole, robot.half_sizes[contact.limb], config.gap)
-        arrived = None
+        limits: list[Callable[[np.ndarray], bool]] = []
         if goal is not None and final[contact.limb] == index:
-            arrived = partial(_arrived, goal, stances[-1].mean_feet.position, contact, config.arrival)
+            limits.append(partial(_arrived, goal, stances[-1].mean_feet.position, contact, config.arrival))
+        if hits is not None:
+            limits.append(partial(_free, hits, contact))
         half = robot.half_sizes[contact.limb]
         margins = (robot.foot_room(config.margin) - half, 0.5 * config.margin, 0.0)
-        room[index] = _inside(box, contact, surfaces[contact.surface], half, margins, config.step, arrived)
+        room[index] = _inside(box, contact, surfaces[contact.surface], half, margins, config.step, limits)
     return room
 
 
@@ -113,6 +117,13 @@ def _arrived(goal: Goal, centre: np.ndarray, contact: Contact, margin: float, bo
     return bool(farthest <= max(goal.radius - margin, planned + 1e-9))
 
 
+def _free(hits: Callable[[np.ndarray, np.ndarray], np.ndarray], contact: Contact, box: np.ndarray) -> bool:
+    """Whether a foot touches nothing at the corners of the box."""
+    corners = np.array([[x, y, 0.0] for x in box[:, 0] for y in box[:, 1]])
+    places = contact.pose.position + corners @ contact.pose.rotation.T
+    return not hits(places, np.tile(contact.pose.rotation, (len(places), 1, 1))).any()
+
+
 def _inside(
     box: np.ndarray,
     contact: Contact,
@@ -120,11 +131,11 @@ def _inside(
     half_size: np.ndarray,
     margins: Sequence[np.ndarray | float],
     step: float,
-    allowed: Callable[[np.ndarray], bool] | None,
+    limits: Sequence[Callable[[np.ndarray], bool]],
 ) -> np.ndarray:
-    """The part of the box that is allowed and keeps the sole on the surface with the first margin (m) that it has.
+    """The part of the box that is within all limits and keeps the sole on the surface.
 
-    It grows evenly from zero, in steps of `step` m.
+    It keeps the first margin (m) that the sole has, and grows evenly from zero, in steps of `step` m.
     """
     region = surface.region
     frame = surface.pose.inverse() @ contact.pose
@@ -145,7 +156,7 @@ def _inside(
             wider, limit = found.copy(), box[end, axis]
             bound, change = (min, step) if end else (max, -step)
             wider[end, axis] = bound(found[end, axis] + change, limit)
-            stuck = wider[end, axis] == found[end, axis] or (allowed is not None and not allowed(wider))
+            stuck = wider[end, axis] == found[end, axis] or not all(allows(wider) for allows in limits)
             if stuck or not holds(wider, margin):
                 growing.discard((end, axis))
             else:

@@ -20,6 +20,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.costs.heuristic import Distance, EuclideanDistance, GridDistance
 from toolkit.search.costs.terrain_distance import TerrainDistance, resting_surfaces
 from toolkit.search.moves.drawn import DrawnSteps, longest_step
+from toolkit.search.moves.foot_collision import FootCollision
 from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.start_palms import with_palms
@@ -55,6 +56,7 @@ class Ground:
         self._projector = self._projected(config.rest_friction)
         half = robot.half_sizes[Limb.LEFT_FOOT]
         self._footholds = Footholds(world.surfaces, half, self._projector.room - half)
+        self._feet = FootCollision.of(robot, world, self._projector.config.margin)
         self._terrain = self._distances(self._projector)
         walls = config.palms and bool(self._projector.table.palm.any())
         self._arms = {limb: ArmMap.of(robot, limb) for limb in robot.arms if walls}
@@ -74,7 +76,8 @@ class Ground:
         model = self._models[way is not None and way.slides]
         if way is not None and self._config.drawn and not way.slides:
             drawn = DrawnSteps(self._robot, self._projector.table, self._footholds, way.distance, self._longest)
-        return MoveGenerator(self._robot, self._projector, model, terrain.occupancy, terrain.box, self._arms, drawn)
+        places = terrain.occupancy, terrain.box, self._arms, drawn, self._feet
+        return MoveGenerator(self._robot, self._projector, model, *places)
 
     def start_stance(self) -> Stance:
         """Both feet on the ground below the start, at their distance in the home posture, and palms at their sites.

@@ -12,6 +12,7 @@ _PACES = (  # s, s; shifts and swings to choose from, the calmest first; where a
     ((0.35, 0.6), (0.05, 0.3)),
     ((0.6, 0.8), (0.35, 0.6)),
     ((1.0, 1.0), (0.6, 0.8)),
+    ((1.4, 1.4), (1.0, 1.0)),
 )
 
 
@@ -40,7 +41,7 @@ def own_choice(factor: float, calmer: int = 0) -> tuple[Timing, ...]:
     """The timings that a planner may choose from for every transition, the calmest first.
 
     They scale with the robot's factor on times (`RobotModel.pace`). The more often the pace has yielded (`calmer`),
-    the slower they are, down to the paper's.
+    the slower they are.
     """
     pace = _PACES[min(calmer, len(_PACES) - 1)]
     return tuple(Timing(*times).times(factor) for times in pace)

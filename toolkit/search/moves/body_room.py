@@ -8,9 +8,11 @@ import numpy as np
 
 from toolkit.centroidal.problem import CentroidalProblem, ComRoom
 from toolkit.compiled import compiled
+from toolkit.contacts.projection import ProjectionConfig
 from toolkit.contacts.stance import Stance
 from toolkit.geometry.limb import FEET
 from toolkit.robot.model import RobotModel
+from toolkit.search.moves.foot_collision import FootCollision
 from toolkit.search.moves.legs import Legs, legs_of, reach
 from toolkit.search.moves.limits import drops, margins
 from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
@@ -64,6 +66,7 @@ class BodyRoom:
             float(drops(robot)[-1]),
             robot.scale.length,
         )
+        self._feet = FootCollision.of(robot, world, ProjectionConfig().scaled(robot.scale.length).margin)
         self._occupancy: Occupancy | None = None
         self._bounds = np.zeros((2, 3))  # of the occupancy
 
@@ -75,6 +78,10 @@ class BodyRoom:
         if occupancy is not None:
             _fill_sinks(occupancy, self._walker, place, yaw, sink)
         return float(sink[0])
+
+    def foot_hits(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        """See `Surroundings`."""
+        return np.zeros(len(position), bool) if self._feet is None else self._feet.hits(position, rotation)
 
     def room(self, problem: CentroidalProblem) -> ComRoom | None:
         """See `Surroundings`."""

@@ -19,6 +19,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.drawn import DrawnSteps
+from toolkit.search.moves.foot_collision import FootCollision
 from toolkit.search.moves.legs import legs_of, stances_violated
 from toolkit.search.moves.limits import climb, drops, margins, sole_room
 from toolkit.search.moves.occupancy import BodyBox, Occupancy
@@ -69,6 +70,7 @@ class MoveGenerator:
         box: The body.
         arms: The places where each arm can hold its palm.
         drawn: Landing places for where the steps lead no farther; None: there are none but those of the steps.
+        feet: Finds feet that touch the world beside their soles; None: none do.
 
     Attributes:
         table: The table in which contacts are entered, empty at first.
@@ -86,8 +88,9 @@ class MoveGenerator:
         box: BodyBox,
         arms: Mapping[Limb, ArmMap],
         drawn: DrawnSteps | None = None,
+        feet: FootCollision | None = None,
     ):
-        self._drawn = drawn
+        self._drawn, self._feet = drawn, feet
         self.robot, self.arms, self.table = robot, arms, ContactTable(projector.table.friction, robot.scale.length)
         self._projector, self._model = projector, model
         self._climb, self._scale = climb(robot), robot.scale.length
@@ -140,11 +143,14 @@ class MoveGenerator:
         yaw: np.ndarray,
         standing: int,
     ) -> np.ndarray:
-        """Codes (n,) of soles (n, ...) beside a standing foot; see `screen_steps`."""
+        """Codes (n,) of soles (n, ...) beside a standing foot; see `screen_steps` and `FootCollision`."""
         arrays = (np.ascontiguousarray(array) for array in (position, rotation, yaw))
         soles = Soles(np.asarray(surface, np.int64), *arrays)
         codes = np.empty(len(surface), np.int64)
         screen_steps(soles, int(limb), self._sole(standing), self._limits, self._body, codes)
+        if self._feet is not None:
+            left = np.flatnonzero(codes == 0)
+            codes[left[self._feet.hits(soles.position[left], soles.rotation[left])]] = Reason.FOOT
         return codes
 
     def _sole(self, number: int) -> Sole:

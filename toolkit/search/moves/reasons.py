@@ -52,6 +52,7 @@ class Reason(IntEnum):
     SHANK = "a leg hits the world"
     KNEES = "legs hit each other"
     POSTURE = "no posture of the arm holds the palm", True
+    FOOT = "a foot hits what stands beside it"
 
 
 OF_LIMIT = tuple(Reason[limit.name.upper().replace(" ", "_")].value for limit in LIMITS)
