@@ -26,7 +26,7 @@ def solution(name, *limbs, start=(), seconds=0.0):
     sequence = SimpleNamespace(
         name=name, identity=name.encode(), transitions=transitions, stances=stances, start=stances[0]
     )
-    sequence.timed = lambda timing: SimpleNamespace(name=f"{name} calm")
+    sequence.timed = lambda timing: SimpleNamespace(name=f"{name} at {timing.swing:g}")
     return SimpleNamespace(name=name, sequence=sequence, seconds=seconds)
 
 
@@ -53,7 +53,7 @@ class Planner:
             expansions=1,
             hasty=self.hasty,
             slides=False,
-            calmer=Timing() if calmer + 1 < self.paces else None,
+            calmer=tuple(Timing(swing=float(pace)) for pace in range(calmer + 1, self.paces)),
             screen=SimpleNamespace(),
         )
 
@@ -173,19 +173,45 @@ def test_the_pace_yields_at_once_where_joints_cannot_keep_it(monkeypatch):
 def test_the_pace_yields_where_a_calmer_one_costs_clearly_less(monkeypatch):
     planner = Planner([solution("fast", FOOT)], [])
     planner.paces, planner.calm = 2, [solution("slow", FOOT)]
-    run = Run(planner, {"fast", "slow"}, monkeypatch, {"fast": 10.0, "fast calm": 8.0, "slow": 7.0})
+    run = Run(planner, {"fast", "slow"}, monkeypatch, {"fast": 10.0, "fast at 1": 8.0, "slow": 7.0})
     assert run.tested == ["slow"] and planner.pace == 1 and planner.calls == [True, True]
     for cost in (9.5, np.inf):  # no more than a local search saves, and no motion at all
         planner = Planner([solution("fast", FOOT)], [])
         planner.paces, planner.calm = 2, [solution("slow", FOOT)]
-        assert Run(planner, {"fast"}, monkeypatch, {"fast": 10.0, "fast calm": cost}).tested == ["fast"]
+        assert Run(planner, {"fast"}, monkeypatch, {"fast": 10.0, "fast at 1": cost}).tested == ["fast"]
+
+
+def test_the_pace_yields_by_as_much_as_pays(monkeypatch):
+    """By two paces at once, of which each is clearly cheaper, and not to a third one that is hardly so."""
+    planner = Planner([solution("fast", FOOT)], [])
+    planner.paces, planner.calm = 4, [solution("slow", FOOT)]
+    cost = {"fast": 10.0, "fast at 1": 8.0, "fast at 2": 6.0, "fast at 3": 5.8, "slow": 5.0, "slow at 3": 4.8}
+    assert Run(planner, {"slow"}, monkeypatch, cost).tested == ["slow"]
+    assert planner.pace == 2 and planner.calls == [True, True]
+
+
+def test_the_pace_yields_where_that_pays_for_what_the_local_search_made(monkeypatch):
+    planner = Planner([solution("fast", FOOT)], [])
+    planner.paces, planner.calm = 2, [solution("slow", FOOT)]
+    cost = {"fast": 10.0, "fast at 1": 9.5, "better": 9.0, "better at 1": 7.0, "slow": 6.0}
+    run = Run(planner, {"slow", "better"}, monkeypatch, cost, {"fast": "better"})
+    assert run.tested == ["slow"] and planner.pace == 1
+
+
+def test_the_pace_yields_after_a_few_failures(monkeypatch):
+    """Two of three are tested, then a calmer pace is searched; where there is none, all three are."""
+    for paces, tested in ((2, ["a", "b", "slow"]), (1, ["a", "b", "c"])):
+        planner = Planner([solution(name, FOOT) for name in "abc"], [])
+        planner.paces, planner.calm = paces, [solution("slow", FOOT)]
+        cost = {"a": 1.0, "b": 2.0, "c": 3.0, "slow": 9.0}
+        assert Run(planner, {"slow"}, monkeypatch, cost).tested == tested
 
 
 @pytest.mark.parametrize("calm", [[], [solution("slow", FOOT)]])
 def test_what_a_faster_pace_found_counts_where_a_calmer_one_finds_nothing_cheaper(calm, monkeypatch):
     planner = Planner([solution("fast", FOOT)], [])
     planner.paces, planner.calm = 2, calm
-    run = Run(planner, {"fast", "slow"}, monkeypatch, {"fast": 10.0, "fast calm": 8.0, "slow": 11.0})
+    run = Run(planner, {"fast", "slow"}, monkeypatch, {"fast": 10.0, "fast at 1": 8.0, "slow": 11.0})
     assert run.tested == ["fast"] and planner.pace == 1 and run.result.passed
 
 

@@ -29,6 +29,7 @@ from toolkit.world.world import World
 
 _SAME = 2  # equal failures where nothing has moved yet, after which no other sequence is tried
 _WORTH = 0.9  # of a cost, below which a calmer pace is worth a search; a local search saves less at any pace
+_FAILURES = 2  # at one pace, after which a calmer one is searched, if there is one
 
 
 @dataclass(frozen=True)
@@ -128,6 +129,8 @@ class _Run:
         self._blame = Blame(scale=robot.scale.length)
         self._at_start: Counter[str] = Counter()  # reasons of failures where nothing has moved yet
         self._known: set[bytes] = set()
+        self._pace = 0  # how often the pace has yielded
+        self._improved_at: dict[int, int] = {}  # number of exclusions when a candidate was improved last
         self._local: LocalSearch | None = None
 
     def result(self) -> PipelineResult:
@@ -138,16 +141,21 @@ class _Run:
             found = self._optimised(search)
             if _least(aside) < _least(found):
                 found += aside  # what was found at a faster pace
-            if self._calmer_pays(found):
-                aside = found
+            paces = self._paces_that_pay(found)
+            if not paces:
+                found += self._refined(found)
+                paces = self._paces_that_pay(found)
+            if paces:
+                aside, self._pace = found, self._pace + paces
                 continue
             passed, aside = self._tried(found), []
             failed_with_palms = any(candidate.uses_palms for candidate in found)
             if passed or self._spent():
                 break
-            if search.calmer is None and (not found or not (self._blame.exclusions or failed_with_palms)):
+            if not search.calmer and (not found or not (self._blame.exclusions or failed_with_palms)):
                 break
             palms = palms and (self._too_fast or not failed_with_palms)
+            self._pace += 1
         return self._concluded()
 
     def _spent(self) -> bool:
@@ -195,7 +203,7 @@ class _Run:
             observer=lambda progress: observer.progress("planning", None, str(progress)),
             exclusions=tuple(exclusions),
             palms=palms,
-            calmer=len(self._searches),
+            calmer=self._pace,
         )
         self._searches.append(search)
         found = len(search.solutions)
@@ -228,21 +236,44 @@ class _Run:
         self._observer.finished("dynamics", any(c.feasible for c in found), time.perf_counter() - began, _told(found))
         return found
 
-    def _calmer_pays(self, found: list[Candidate]) -> bool:
-        """Whether the cheapest candidate costs clearly less with the timing of the next pace: then that is searched."""
-        timing = self._searches[-1].calmer
+    def _paces_that_pay(self, found: list[Candidate]) -> int:
+        """By how many paces to yield: to each that makes the cheapest candidate clearly cheaper than the last one did.
+
+        The candidate is timed anew for that; what a search at that pace finds is cheaper still.
+        """
         best = min((candidate for candidate in found if candidate.feasible), key=_rank, default=None)
-        if timing is None or best is None:
-            return False
-        began = time.perf_counter()
+        timings = self._searches[-1].calmer
+        if best is None or not timings:
+            return 0
+        began, pays, least = time.perf_counter(), 0, best.cost.total
         self._observer.started("dynamics")
-        plan = self._tester.motion_of(best.plan.sequence.timed(timing))
-        cost = plan_cost(plan, self._weights).total if plan.motion.feasible else np.inf
-        pays = cost < _WORTH * best.cost.total
-        detail = f"true cost {best.cost.total:.0f}, and {cost:.0f} with {timing.shift:g} s + {timing.swing:g} s"
-        detail += "; a calmer search follows" if pays else ""
+        for number, timing in enumerate(timings, 1):
+            plan = self._tester.motion_of(best.plan.sequence.timed(timing))
+            cost = plan_cost(plan, self._weights).total
+            if plan.motion.feasible and cost < _WORTH * least:
+                pays, least = number, cost
+        detail = f"true cost {best.cost.total:.0f}, and not clearly less at a calmer pace"
+        if pays:
+            chosen = timings[pays - 1]
+            detail = f"true cost {best.cost.total:.0f}, and {least:.0f} with {chosen.shift:g} s + {chosen.swing:g} s"
+            detail += "; a calmer search follows"
         self._observer.finished("dynamics", True, time.perf_counter() - began, detail)
         return pays
+
+    def _refined(self, found: list[Candidate]) -> list[Candidate]:
+        """What the local search makes of the cheapest candidates."""
+        ranked = sorted((candidate for candidate in found if candidate.feasible), key=_rank)[: self._starts]
+        return [better for candidate in ranked if self._improvable(candidate) for better in self._improved(candidate)]
+
+    @property
+    def _starts(self) -> int:
+        """The number of candidates from which the local search starts."""
+        return 0 if self._config.refine is None else self._config.refine.starts
+
+    def _improvable(self, candidate: Candidate) -> bool:
+        """Whether the local search has not been asked yet for a candidate without the transitions that failed."""
+        known = self._improved_at.get(candidate.number) == len(self._blame.exclusions)
+        return self._starts > 0 and candidate.source != Source.LOCAL and not known
 
     def _new(self, sequence: ContactSequence) -> bool:
         """Whether a sequence comes for the first time."""
@@ -274,22 +305,18 @@ class _Run:
     def _tried(self, found: list[Candidate]) -> bool:
         """Whether a candidate passes the stages after the optimiser; the truly cheapest is tried first.
 
-        Before a candidate is tested, it is improved, and again where a transition has been blamed since. Where one asks
-        too much of the joints and the pace may yield, the others are not tested.
+        Before a candidate is tested, it is improved, and again where a transition has been blamed since. Where the pace
+        may yield, the others are not tested after one that asks too much of the joints, or after a few failures.
         """
         blame = self._blame
         since = len(blame.exclusions)  # what the optimiser rejected concerns only searches to come
-        ranked = sorted((candidate for candidate in found if candidate.feasible), key=_rank)
-        starts = 0 if self._config.refine is None else self._config.refine.starts
-        tried = {candidate.number: since for candidate in ranked[:starts]}
-        ranked += [better for candidate in ranked[:starts] for better in self._improved(candidate)]
+        ranked, failures = [candidate for candidate in found if candidate.feasible], 0
         while ranked:
             candidate = min(ranked, key=_rank)
             ranked.remove(candidate)
             if not self._allowed(candidate) or blame.first_in(candidate.solution.sequence, since) is not None:
                 continue
-            if starts and candidate.source != Source.LOCAL and tried.get(candidate.number) != len(blame.exclusions):
-                tried[candidate.number] = len(blame.exclusions)
+            if self._improvable(candidate):
                 ranked += [candidate, *self._improved(candidate)]
                 continue
             trial = self._tester.test(candidate)
@@ -299,17 +326,21 @@ class _Run:
             if self._too_fast:
                 break  # the next search is calmer, and no transition is to blame
             self._note(candidate.solution.sequence, trial.failure)
+            failures += 1
+            if failures >= _FAILURES and self._searches[-1].calmer:
+                break
         return False
 
     @property
     def _too_fast(self) -> bool:
         """Whether the last trial asked too much of the joints at a pace that may yield."""
         failure = self._trials[-1].failure if self._trials else None
-        return failure is not None and failure.too_fast and self._searches[-1].calmer is not None
+        return failure is not None and failure.too_fast and bool(self._searches[-1].calmer)
 
     def _improved(self, candidate: Candidate) -> list[Candidate]:
         """What the local search makes of a candidate without transitions that failed; nothing where none is better."""
         config, screen = self._config.refine, self._searches[candidate.search].screen
+        self._improved_at[candidate.number] = len(self._blame.exclusions)
         if config is None or screen is None:
             return []
         if self._local is None:

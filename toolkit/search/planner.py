@@ -85,6 +85,13 @@ class ContactPlanner:
         timings = timings_of(config.timings, own, self.robot.pace, pace)
         return timings[:1] if config.one_timing else timings
 
+    def _paces_after(self, calmer: int, *, slides: bool) -> tuple[Timing, ...]:
+        """The calmest timing of every pace to which the pace may still yield."""
+        found = [self.timings(calmer, slides=slides)]
+        while (after := self.timings(calmer + len(found), slides=slides)) != found[-1]:
+            found.append(after)
+        return tuple(timings[0] for timings in found[1:])
+
     @warnings_refused("the contact search", PlanningError)
     def search(
         self,
@@ -122,10 +129,9 @@ class ContactPlanner:
         blame = Blame(exclusions, _STRIKES, scale=scale)
         parts = self._parts(way, strategy, timings, tally, blame.exclusions, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
-        unit, after = parts.cost.unit, self.timings(calmer + 1, slides=way.slides)
-        may_yield = after != timings
+        unit, paces = parts.cost.unit, self._paces_after(calmer, slides=way.slides)
         patient = replace(strategy.patient, unit=unit)
-        if may_yield or way.slides:  # a calmer search follows, or the strategy has extended the limit
+        if paces or way.slides:  # a calmer search follows, or the strategy has extended the limit
             patient = replace(patient, persistence=1)
         searches = [(ContactProblem(parts, state), patient)]
         if strategy.hasty is not None:  # a sequence that begins with the right foot often mirrors one that does not
@@ -148,7 +154,7 @@ class ContactPlanner:
             reason="" if result.paths else self._reason(result, tally),
             warning=_UNTRAINED if tally.untrained else "",
             slides=way.slides,
-            calmer=after[0] if may_yield else None,
+            calmer=paces,
             screen=parts.screen,
         )
 

@@ -75,8 +75,8 @@ class SearchResult:
         warning: One line where the judgements are less reliable, else "".
         hasty: Number of first solutions that only had to come soon; better ones follow.
         slides: Whether no way leads over resting ground alone; see `CostConfig.on_ground`.
-        calmer: The calmest timing of the next pace to search with; None where the pace is not the planner's to choose,
-            or none is left.
+        calmer: The calmest timing of every pace to come, the fastest pace first; empty where the pace is not the
+            planner's to choose, or none is left.
         screen: The screens of the search, for sequences that are made from what it found; None where there are none.
     """
 
@@ -90,7 +90,7 @@ class SearchResult:
     warning: str = ""
     hasty: int = 0
     slides: bool = False
-    calmer: Timing | None = None
+    calmer: tuple[Timing, ...] = ()
     screen: SequenceScreen | None = field(default=None, repr=False, compare=False)
 
 
