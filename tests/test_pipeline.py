@@ -208,11 +208,13 @@ def test_the_pace_yields_after_a_few_failures(monkeypatch):
 
 
 @pytest.mark.parametrize("calm", [[], [solution("slow", FOOT)]])
-def test_what_a_faster_pace_found_counts_where_a_calmer_one_finds_nothing_cheaper(calm, monkeypatch):
+def test_what_a_faster_pace_found_counts_at_both_timings_where_a_calmer_one_finds_nothing_cheaper(calm, monkeypatch):
     planner = Planner([solution("fast", FOOT)], [])
     planner.paces, planner.calm = 2, calm
     run = Run(planner, {"fast", "slow"}, monkeypatch, {"fast": 10.0, "fast at 1": 8.0, "slow": 11.0})
-    assert run.tested == ["fast"] and planner.pace == 1 and run.result.passed
+    assert run.tested == ["fast at 1", "fast"] and planner.pace == 1 and run.result.passed
+    timed = run.result.candidates[1]
+    assert timed.source == Source.TIMED and timed.search == 0 and timed.cost.total == 8.0
 
 
 def test_a_pace_that_may_not_yield_is_kept(monkeypatch):

@@ -19,6 +19,7 @@ class Source(StrEnum):
     SEARCH = "search"
     HASTY = "hasty search"
     LOCAL = "local search"
+    TIMED = "a calmer timing"
 
 
 def refined_solution(plan: MotionPlan, cost: PlanCost, seconds: float) -> Solution:

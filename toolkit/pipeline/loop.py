@@ -180,7 +180,7 @@ class _Run:
     @property
     def _optimisations(self) -> int:
         """Number of sequences of searches that were optimised."""
-        return sum(candidate.source != Source.LOCAL for candidate in self._candidates)
+        return sum(candidate.source in (Source.SEARCH, Source.HASTY) for candidate in self._candidates)
 
     def _concluded(self) -> PipelineResult:
         """The result with the best trial; of trials that came equally far, the first."""
@@ -239,23 +239,24 @@ class _Run:
     def _paces_that_pay(self, found: list[Candidate]) -> int:
         """By how many paces to yield: to each that makes the cheapest candidate clearly cheaper than the last one did.
 
-        The candidate is timed anew for that; what a search at that pace finds is cheaper still.
+        The candidate is timed anew for that. What comes of it is a further one, since a search may find nothing better.
         """
         best = min((candidate for candidate in found if candidate.feasible), key=_rank, default=None)
         timings = self._searches[-1].calmer
         if best is None or not timings:
             return 0
-        began, pays, least = time.perf_counter(), 0, best.cost.total
+        began, pays, plan, least = time.perf_counter(), 0, best.plan, best.cost
         self._observer.started("dynamics")
         for number, timing in enumerate(timings, 1):
-            plan = self._tester.motion_of(best.plan.sequence.timed(timing))
-            cost = plan_cost(plan, self._weights).total
-            if plan.motion.feasible and cost < _WORTH * least:
-                pays, least = number, cost
+            timed = self._tester.motion_of(best.plan.sequence.timed(timing))
+            cost = plan_cost(timed, self._weights)
+            if timed.motion.feasible and cost.total < _WORTH * least.total:
+                pays, plan, least = number, timed, cost
         detail = f"true cost {best.cost.total:.0f}, and not clearly less at a calmer pace"
         if pays:
-            chosen = timings[pays - 1]
-            detail = f"true cost {best.cost.total:.0f}, and {least:.0f} with {chosen.shift:g} s + {chosen.swing:g} s"
+            found.append(self._entered(Source.TIMED, self._as_solution(plan, least), plan, least, None))
+            shift, swing = timings[pays - 1].shift, timings[pays - 1].swing
+            detail = f"true cost {best.cost.total:.0f}, and {least.total:.0f} with {shift:g} s + {swing:g} s"
             detail += "; a calmer search follows"
         self._observer.finished("dynamics", True, time.perf_counter() - began, detail)
         return pays
@@ -356,8 +357,11 @@ class _Run:
         self._observer.finished("refinement", True, time.perf_counter() - began, detail)
         if not changed or not self._new(plan.sequence):
             return []
-        solution = refined_solution(plan, cost, self._searches[-1].seconds)
-        return [self._entered(Source.LOCAL, solution, plan, cost, None)]
+        return [self._entered(Source.LOCAL, self._as_solution(plan, cost), plan, cost, None)]
+
+    def _as_solution(self, plan: MotionPlan, cost: PlanCost) -> Solution:
+        """A plan that was made from what the last search found, as if that had found it."""
+        return refined_solution(plan, cost, self._searches[-1].seconds)
 
     def _optimise(self, sequence: ContactSequence) -> MotionPlan:
         """The motion of a variant."""
