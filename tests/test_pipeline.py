@@ -22,11 +22,15 @@ def solution(name, *limbs, start=(), seconds=0.0):
     for limb in limbs:
         palms.append(palms[-1] if limb.is_foot else palms[-1] ^ {limb})
     stances = [SimpleNamespace(palms=tuple(each), contacts=()) for each in palms]
-    transitions = [SimpleNamespace(limb=limb, contact=None) for limb in limbs]
+    transitions = [SimpleNamespace(limb=limb, contact=None, timing=Timing(swing=0.5)) for limb in limbs]
     sequence = SimpleNamespace(
         name=name, identity=name.encode(), transitions=transitions, stances=stances, start=stances[0]
     )
-    sequence.timed = lambda timing: SimpleNamespace(name=f"{name} at {timing.swing:g}")
+
+    def timed(timing, only=None):
+        return SimpleNamespace(name=f"{name} at {timing.swing:g}" + ("" if only is None else f" in {only}"))
+
+    sequence.timed = timed
     return SimpleNamespace(name=name, sequence=sequence, seconds=seconds)
 
 
@@ -92,7 +96,8 @@ class Run:
                 return SimpleNamespace(name=sequence.name, sequence=sequence), failure
 
             def motion_of(self, sequence):
-                return SimpleNamespace(name=sequence.name, motion=SimpleNamespace(feasible=sequence.name in cost))
+                motion = SimpleNamespace(feasible=sequence.name in cost)
+                return SimpleNamespace(name=sequence.name, sequence=sequence, motion=motion)
 
             def settled(self, plan):
                 return plan
@@ -215,6 +220,19 @@ def test_what_a_faster_pace_found_counts_at_both_timings_where_a_calmer_one_find
     assert run.tested == ["fast at 1", "fast"] and planner.pace == 1 and run.result.passed
     timed = run.result.candidates[1]
     assert timed.source == Source.TIMED and timed.search == 0 and timed.cost.total == 8.0
+
+
+def test_where_a_transition_fails_it_alone_is_slowed_down_at_first(monkeypatch):
+    """With the next calmer timing; where that has no motion or there is none, the next search follows as ever."""
+    for paces, cost, tested in (
+        (2, {"fast": 10.0, "fast at 1": 10.0, "fast at 1 in 0": 10.5}, ["fast", "fast at 1 in 0"]),
+        (2, {"fast": 10.0, "fast at 1": 10.0}, ["fast", "slow"]),
+        (1, {"fast": 10.0, "fast at 1 in 0": 10.5}, ["fast", "slow"]),
+    ):
+        planner = Planner([solution("fast", FOOT)], [])
+        planner.paces, planner.calm = paces, [solution("slow", FOOT)]
+        run = Run(planner, {"fast at 1 in 0", "slow"}, monkeypatch, cost, failed_at=0)
+        assert run.tested == tested and run.result.passed
 
 
 def test_a_pace_that_may_not_yield_is_kept(monkeypatch):

@@ -60,9 +60,15 @@ class ContactSequence:
             stances.append(transition.apply(stances[-1]))
         return tuple(stances)
 
-    def timed(self, timing: Timing) -> ContactSequence:
-        """The same contacts with one timing for all transitions."""
-        return replace(self, transitions=tuple(replace(each, timing=timing) for each in self.transitions))
+    def timed(self, timing: Timing, only: int | None = None) -> ContactSequence:
+        """The same contacts with one timing for all transitions, or for one of them alone."""
+        return replace(
+            self,
+            transitions=tuple(
+                replace(each, timing=timing) if only in (None, index) else each
+                for index, each in enumerate(self.transitions)
+            ),
+        )
 
     @property
     def contacts(self) -> tuple[Contact, ...]:

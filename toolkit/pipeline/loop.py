@@ -307,7 +307,8 @@ class _Run:
         """Whether a candidate passes the stages after the optimiser; the truly cheapest is tried first.
 
         Before a candidate is tested, it is improved, and again where a transition has been blamed since. Where the pace
-        may yield, the others are not tested after one that asks too much of the joints, or after a few failures.
+        may yield, one that fails is tested once more with the transition to blame at a calmer timing, and no other is
+        after one that asks too much of the joints, or after a few failures.
         """
         blame = self._blame
         since = len(blame.exclusions)  # what the optimiser rejected concerns only searches to come
@@ -320,17 +321,37 @@ class _Run:
             if self._improvable(candidate):
                 ranked += [candidate, *self._improved(candidate)]
                 continue
-            trial = self._tester.test(candidate)
-            self._trials.append(trial)
-            if trial.failure is None:
+            failure = self._failure_of(candidate)
+            slowed = None if failure is None else self._slowed(candidate, failure)
+            if failure is None or (slowed is not None and self._failure_of(slowed) is None):
                 return True
             if self._too_fast:
                 break  # the next search is calmer, and no transition is to blame
-            self._note(candidate.solution.sequence, trial.failure)
-            failures += 1
+            self._note(candidate.solution.sequence, failure)
+            failures += 1 if slowed is None else 2
             if failures >= _FAILURES and self._searches[-1].calmer:
                 break
         return False
+
+    def _failure_of(self, candidate: Candidate) -> Failure | None:
+        """Test a candidate: why it does not pass; None where it does."""
+        self._trials.append(self._tester.test(candidate))
+        return self._trials[-1].failure
+
+    def _slowed(self, candidate: Candidate, failure: Failure) -> Candidate | None:
+        """A candidate with the transition to blame at the next calmer timing; None where that is not to be had."""
+        index, sequence = failure.transition, candidate.plan.sequence
+        if index is None or not self._searches[-1].calmer or not self._allowed(candidate):
+            return None
+        swing = sequence.transitions[index].timing.swing
+        timing = next((each for each in self._searches[-1].calmer if each.swing > swing), None)
+        if timing is None:
+            return None
+        plan = self._tester.motion_of(sequence.timed(timing, index))
+        if not plan.motion.feasible:
+            return None
+        cost = plan_cost(plan, self._weights)
+        return self._entered(Source.TIMED, self._as_solution(plan, cost), plan, cost, None)
 
     @property
     def _too_fast(self) -> bool:
