@@ -25,7 +25,7 @@ _AROUND = 1.0  # m around the feet that are looked at
 _AHEAD, _ASIDE = 0.12, 0.05  # m; the CoM may be so far from the middle of the feet when it meets a ceiling
 _FAR, _STEP = 0.12, 0.01  # m; walls farther away do not matter; spacing of tries
 _LEAST, _SWAY = 0.015, 0.05  # m; room that is left along the heading and across it, where walking needs more
-_ARM = 0.08  # m by which arms give way
+_ARM = 0.03  # m by which arms give way: upper arms, which hang from the shoulders, hardly do
 _SIDES = 4  # ahead, left, back, right
 
 
