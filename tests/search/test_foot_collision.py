@@ -17,15 +17,15 @@ def robot(overhang):
 
 
 def hits(world, *places):
-    feet = FootCollision.of(robot(0.02), world, 0.01)  # pyright: ignore[reportArgumentType]
+    feet = FootCollision.of(robot(0.02), world)  # pyright: ignore[reportArgumentType]
     assert feet is not None
     return feet.hits(np.array(places, float), np.tile(np.eye(3), (len(places), 1, 1))).tolist()
 
 
 def test_feet_within_their_soles_and_the_margin_need_no_check():
     world = make_world(FLOOR)
-    assert FootCollision.of(robot(0.01), world, 0.01) is None  # pyright: ignore[reportArgumentType]
-    assert FootCollision.of(robot(0.02), world, 0.01) is not None  # pyright: ignore[reportArgumentType]
+    assert FootCollision.of(robot(0.01), world) is None  # pyright: ignore[reportArgumentType]
+    assert FootCollision.of(robot(0.02), world) is not None  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(("height", "touches"), [(0.1, True), (0.005, False), (-0.02, False)])

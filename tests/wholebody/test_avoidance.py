@@ -148,7 +148,7 @@ def test_feet_are_left_to_their_paths(robot):
     avoidance._place(robot.home)
     feet = {int(body) for limb, body in avoidance.body.items() if limb.is_foot}
     pairs = avoidance._near(set())
-    bodies = avoidance.model.geom_bodyid[pairs.geoms[avoidance._of_world(pairs)]]
+    bodies = avoidance.model.geom_bodyid[pairs.geoms[avoidance._of_world(pairs.geoms)]]
     assert not np.isin(bodies, list(feet)).any()
 
 

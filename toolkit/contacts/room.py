@@ -110,8 +110,7 @@ def _arrived(goal: Goal, centre: np.ndarray, contact: Contact, margin: float, bo
 
     Both feet are displaced alike here. That covers any other displacements of the two, since the goal is convex.
     """
-    corners = np.array([[x, y, 0.0] for x in box[:, 0] for y in box[:, 1]])
-    moved = centre + corners @ contact.pose.rotation.T
+    moved = centre + _ways(contact, box)
     planned = np.hypot(*(centre - goal.position)[:2])
     farthest = np.hypot(*(moved - goal.position)[:, :2].T).max()
     return bool(farthest <= max(goal.radius - margin, planned + 1e-9))
@@ -119,9 +118,13 @@ def _arrived(goal: Goal, centre: np.ndarray, contact: Contact, margin: float, bo
 
 def _free(hits: Callable[[np.ndarray, np.ndarray], np.ndarray], contact: Contact, box: np.ndarray) -> bool:
     """Whether a foot touches nothing at the corners of the box."""
-    corners = np.array([[x, y, 0.0] for x in box[:, 0] for y in box[:, 1]])
-    places = contact.pose.position + corners @ contact.pose.rotation.T
+    places = contact.pose.position + _ways(contact, box)
     return not hits(places, np.tile(contact.pose.rotation, (len(places), 1, 1))).any()
+
+
+def _ways(contact: Contact, box: np.ndarray) -> np.ndarray:
+    """(4, 3) m; the displacements in the world that the corners of the box stand for."""
+    return np.array([[x, y, 0.0] for x in box[:, 0] for y in box[:, 1]]) @ contact.pose.rotation.T
 
 
 def _inside(

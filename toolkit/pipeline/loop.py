@@ -139,11 +139,11 @@ class _Run:
         while True:
             search = self._search(palms)
             found = self._optimised(search)
-            if _least(aside) < _least(found):
+            if min(_costs(aside), default=np.inf) < min(_costs(found), default=np.inf):
                 found += aside  # what was found at a faster pace
             paces = self._paces_that_pay(found)
-            if not paces:
-                found += self._refined(found)
+            if not paces and (better := self._refined(found)):
+                found += better
                 paces = self._paces_that_pay(found)
             if paces:
                 aside, self._pace = found, self._pace + paces
@@ -241,10 +241,10 @@ class _Run:
 
         The candidate is timed anew for that. What comes of it is a further one, since a search may find nothing better.
         """
-        best = min((candidate for candidate in found if candidate.feasible), key=_rank, default=None)
-        timings = self._searches[-1].calmer
-        if best is None or not timings:
+        ranked, timings = _ranked(found), self._searches[-1].calmer
+        if not ranked or not timings:
             return 0
+        best = ranked[0]
         began, pays, plan, least = time.perf_counter(), 0, best.plan, best.cost
         self._observer.started("dynamics")
         for number, timing in enumerate(timings, 1):
@@ -254,7 +254,7 @@ class _Run:
                 pays, plan, least = number, timed, cost
         detail = f"true cost {best.cost.total:.0f}, and not clearly less at a calmer pace"
         if pays:
-            found.append(self._entered(Source.TIMED, self._as_solution(plan, least), plan, least, None))
+            found.append(self._made(Source.TIMED, plan, least))
             shift, swing = timings[pays - 1].shift, timings[pays - 1].swing
             detail = f"true cost {best.cost.total:.0f}, and {least.total:.0f} with {shift:g} s + {swing:g} s"
             detail += "; a calmer search follows"
@@ -263,8 +263,8 @@ class _Run:
 
     def _refined(self, found: list[Candidate]) -> list[Candidate]:
         """What the local search makes of the cheapest candidates."""
-        ranked = sorted((candidate for candidate in found if candidate.feasible), key=_rank)[: self._starts]
-        return [better for candidate in ranked if self._improvable(candidate) for better in self._improved(candidate)]
+        starts = _ranked(found)[: self._starts]
+        return [better for candidate in starts if self._improvable(candidate) for better in self._improved(candidate)]
 
     @property
     def _starts(self) -> int:
@@ -312,7 +312,7 @@ class _Run:
         """
         blame = self._blame
         since = len(blame.exclusions)  # what the optimiser rejected concerns only searches to come
-        ranked, failures = [candidate for candidate in found if candidate.feasible], 0
+        ranked, failures = _ranked(found), 0
         while ranked:
             candidate = min(ranked, key=_rank)
             ranked.remove(candidate)
@@ -350,8 +350,7 @@ class _Run:
         plan = self._tester.motion_of(sequence.timed(timing, index))
         if not plan.motion.feasible:
             return None
-        cost = plan_cost(plan, self._weights)
-        return self._entered(Source.TIMED, self._as_solution(plan, cost), plan, cost, None)
+        return self._made(Source.TIMED, plan, plan_cost(plan, self._weights))
 
     @property
     def _too_fast(self) -> bool:
@@ -378,11 +377,11 @@ class _Run:
         self._observer.finished("refinement", True, time.perf_counter() - began, detail)
         if not changed or not self._new(plan.sequence):
             return []
-        return [self._entered(Source.LOCAL, self._as_solution(plan, cost), plan, cost, None)]
+        return [self._made(Source.LOCAL, plan, cost)]
 
-    def _as_solution(self, plan: MotionPlan, cost: PlanCost) -> Solution:
-        """A plan that was made from what the last search found, as if that had found it."""
-        return refined_solution(plan, cost, self._searches[-1].seconds)
+    def _made(self, source: Source, plan: MotionPlan, cost: PlanCost) -> Candidate:
+        """A new candidate that was made from what the last search found, as if that had found it."""
+        return self._entered(source, refined_solution(plan, cost, self._searches[-1].seconds), plan, cost, None)
 
     def _optimise(self, sequence: ContactSequence) -> MotionPlan:
         """The motion of a variant."""
@@ -395,9 +394,14 @@ class _Run:
         return len(self._trials) < (max(1, most // 2) if candidate.uses_palms else most)
 
 
-def _least(found: list[Candidate]) -> float:
-    """The least true cost of feasible candidates."""
-    return min((candidate.cost.total for candidate in found if candidate.feasible), default=np.inf)
+def _costs(found: list[Candidate]) -> list[float]:
+    """True costs of feasible candidates."""
+    return [candidate.cost.total for candidate in found if candidate.feasible]
+
+
+def _ranked(found: list[Candidate]) -> list[Candidate]:
+    """Feasible candidates, the truly cheapest first."""
+    return sorted((candidate for candidate in found if candidate.feasible), key=_rank)
 
 
 def _rank(candidate: Candidate) -> tuple[float, int]:
@@ -407,7 +411,7 @@ def _rank(candidate: Candidate) -> tuple[float, int]:
 
 def _told(found: list[Candidate]) -> str:
     """How the optimisation of some sequences ended, in one line."""
-    feasible = [candidate.cost.total for candidate in found if candidate.feasible]
+    feasible = _costs(found)
     count = f"{len(feasible)} of {len(found)} sequence{'s' if len(found) > 1 else ''} feasible"
     if not feasible:
         assert found[0].failure is not None

@@ -56,7 +56,7 @@ class Ground:
         self._projector = self._projected(config.rest_friction)
         half = robot.half_sizes[Limb.LEFT_FOOT]
         self._footholds = Footholds(world.surfaces, half, self._projector.room - half)
-        self._feet = FootCollision.of(robot, world, self._projector.config.margin)
+        self._feet = FootCollision.of(robot, world)
         self._terrain = self._distances(self._projector)
         walls = config.palms and bool(self._projector.table.palm.any())
         self._arms = {limb: ArmMap.of(robot, limb) for limb in robot.arms if walls}

@@ -154,6 +154,7 @@ class Avoidance:
         np.maximum.at(model.body_margin, model.geom_bodyid, model.geom_margin)  # where collisions are looked for at all
         self.box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
         self.box_pairs = _box_pairs(model, self.static)
+        self.box_notice = self._notice(self.box_pairs)
         self.at_home = np.full((model.nbody, model.nbody), np.inf)
         self._place(robot.home)
         self._set_distances()
@@ -173,7 +174,8 @@ class Avoidance:
         """
         self._place(qpos)
         pairs = self._near(reaching)
-        world, arms, at_home = self._of_world(pairs), self._of_arms(pairs), self._home_distance(pairs)
+        world, arms = self._of_world(pairs.geoms), self._of_arms(pairs.geoms)
+        at_home = self._home_distance(pairs)
         safe, room = np.empty((2, len(arms)))
         for damper, mine in ((self.arms, arms), (self.others, ~arms)):
             safe[mine] = np.where(world[mine], damper.safe_world, damper.safe_self)
@@ -195,13 +197,13 @@ class Avoidance:
         kept = np.argsort(slack / np.maximum(np.linalg.norm(rate, axis=1), 1e-9), kind="stable")[:MAX_ROWS]
         return Dampers(-rate[kept], bound[kept], weight[kept])
 
-    def _of_arms(self, pairs: _Pairs) -> np.ndarray:
-        """(k,) bool; which pairs have a link of an arm."""
-        return np.any(self.arm[pairs.geoms], axis=1)
+    def _of_arms(self, geoms: np.ndarray) -> np.ndarray:
+        """(k,) bool; which pairs (k, 2) of geoms have a link of an arm."""
+        return np.any(self.arm[geoms], axis=1)
 
-    def _of_world(self, pairs: _Pairs) -> np.ndarray:
-        """(k,) bool; which pairs have a geom of the world."""
-        return np.any(self.static[pairs.geoms], axis=1)
+    def _of_world(self, geoms: np.ndarray) -> np.ndarray:
+        """(k,) bool; which pairs (k, 2) of geoms have one of the world."""
+        return np.any(self.static[geoms], axis=1)
 
     def _home_distance(self, pairs: _Pairs) -> np.ndarray:
         """(k,) m; distances of pairs' links at home, or of links from the ground below; -inf where links touch."""
@@ -246,15 +248,15 @@ class Avoidance:
 
     def _notice(self, geoms: np.ndarray) -> np.ndarray:
         """(k,) m; distances at which pairs (k, 2) of geoms are noticed."""
-        return np.where(self.arm[geoms].any(1), self.arms.notice, self.others.notice)
+        return np.where(self._of_arms(geoms), self.arms.notice, self.others.notice)
 
     def _left(self, geoms: np.ndarray, free: np.ndarray) -> np.ndarray:
         """(k,) bool; which pairs (k, 2) of geoms are of the world and a link that is free to touch it."""
-        return self.static[geoms].any(1) & free[geoms].all(1)
+        return self._of_world(geoms) & free[geoms].all(1)
 
     def _near_boxes(self, free: np.ndarray) -> _Pairs:
         """The same for pairs of boxes; MuJoCo's collision function finds those apart only if two faces are opposite."""
-        model, data, notice = self.model, self.data, self._notice(self.box_pairs)
+        model, data, notice = self.model, self.data, self.box_notice
         first, second = self.box_pairs.T
         apart = np.linalg.norm(data.geom_xpos[first] - data.geom_xpos[second], axis=1)
         near = apart < notice + model.geom_rbound[first] + model.geom_rbound[second]
@@ -270,7 +272,7 @@ class Avoidance:
     def _set_distances(self) -> None:
         """Least distances between bodies of the robot that are near each other in the posture as it is placed."""
         pairs = self._near(set())
-        pairs = pairs.of(~self._of_world(pairs))
+        pairs = pairs.of(~self._of_world(pairs.geoms))
         first, second = self.model.geom_bodyid[pairs.geoms].T
         for a, b in ((first, second), (second, first)):
             np.minimum.at(self.at_home, (a, b), pairs.distance)

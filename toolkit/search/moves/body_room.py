@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from toolkit.centroidal.problem import CentroidalProblem, ComRoom
 from toolkit.compiled import compiled
-from toolkit.contacts.projection import ProjectionConfig
 from toolkit.contacts.stance import Stance
 from toolkit.geometry.limb import FEET
 from toolkit.robot.model import RobotModel
@@ -56,7 +56,7 @@ class BodyRoom:
     """
 
     def __init__(self, robot: RobotModel, world: World):
-        self._world = world
+        self._robot, self._world = robot, world
         box = BodyBox.of(robot)
         self._walker = _Walker(
             legs_of(robot, margins(robot)),
@@ -66,7 +66,6 @@ class BodyRoom:
             float(drops(robot)[-1]),
             robot.scale.length,
         )
-        self._feet = FootCollision.of(robot, world, ProjectionConfig().scaled(robot.scale.length).margin)
         self._occupancy: Occupancy | None = None
         self._bounds = np.zeros((2, 3))  # of the occupancy
 
@@ -78,6 +77,11 @@ class BodyRoom:
         if occupancy is not None:
             _fill_sinks(occupancy, self._walker, place, yaw, sink)
         return float(sink[0])
+
+    @cached_property
+    def _feet(self) -> FootCollision | None:
+        """The collisions of the feet, made when the first landing is to move."""
+        return FootCollision.of(self._robot, self._world)
 
     def foot_hits(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
         """See `Surroundings`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from toolkit.contacts.projection import ProjectionConfig
 from toolkit.geometry.limb import FEET
 from toolkit.robot.model import RobotModel
 from toolkit.world.clearance import BoxCollider
@@ -32,9 +33,9 @@ class FootCollision:
         self._height = 0.5 * length * (_TO + _FROM)
 
     @classmethod
-    def of(cls, robot: RobotModel, world: World, margin: float) -> FootCollision | None:
-        """The collisions of a robot's feet; None for feet that are no wider than their soles with a margin in m."""
-        sole = robot.half_sizes[list(FEET)].max(0) + margin
+    def of(cls, robot: RobotModel, world: World) -> FootCollision | None:
+        """The collisions of a robot's feet; None for feet that are no wider than the room of their soles."""
+        sole = robot.half_sizes[list(FEET)].max(0) + ProjectionConfig().scaled(robot.scale.length).margin
         return cls(robot, world) if (robot.foot_outline > sole).any() else None
 
     def hits(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
