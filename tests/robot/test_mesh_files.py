@@ -79,6 +79,17 @@ def test_a_robot_whose_soles_are_collada_needs_nothing_by_hand(tmp_path: Path) -
     robot = load_robot(str(tmp_path / "biped"))
     np.testing.assert_allclose(2 * robot.limbs[Limb.LEFT_FOOT].half_size, [0.2, 0.1])
     np.testing.assert_allclose(robot.legs[Limb.LEFT_FOOT].ankle_in_sole, [-0.02, 0, 0.08], atol=1e-6)
+    assert not any("meshes" in warning for warning in robot.warnings)
+
+
+def test_soles_that_are_only_meshes_are_warned_of(tmp_path: Path) -> None:
+    (tmp_path / "sole.dae").write_text(collada(CORNERS))
+    (tmp_path / "biped.urdf").write_text(with_sole_mesh(biped_urdf(), "sole.dae"))
+    assert robots.main(["--inspect", str(tmp_path / "biped.urdf"), "--out", str(tmp_path / "biped")]) == 0
+    toml = tmp_path / "biped" / "robot.toml"
+    toml.write_text(toml.read_text().replace("pad = 0.01", ""))
+    (warning,) = (item for item in load_robot(str(tmp_path / "biped")).warnings if "meshes" in item)
+    assert "left_foot, right_foot" in warning and "`pad`" in warning
 
 
 @pytest.mark.parametrize("lies", [True, False])

@@ -24,7 +24,7 @@ from toolkit.robot.model import LimbModel, RobotModel
 from toolkit.robot.problems import Problems
 from toolkit.robot.reader import suggestion
 from toolkit.robot.rolling import sole_rolls
-from toolkit.robot.soundness import bare_trunk, check_palms, straight_legs
+from toolkit.robot.soundness import bare_trunk, check_palms, mesh_patches, straight_legs
 from toolkit.robot.source import find_model_file, read_model
 from toolkit.robot.urdf import urdf_from_model
 from toolkit.shipped import shipped
@@ -157,7 +157,12 @@ def load_robot(name: str | None, robots_dir: Path | None = None) -> RobotModel:
             legs=legs,
             arms=arms,
             fingerprint=_fingerprint(description, assembly, home),
-            warnings=(*assembly.warnings, *bare_trunk(model), *straight_legs(legs, home, model)),
+            warnings=(
+                *assembly.warnings,
+                *bare_trunk(model),
+                *mesh_patches(model, home, description.limbs),
+                *straight_legs(legs, home, model),
+            ),
         )
         check_agreement(robot)
         return robot

@@ -10,11 +10,13 @@ import numpy as np
 from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.robot.chain import arm_joints, bodies_above, joints_to
 from toolkit.robot.description import LimbDescription
+from toolkit.robot.mend import geom_spheres
 from toolkit.robot.model import LegGeometry
 from toolkit.robot.problems import Problems
 
 FAR = 0.1
 """Largest distance of a padded patch from the other shapes of its body, as a share of the CoM's height."""
+_BEARING = 0.002  # m; shapes as close to the plane of a patch bear it
 _FACING_AWAY = -0.2  # least cosine between a palm's z axis and the direction to its elbow
 _SLACK = 0.02  # least slack of a leg, as a share of its length: a step of 0.4 lengths takes as much
 
@@ -29,6 +31,40 @@ def bare_trunk(model: mujoco.MjModel) -> list[str]:
     if any(not legs.intersection(bodies_above(model, int(model.geom_bodyid[geom]))) for geom in colliding):
         return []
     return ["no shape above the knees collides; add geoms to the model, or choose shapes in [mend.collision]"]
+
+
+def mesh_patches(model: mujoco.MjModel, home: np.ndarray, limbs: Mapping[Limb, LimbDescription]) -> list[str]:
+    """A warning where meshes alone bear a patch: MuJoCo finds few of their contact points at a time, which slide.
+
+    Args:
+        model: The robot alone.
+        home: Its home posture qpos (7 + n,).
+        limbs: Its limbs.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = home
+    mujoco.mj_kinematics(model, data)
+    colliding = (model.geom_contype | model.geom_conaffinity) != 0
+    names = []
+    for limb in limbs:
+        site = model.site(limb.label).id
+        position, normal = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)[:, 2]
+        weld = model.body_weldid[model.geom_bodyid]
+        bearing = set()
+        for geom in np.flatnonzero(colliding & (weld == model.body_weldid[model.site_bodyid[site]])).tolist():
+            body = model.geom_bodyid[geom]
+            points, radius = geom_spheres(model, geom)
+            heights = (data.xpos[body] + points @ data.xmat[body].reshape(3, 3).T - position) @ normal
+            if heights.min() - radius < _BEARING:
+                bearing.add(int(model.geom_type[geom]))
+        if bearing == {int(mujoco.mjtGeom.mjGEOM_MESH)}:
+            names.append(limb.label)
+    if not names:
+        return []
+    return [
+        f"only meshes bear the patches of {', '.join(names)}, and MuJoCo finds few of their contact points at a time: "
+        "standing limbs would rock and slide; give each a `pad`"
+    ]
 
 
 def check_palms(
