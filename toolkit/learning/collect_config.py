@@ -48,8 +48,8 @@ class CollectConfig:
     networks_digest: str = ""
     paper_share: float = 0.25
     planned_share: float = 0.35
-    shift: tuple[float, float] = (0.04, 1.0)
-    swing: tuple[float, float] = (0.25, 1.0)
+    shift: tuple[float, float] = (0.04, 1.5)
+    swing: tuple[float, float] = (0.25, 1.5)
     quick_shift: tuple[float, float] = (0.04, 0.2)
     quick_swing: tuple[float, float] = (0.25, 0.5)
     choices: int = 3
