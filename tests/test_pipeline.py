@@ -49,7 +49,7 @@ class Planner:
         self.pace = calmer
         self.exclusions.append(len(exclusions))
         return SimpleNamespace(
-            solutions=self.found[palms] if not calmer or self.calm is None else self.calm,
+            solutions=self.found[palms] if len(self.calls) == 1 or self.calm is None else self.calm,
             reason="",
             warning="",
             seconds=1.0,
@@ -233,6 +233,21 @@ def test_where_a_transition_fails_it_alone_is_slowed_down_at_first(monkeypatch):
         planner.paces, planner.calm = paces, [solution("slow", FOOT)]
         run = Run(planner, {"fast at 1 in 0", "slow"}, monkeypatch, cost, failed_at=0)
         assert run.tested == tested and run.result.passed
+
+
+def test_where_a_calmer_pace_finds_nothing_the_one_before_is_searched_again(monkeypatch):
+    """What had not been tested there is, and the pace yields no more; where it found nothing either, that is all."""
+    planner = Planner([solution(name, FOOT) for name in "abcd"], [])
+    planner.paces, planner.calm = 3, []
+    cost = {"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0, "c at 1": 1.0}
+    run = Run(planner, {"d"}, monkeypatch, cost)
+    assert run.tested == ["a", "b", "c", "d"] and run.result.passed
+    assert planner.calls == [True] * 4 and planner.pace == 0
+    planner = Planner([solution(name, FOOT) for name in "abcd"], [])
+    planner.paces, planner.calm = 3, []
+    run = Run(planner, set(), monkeypatch, cost)
+    assert run.tested == ["a", "b", "c", "d"] and not run.result.passed
+    assert planner.calls == [True] * 4 and planner.pace == 0
 
 
 def test_a_pace_that_may_not_yield_is_kept(monkeypatch):

@@ -25,6 +25,7 @@ from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.plan_cost import PlanCost, plan_cost
 from toolkit.search.moves.exclusion import Blame
 from toolkit.search.result import SearchResult, Solution
+from toolkit.world.timing import Timing
 from toolkit.world.world import World
 
 _SAME = 2  # equal failures where nothing has moved yet, after which no other sequence is tried
@@ -130,6 +131,8 @@ class _Run:
         self._at_start: Counter[str] = Counter()  # reasons of failures where nothing has moved yet
         self._known: set[bytes] = set()
         self._pace = 0  # how often the pace has yielded
+        self._fruitful: int | None = None  # the pace of the last search that found something
+        self._calmest: int | None = None  # the last pace to search at, where nothing was found at a calmer one
         self._improved_at: dict[int, int] = {}  # number of exclusions when a candidate was improved last
         self._local: LocalSearch | None = None
 
@@ -152,11 +155,31 @@ class _Run:
             failed_with_palms = any(candidate.uses_palms for candidate in found)
             if passed or self._spent():
                 break
-            if not search.calmer and (not found or not (self._blame.exclusions or failed_with_palms)):
-                break
             palms = palms and (self._too_fast or not failed_with_palms)
-            self._pace += 1
+            if self._calmer:
+                self._pace += 1
+            elif not found and self._fruitful is not None and self._fruitful < self._pace:
+                self._pace = self._calmest = self._fruitful  # what failed there may not be all that there is
+                aside = self._left_over()
+            elif not found or not (self._blame.exclusions or failed_with_palms):
+                break
         return self._concluded()
+
+    def _left_over(self) -> list[Candidate]:
+        """Feasible candidates that have not been tested and have no transition that failed."""
+        tested = {trial.candidate.number for trial in self._trials}
+        return [
+            candidate
+            for candidate in self._candidates
+            if candidate.feasible
+            and candidate.number not in tested
+            and self._blame.first_in(candidate.solution.sequence) is None
+        ]
+
+    @property
+    def _calmer(self) -> tuple[Timing, ...]:
+        """The swings' longest timings at the paces to which the last search may yield."""
+        return () if self._pace == self._calmest else self._searches[-1].calmer
 
     def _spent(self) -> bool:
         """Whether nothing more may be optimised or tested, or other sequences would make no difference."""
@@ -207,6 +230,7 @@ class _Run:
         )
         self._searches.append(search)
         found = len(search.solutions)
+        self._fruitful = self._pace if found else self._fruitful
         detail = search.reason or f"{found} sequence{'s' if found > 1 else ''}"
         if exclusions:
             detail += f" without {len(exclusions)} transition{'s' if len(exclusions) > 1 else ''} that failed"
@@ -241,7 +265,7 @@ class _Run:
 
         The candidate is timed anew for that. What comes of it is a further one, since a search may find nothing better.
         """
-        ranked, timings = _ranked(found), self._searches[-1].calmer
+        ranked, timings = _ranked(found), self._calmer
         if not ranked or not timings:
             return 0
         best = ranked[0]
@@ -329,7 +353,7 @@ class _Run:
                 break  # the next search is calmer, and no transition is to blame
             self._note(candidate.solution.sequence, failure)
             failures += 1 if slowed is None else 2
-            if failures >= _FAILURES and self._searches[-1].calmer:
+            if failures >= _FAILURES and self._calmer:
                 break
         return False
 
@@ -356,7 +380,7 @@ class _Run:
     def _too_fast(self) -> bool:
         """Whether the last trial asked too much of the joints at a pace that may yield."""
         failure = self._trials[-1].failure if self._trials else None
-        return failure is not None and failure.too_fast and bool(self._searches[-1].calmer)
+        return failure is not None and failure.too_fast and bool(self._calmer)
 
     def _improved(self, candidate: Candidate) -> list[Candidate]:
         """What the local search makes of a candidate without transitions that failed; nothing where none is better."""
