@@ -79,6 +79,7 @@ class Run:
         hurrying=None,
         since=None,
         failed_at=None,
+        still=True,
         **settings,
     ):
         self.optimised, self.tested, self.improved = [], [], []
@@ -134,7 +135,7 @@ class Run:
         monkeypatch.setattr(loop, "Tester", Tester)
         monkeypatch.setattr(loop, "plan_cost", plan_cost)
         config = pipeline.PipelineConfig(**{"candidates": 6} | settings)
-        robot = SimpleNamespace(scale=USUAL)
+        robot = SimpleNamespace(scale=USUAL, stands_on_one_foot=still)
         self.result = pipeline.run(robot, None, planner, config)  # pyright: ignore[reportArgumentType]
 
 
@@ -248,6 +249,14 @@ def test_where_a_calmer_pace_finds_nothing_the_one_before_is_searched_again(monk
     run = Run(planner, set(), monkeypatch, cost)
     assert run.tested == ["a", "b", "c", "d"] and not run.result.passed
     assert planner.calls == [True] * 4 and planner.pace == 0
+
+
+def test_on_soles_that_roll_failures_ask_for_no_calmer_pace(monkeypatch):
+    planner = Planner([solution(name, FOOT) for name in "abc"], [])
+    planner.paces, planner.calm = 2, [solution("slow", FOOT)]
+    cost = {"a": 1.0, "b": 2.0, "c": 3.0, "slow": 9.0}
+    run = Run(planner, {"c"}, monkeypatch, cost, still=False)
+    assert run.tested == ["a", "b", "c"] and planner.pace == 0 and run.result.passed
 
 
 def test_a_pace_that_may_not_yield_is_kept(monkeypatch):

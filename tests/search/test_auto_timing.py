@@ -55,6 +55,8 @@ def test_judges_that_know_no_dynamics_walk_at_one_calm_pace(robot):
     world = make_world(FLOOR, goal=(1.2, 0, 0), timing=None)
     for kind in ("kinematic", "quasi-static"):
         assert make_planner(robot, world, kind).timings() == own_choice(robot.pace, 1)[:1]
+    limbs = robot.limbs | {foot: replace(robot.limbs[foot], rolls=True) for foot in FEET}
+    assert make_planner(replace(robot, limbs=limbs), world, "kinematic").timings() == own_choice(robot.pace)[:1]
 
 
 def swings(name, world):

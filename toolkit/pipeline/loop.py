@@ -332,7 +332,7 @@ class _Run:
 
         Before a candidate is tested, it is improved, and again where a transition has been blamed since. Where the pace
         may yield, one that fails is tested once more with the transition to blame at a calmer timing, and no other is
-        after one that asks too much of the joints, or after a few failures.
+        after one that asks too much of the joints, or after a few failures. On soles that roll, calmer is harder.
         """
         blame = self._blame
         since = len(blame.exclusions)  # what the optimiser rejected concerns only searches to come
@@ -353,7 +353,7 @@ class _Run:
                 break  # the next search is calmer, and no transition is to blame
             self._note(candidate.solution.sequence, failure)
             failures += 1 if slowed is None else 2
-            if failures >= _FAILURES and self._calmer:
+            if failures >= _FAILURES and self._calmer and self._robot.stands_on_one_foot:
                 break
         return False
 
@@ -366,6 +366,8 @@ class _Run:
         """A candidate with the transition to blame at the next calmer timing; None where that is not to be had."""
         index, sequence = failure.transition, candidate.plan.sequence
         if index is None or not self._searches[-1].calmer or not self._allowed(candidate):
+            return None
+        if not self._robot.stands_on_one_foot:
             return None
         swing = sequence.transitions[index].timing.swing
         timing = next((each for each in self._searches[-1].calmer if each.swing > swing), None)

@@ -295,6 +295,11 @@ class RobotModel:
                 half = np.maximum(half, np.abs(points[:, :2]).max(0))
         return half
 
+    @property
+    def stands_on_one_foot(self) -> bool:
+        """Whether either foot can bear the robot at rest; on soles that roll it balances by stepping in time alone."""
+        return not any(self.limbs[foot].rolls for foot in FEET)
+
     @cached_property
     def passing_gap(self) -> float:
         """Gap in m between the soles at which the legs pass each other (`toolkit.robot.legroom.passing_gap`)."""

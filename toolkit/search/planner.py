@@ -77,10 +77,11 @@ class ContactPlanner:
         """The timings of a transition to choose from when the pace has yielded so often.
 
         Where the ground `slides`, standing for longer does not help, so the pace never yields. Judges that know no
-        dynamics begin with the second pace. Heavy rotors make a world's own timing longer, as they do the planner's.
+        dynamics begin with the second pace, but not for soles that roll, on which a robot stands the worse the longer
+        it stands on one. Heavy rotors make a world's own timing longer, as they do the planner's.
         """
         config = self.config
-        pace = 0 if slides else calmer + config.one_timing
+        pace = 0 if slides else calmer + (config.one_timing and self.robot.stands_on_one_foot)
         own = self.world.timing and self.world.timing.times(self.robot.rotor_factor)
         timings = timings_of(config.timings, own, self.robot.pace, pace)
         return timings[:1] if config.one_timing else timings
