@@ -365,9 +365,7 @@ class _Run:
     def _slowed(self, candidate: Candidate, failure: Failure) -> Candidate | None:
         """A candidate with the transition to blame at the next calmer timing; None where that is not to be had."""
         index, sequence = failure.transition, candidate.plan.sequence
-        if index is None or not self._searches[-1].calmer or not self._allowed(candidate):
-            return None
-        if not self._robot.stands_on_one_foot:
+        if index is None or not self._robot.stands_on_one_foot or not self._allowed(candidate):
             return None
         swing = sequence.transitions[index].timing.swing
         timing = next((each for each in self._searches[-1].calmer if each.swing > swing), None)

@@ -41,22 +41,18 @@ def mesh_patches(model: mujoco.MjModel, home: np.ndarray, limbs: Mapping[Limb, L
         home: Its home posture qpos (7 + n,).
         limbs: Its limbs.
     """
-    data = mujoco.MjData(model)
-    data.qpos[:] = home
-    mujoco.mj_kinematics(model, data)
-    colliding = (model.geom_contype | model.geom_conaffinity) != 0
-    names = []
+    data, names = _posed(model, home), []
     for limb in limbs:
         site = model.site(limb.label).id
         position, normal = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)[:, 2]
-        weld = model.body_weldid[model.geom_bodyid]
         bearing = set()
-        for geom in np.flatnonzero(colliding & (weld == model.body_weldid[model.site_bodyid[site]])).tolist():
-            body = model.geom_bodyid[geom]
-            points, radius = geom_spheres(model, geom)
-            heights = (data.xpos[body] + points @ data.xmat[body].reshape(3, 3).T - position) @ normal
-            if heights.min() - radius < _BEARING:
-                bearing.add(int(model.geom_type[geom]))
+        for geom in _shapes(model, limb):
+            if model.geom_contype[geom] | model.geom_conaffinity[geom]:
+                body = model.geom_bodyid[geom]
+                points, radius = geom_spheres(model, geom)
+                heights = (data.xpos[body] + points @ data.xmat[body].reshape(3, 3).T - position) @ normal
+                if heights.min() - radius < _BEARING:
+                    bearing.add(int(model.geom_type[geom]))
         if bearing == {int(mujoco.mjtGeom.mjGEOM_MESH)}:
             names.append(limb.label)
     if not names:
@@ -71,10 +67,7 @@ def check_palms(
     model: mujoco.MjModel, home: np.ndarray, limbs: Mapping[Limb, LimbDescription], problems: Problems
 ) -> None:
     """Note palms that face their own forearm, and padded patches far from all other shapes of their body."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = home
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
+    data = _posed(model, home)
     far = FAR * float(data.subtree_com[1, 2])
     for limb, item in limbs.items():
         site = model.site(limb.label).id
@@ -98,10 +91,7 @@ def check_palms(
 
 def straight_legs(legs: Mapping[Limb, LegGeometry], home: np.ndarray, model: mujoco.MjModel) -> list[str]:
     """A warning where a leg of the home posture, qpos (7 + n,), is so straight that it cannot step far."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = home
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
+    data = _posed(model, home)
     base = data.xmat[1].reshape(3, 3)
     warnings = []
     for limb, leg in legs.items():
@@ -117,13 +107,27 @@ def straight_legs(legs: Mapping[Limb, LegGeometry], home: np.ndarray, model: muj
     return warnings
 
 
+def _posed(model: mujoco.MjModel, home: np.ndarray) -> mujoco.MjData:
+    """Places of everything and centres of mass in the home posture, qpos (7 + n,)."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = home
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return data
+
+
+def _shapes(model: mujoco.MjModel, limb: Limb) -> list[int]:
+    """Geoms that move with a limb's patch, whether they collide or not."""
+    body = model.site_bodyid[model.site(limb.label).id]
+    return np.flatnonzero(model.body_weldid[model.geom_bodyid] == model.body_weldid[body]).tolist()
+
+
 def _gap(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> float:
     """Distance in m from the middle of a patch to its body: to its shapes but the pad, or to its frame without any."""
     site, pad = model.site(limb.label).id, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, f"{limb.label}_pad")
-    position, body = data.site_xpos[site], int(model.site_bodyid[site])
-    rigid = np.flatnonzero(model.body_weldid[model.geom_bodyid] == model.body_weldid[body])
-    gaps = [float(np.linalg.norm(position - data.xpos[body]))]
-    for geom in (int(geom) for geom in rigid if geom != pad):
+    position = data.site_xpos[site]
+    gaps = [float(np.linalg.norm(position - data.xpos[model.site_bodyid[site]]))]
+    for geom in (geom for geom in _shapes(model, limb) if geom != pad):
         # Distance to the box around the shape, in the shape's own axes.
         local = data.geom_xmat[geom].reshape(3, 3).T @ (position - data.geom_xpos[geom]) - model.geom_aabb[geom, :3]
         gaps.append(float(np.linalg.norm(np.maximum(np.abs(local) - model.geom_aabb[geom, 3:], 0.0))))
