@@ -177,6 +177,20 @@ def _sleep(name, arguments):
     time.sleep(LONG)
 
 
+@pytest.mark.parametrize("command", ["validate", "plan"])
+def test_a_folder_that_is_not_fit_is_refused_before_anything_is_compiled(tmp_path, command):
+    (tmp_path / "mine.txt").write_text("kept")
+    done = subprocess.run(
+        [sys.executable, "-m", f"toolkit.{command}", "flat", "--out", str(tmp_path)],
+        env=dict(os.environ, PYTHONPATH=str(ROOT), NUMBA_CACHE_DIR=str(tmp_path / "kernels")),
+        capture_output=True,
+        text=True,
+        timeout=LONG,
+    )
+    assert done.returncode == 2 and "is not an earlier run" in done.stderr, done.stderr
+    assert "compiling" not in done.stdout + done.stderr
+
+
 def test_the_processes_share_the_work():
     assert warmup._ends([4.0, 2.0, 1.0], 2) == [5.0, 3.0, 4.0]
     one, many = [SPREAD], [SPREAD] * 1000

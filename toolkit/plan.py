@@ -56,8 +56,9 @@ def main(argv: list[str] | None = None) -> int:
         world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
         surface_seconds = time.perf_counter() - began
         robot = load_robot(args.robot, args.robots)
+        run_folder = RunFolder(args.out, world.name, robot.name)  # one that is not fit for it is noticed here
     display.warn(robot)
-    with RunFolder(args.out, world.name, robot.name) as folder:  # one that cannot be written is noticed here
+    with run_folder as folder:
         display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
         planner = make_planner(robot, world, options.planner, options.planner_config())
         config = PipelineConfig(seed=args.seed, time_limit=options.time_limit, until="dynamics")
