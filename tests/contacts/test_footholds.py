@@ -28,7 +28,7 @@ def test_soles_lie_on_the_surface_as_near_to_the_wish_as_they_can():
     wishes = np.random.default_rng(0).uniform(-1.0, 1.0, (60, 2))
     top = int(np.argmax([surface.normal[2] for surface in world.surfaces]))
     for yaw in (0.0, 0.4, 2.0):
-        found = holds.nearest(top, yaw, wishes)
+        found = holds.nearest([(top, yaw)], wishes)
         assert found.found.all()
         assert all(covered(world, found, row) for row in range(len(wishes)))
         np.testing.assert_allclose(np.arctan2(*found.rotation[:, 1::-1, 0].T), yaw, atol=1e-9)
@@ -40,10 +40,10 @@ def test_a_stone_as_large_as_a_sole_holds_it_in_its_own_direction_only():
     turn = 25.0
     world, holds = footholds(box([0, 0, -0.05], [0.112, 0.067, 0.05], [0, 0, turn]))
     top = int(np.argmax([surface.normal[2] for surface in world.surfaces]))
-    assert not holds.nearest(top, 0.0, np.zeros((1, 2))).found.any()
+    assert not holds.nearest([(top, 0.0)], np.zeros((1, 2))).found.any()
     headings = holds.headings(top, 0.0)
     assert any(abs(heading - np.radians(turn)) < 1e-6 for heading in headings)
-    found = holds.nearest(top, np.radians(turn), np.array([[0.3, 0.0]]))
+    found = holds.nearest([(top, np.radians(turn))], np.array([[0.3, 0.0]]))
     assert found.found.all() and covered(world, found, 0, 1e-4)
     np.testing.assert_allclose(found.position[0], 0.0, atol=2e-3)
     assert len(holds.samples(top, 0.1))

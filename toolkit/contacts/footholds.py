@@ -34,6 +34,8 @@ class Footholds:
 
     def __init__(self, surfaces: Sequence[Surface], half_size: np.ndarray, margin: float | np.ndarray):
         self._surfaces, self._half, self._margin = surfaces, half_size, margin
+        self._turns = np.array([surface.pose.rotation for surface in surfaces]).reshape(-1, 3, 3)
+        self._origins = np.array([surface.pose.position for surface in surfaces]).reshape(-1, 3)
         self._regions: dict[tuple[int, int], shapely.Geometry] = {}
         self._edges: dict[int, float] = {}
 
@@ -55,29 +57,34 @@ class Footholds:
         flat = np.concatenate(found) if found else np.zeros((0, 2))
         return surface.pose @ np.column_stack([flat, np.zeros(len(flat))])
 
-    def nearest(self, index: int, yaw: float, wishes: np.ndarray) -> Projected:
-        """The footholds on a surface nearest to wanted places.
+    def nearest(self, places: Sequence[tuple[int, float]], wishes: np.ndarray) -> Projected:
+        """The footholds nearest to wanted places, each on several surfaces.
 
         Args:
-            index: The surface.
-            yaw: Heading of the sole in rad.
+            places: k surfaces, each with the heading of the sole in rad.
             wishes: (n, 2) m; places in the world's XY.
 
         Returns:
-            n contacts; surface -1 where the surface has no room for the sole in this heading.
+            k n contacts, those of a surface together; surface -1 where it has no room for the sole in its heading.
         """
-        surface, found = self._surfaces[index], Projected.none(len(wishes))
-        turn, origin = surface.pose.rotation, surface.pose.position
-        axis = _sole_axis(turn[:, 2], yaw)
-        region = self._region(index, axis)
-        if region.is_empty:
+        count, found = len(wishes), Projected.none(len(places) * len(wishes))
+        axes = [_sole_axis(self._surfaces[index].normal, yaw) for index, yaw in places]
+        regions = [self._region(index, axis) for (index, _), axis in zip(places, axes, strict=True)]
+        roomy = [row for row, region in enumerate(regions) if not region.is_empty]
+        if not roomy:
             return found
-        height = plane_height(origin, turn[:, 2], *wishes.T)
-        local = (np.column_stack([wishes, height]) - origin) @ turn
-        places = _nearest(region, local[:, :2])
-        found.surface[:] = index
-        found.position[:] = origin + places @ turn[:, :2].T
-        found.rotation[:] = np.column_stack([axis, np.cross(turn[:, 2], axis), turn[:, 2]])
+        chosen = np.array([places[row][0] for row in roomy])
+        turn, origin, axis = self._turns[chosen], self._origins[chosen], np.array(axes)[roomy]
+        x, y = np.broadcast_to(wishes.T[:, None], (2, len(roomy), count))
+        height = plane_height(origin.T[:, :, None], turn[:, :, 2].T[:, :, None], x, y)
+        local = (np.stack([x, y, height], axis=-1) - origin[:, None]) @ turn
+        within = np.repeat(np.array([regions[row] for row in roomy], object), count)
+        flat = _nearest(within, local[..., :2].reshape(-1, 2)).reshape(len(roomy), count, 2)
+        rows = (np.array(roomy)[:, None] * count + np.arange(count)).ravel()
+        frame = np.stack([axis, np.cross(turn[:, :, 2], axis), turn[:, :, 2]], axis=-1)
+        found.surface[rows] = np.repeat(chosen, count)
+        found.position[rows] = (origin[:, None] + flat @ turn[:, :, :2].transpose(0, 2, 1)).reshape(-1, 3)
+        found.rotation[rows] = np.repeat(frame, count, axis=0)
         return found
 
     def _longest_edge(self, index: int) -> float:
@@ -113,8 +120,8 @@ def _sole_axis(normal: np.ndarray, yaw: float) -> np.ndarray:
     return np.array(along_plane(normal, np.cos(yaw), np.sin(yaw)))
 
 
-def _nearest(region: shapely.Geometry, points: np.ndarray) -> np.ndarray:
-    """The points (n, 2) of a region nearest to points (n, 2)."""
+def _nearest(region: shapely.Geometry | np.ndarray, points: np.ndarray) -> np.ndarray:
+    """The points (n, 2) of a region, or of n regions, nearest to points (n, 2)."""
     lines = shapely.shortest_line(shapely.points(points), region)
     return shapely.get_coordinates(shapely.get_point(lines, 1))
 

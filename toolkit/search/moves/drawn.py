@@ -66,18 +66,21 @@ class DrawnSteps:
         wishes = self._wishes * [1.0, 1.0 if limb.is_left else -1.0] @ turn.T + stand[:2]
         away = np.hypot(*(table.centre - stand)[:, :2].T) - table.radius
         near = np.flatnonzero(table.foot & (away < self._longest))
-        found, headings = [], []
-        for index in near[np.argsort(away[near], kind="stable")][:_NEAREST].tolist():
-            for heading in self._footholds.headings(index, yaw):
-                soles = self._footholds.nearest(index, heading, wishes)
-                _, first = np.unique(np.round(soles.position / self._same), axis=0, return_index=True)
-                first = np.sort(first[soles.found[first]])
-                kept = first[np.hypot(*(soles.position[first] - stand)[:, :2].T) < self._longest]
-                found.append(soles.select(kept))
-                headings.append(np.full(len(kept), heading))
-        if not found:
-            return Projected.none(0), np.zeros(0)
-        return Projected.joined(found), np.concatenate(headings)
+        nearest = near[np.argsort(away[near], kind="stable")][:_NEAREST].tolist()
+        places = [(index, heading) for index in nearest for heading in self._footholds.headings(index, yaw)]
+        soles, which = self._footholds.nearest(places, wishes), np.repeat(np.arange(len(places)), len(wishes))
+        found = np.flatnonzero(soles.found)
+        kept = found[_firsts(np.column_stack([which[found], np.round(soles.position[found] / self._same)]))]
+        kept = kept[np.hypot(*(soles.position[kept] - stand)[:, :2].T) < self._longest]
+        return soles.select(kept), np.array([heading for _, heading in places])[which[kept]]
+
+
+def _firsts(rows: np.ndarray) -> np.ndarray:
+    """Indices, ascending, of the first of all rows (n, k) that are the same."""
+    order = np.lexsort(rows.T)
+    new = np.ones(len(rows), bool)
+    new[1:] = (rows[order[1:]] != rows[order[:-1]]).any(axis=1)
+    return np.sort(order[new])
 
 
 def longest_step(robot: RobotModel) -> float:
