@@ -39,7 +39,9 @@ REORDERED = frozenset({"reassoc", "contract", "arcp", "nsz"})
 """Changes that LLVM may make to floating-point sums where a kernel allows it; nan and inf keep their meaning."""
 
 
-def compiled(function: Callable | None = None, *, kept: bool = False, reordered: bool = False) -> Any:
+def compiled(
+    function: Callable | None = None, *, kept: bool = False, reordered: bool = False, allocates: bool = False
+) -> Any:
     """Compile a function with numba when it is first called.
 
     Division by zero gives inf or nan, and the GIL is released.
@@ -48,27 +50,57 @@ def compiled(function: Callable | None = None, *, kept: bool = False, reordered:
         function: The function; None where the decorator is called with options.
         kept: Whether the compiled code is kept on disk. This is for functions that Python calls.
         reordered: Whether the compiler may reorder sums.
+        allocates: Whether the function makes arrays, returns them, or calls a function that returns them. References
+            to arrays are counted in such functions only: where a function looks things up in named tuples of arrays,
+            the counting takes most of its time.
 
     Returns:
         The dispatcher that takes the function's place, or the decorator that makes it.
     """
     if function is None:
-        return lambda function: compiled(function, kept=kept, reordered=reordered)
+        return lambda function: compiled(function, kept=kept, reordered=reordered, allocates=allocates)
     if config.DISABLE_JIT:
         return function
-    options = _COMMON | {"fastmath": set(REORDERED) if reordered else False}
+    options = _COMMON | {"fastmath": set(REORDERED) if reordered else False, "_nrt": allocates}
     if not kept:
         return _Inner(function, targetoptions=options | {"no_cpython_wrapper": True})
-    dispatcher = CPUDispatcher(function, targetoptions=options)
+    dispatcher = _Kernel(function, targetoptions=options)
     with contextlib.suppress(RuntimeError):  # numba found no folder to write to
         dispatcher._cache = _SourceCache(function)
     return dispatcher
 
 
+_OPTIONAL = ("fastmath", "_nrt")  # options that change what is compiled
 _COMMON = {"nopython": True, "boundscheck": None, "error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
 
-class _Inner(CPUDispatcher):
+class _Kernel(CPUDispatcher):
+    """A function that is handed no arrays by others, and hands out none, unless references to arrays are counted."""
+
+    def compile(self, sig: Any) -> Any:
+        entry = super().compile(sig)
+        if not self.targetoptions["_nrt"]:
+            for found in self.overloads.values():
+                returned = [found.signature.return_type, *_returned(found.type_annotation)]
+                if any(map(_holds_arrays, returned)):
+                    raise TypeError(
+                        f"{kernel_name(self)} returns an array, or calls what does: decorate it with allocates=True"
+                    )
+        return entry
+
+
+def _returned(annotation: Any) -> list[nb.Type]:
+    """What the compiled functions return that a function calls; none are known of one that comes from the disk."""
+    calls = getattr(annotation, "calltypes", {}).items()
+    kinds = getattr(annotation, "typemap", {})
+    return [
+        signature.return_type
+        for call, signature in calls
+        if getattr(call, "op", None) == "call" and isinstance(kinds.get(call.func.name), nb.Dispatcher)
+    ]
+
+
+class _Inner(_Kernel):
     """A function for compiled functions: without an entrance from Python, it compiles in four fifths of the time.
 
     Where Python calls it nevertheless, as tests do, it is compiled once more, with an entrance.
@@ -79,7 +111,12 @@ class _Inner(CPUDispatcher):
 
     @cached_property
     def _entered(self) -> Callable:
-        return CPUDispatcher(self.py_func, targetoptions=self.targetoptions | {"no_cpython_wrapper": False})
+        return _Kernel(self.py_func, targetoptions=self.targetoptions | {"no_cpython_wrapper": False})
+
+
+def _holds_arrays(item: nb.Type) -> bool:
+    """Whether a type is that of an array, or of a tuple with one."""
+    return isinstance(item, nb.Array) or (isinstance(item, nb.BaseTuple) and any(map(_holds_arrays, item.types)))
 
 
 def kept_folder() -> Path | None:
@@ -112,13 +149,14 @@ def digest(function: Callable) -> str:
     waiting: list[Any] = [function]
     while waiting:
         item = waiting.pop()
+        options = item.targetoptions if isinstance(item, Dispatcher) else {}
         item = item.py_func if isinstance(item, Dispatcher) else item
         name = f"{item.__module__}.{item.__qualname__}"
         if name in found:
             continue
         found[name] = ""  # before its callees, which may call it
         text, called = _described(item)
-        found[name] = text
+        found[name] = text + "".join(f"\n{each}" for each in _OPTIONAL if options.get(each))
         waiting += called
     return hashlib.sha256(repr(sorted(found.items())).encode()).hexdigest()
 

@@ -125,7 +125,7 @@ def _evaluated(motion: CentroidalMotion) -> tuple[Residuals, np.ndarray]:
     return evaluate(ProblemArrays.of(motion.solved), arrays)
 
 
-@compiled(kept=True)
+@compiled(kept=True, allocates=True)
 def evaluate(p, motion):
     """`Residuals` of a problem (`ProblemArrays`) and its motion (`MotionArrays`), and the costs (N,) of its steps.
 

@@ -77,7 +77,7 @@ def flat_groups(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_a
     return [group for group in groups if area[group].sum() >= least_area]
 
 
-@compiled(kept=True)
+@compiled(kept=True, allocates=True)
 def _grow(seeds, free, first, neighbours, normals, corners, cosine, distance, members, last):
     """Fill `members` with triangles, group by group, and `last` with the end of each group; return their number."""
     count, end = 0, 0

@@ -83,7 +83,7 @@ def complementarity(block):
     return total
 
 
-@compiled(reordered=True)
+@compiled(reordered=True, allocates=True)
 def add_curvature(block, hessian):
     """Add J' (z / s) J of all rows to the stages' Hessians."""
     rows, k = block.value.shape[1], block.variables.shape[1]

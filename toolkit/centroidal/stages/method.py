@@ -201,7 +201,7 @@ def residual(all_blocks, y, rest, work):
     return worst
 
 
-@compiled(kept=True, reordered=True)
+@compiled(kept=True, reordered=True, allocates=True)
 def minimise(steps, prices, squares, all_blocks, size, y, work, options):
     """Minimise from the motion y (T, m), which is overwritten but for its first state.
 

@@ -45,7 +45,7 @@ def allocate(stages: int, states: int, variables: int) -> Sweep:
     )
 
 
-@compiled(reordered=True)
+@compiled(reordered=True, allocates=True)
 def factor(size, hessian, following, sweep):
     """Factor the Hessians (T, m, m) of stages with `size` (T,) variables and dynamics (T - 1, n, m).
 
@@ -112,7 +112,7 @@ def factor(size, hessian, following, sweep):
                 out[b, a] = out[a, b]
 
 
-@compiled(reordered=True)
+@compiled(reordered=True, allocates=True)
 def solve(size, following, defect, gradient, sweep, change):
     """Newton step for gradients (T, m), which are overwritten, and defects (T - 1, n), after `factor`.
 

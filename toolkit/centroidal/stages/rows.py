@@ -86,7 +86,7 @@ def prepare_contacts(block):
                 slope[a, k] *= SHARPNESS
 
 
-@compiled(reordered=True)
+@compiled(reordered=True, allocates=True)
 def fill_contacts(block, y, floor, hessian, gradient):
     """Friction cone, patch and yaw moment (Caron et al., ICRA 2015) of contacts, and their objective.
 
@@ -228,7 +228,7 @@ def limited(values):
     )
 
 
-@compiled(reordered=True)
+@compiled(reordered=True, allocates=True)
 def fill_legs(block, y, hessian, gradient):
     """Limits of stance legs at knots.
 
@@ -303,7 +303,7 @@ def gradient_of_reach(block, i, a, row):
             row[b] = -p[10 + 4 * a + b - 7]
 
 
-@compiled(reordered=True)
+@compiled(reordered=True, allocates=True)
 def fill_distances(block, y, hessian, gradient):
     """Bounds on the distance from a hip or shoulder to a tip, some time after a knot.
 
@@ -337,7 +337,7 @@ def fill_distances(block, y, hessian, gradient):
     return 0.0
 
 
-@compiled(reordered=True)
+@compiled(reordered=True, allocates=True)
 def fill_torques(block, y):
     """Joint torques of stance legs in the middle of steps.
 
@@ -402,7 +402,7 @@ def fill_heights(block, y):
         block.value[i, 0] = STRETCH * value
 
 
-@compiled(reordered=True)
+@compiled(reordered=True, allocates=True)
 def fill_final(block, y, hessian, gradient):
     """Box of the last CoM along the axes of the last heading, and what the last state costs.
 

@@ -100,7 +100,7 @@ def terms(steps, t, before, acceleration, spin_rate, after):
     return total + weights[HEIGHT] * (after[R + 2] - steps.height[t]) ** 2
 
 
-@compiled(reordered=True)
+@compiled(reordered=True, allocates=True)
 def linearise(steps, size, y, hessian, gradient, following, defect):
     """Enter the steps into Hessians (N + 1, m, m), gradients (N + 1, m), dynamics (N, n, m) and defects (N, n).
 

@@ -53,7 +53,7 @@ def sole_levels(corner, cell, half, offsets, merge, table, result):
 
 @compiled(kept=True)
 def spread(levels, disc, merge, result):
-    """Add to a copy of the heights (nx, ny, L) of each cell those of the cells around it, the nearest first."""
+    """Add to `result`, a copy of the heights (nx, ny, L) of each cell, those of the cells around, the nearest first."""
     for a in range(levels.shape[0]):
         for b in range(levels.shape[1]):
             for k in range(len(disc)):
@@ -69,7 +69,6 @@ def spread(levels, disc, merge, result):
                         new &= not abs(result[a, b, n] - z) < merge
                     if new:
                         add_level(result[a, b], z, merge)
-    return result
 
 
 @compiled(kept=True)
@@ -96,7 +95,7 @@ def number_nodes(levels, corner, cell, occupancy, body, nodes, low):
     return count
 
 
-@compiled
+@compiled(allocates=True)
 def stack_of(reached):
     """A stack for all cells of reached (nx, ny, L) bool, with those that are on it, and their number."""
     nx, ny, depth = reached.shape
@@ -110,7 +109,7 @@ def stack_of(reached):
     return stack, count
 
 
-@compiled(kept=True)
+@compiled(kept=True, allocates=True)
 def spread_forward(levels, free, climb, reached):
     """Spread reached (nx, ny, 4) to cells from which a body gets there that always faces the way it goes, or backwards.
 

@@ -76,7 +76,7 @@ def mark_between(ground: np.ndarray, stride: float, border: np.ndarray) -> np.nd
     return between
 
 
-@compiled(kept=True)
+@compiled(kept=True, allocates=True)
 def _mark_between(ground, asked, offsets, sectors, lengths, stride, border, between):
     """Fill between (nx, ny) where it is asked for, looking at offsets (k, 2) with their sectors and lengths (k,).
 
@@ -188,7 +188,7 @@ def mark_free(levels, corner, cell, occupancy, trunk, climb, merge, free):
                     ground -= step
 
 
-@compiled(kept=True)
+@compiled(kept=True, allocates=True)
 def flood(levels, free, climb, border, reached):
     """Spread reached (nx, ny, L) over the free ground whose heights differ by `climb` or less from cell to cell.
 

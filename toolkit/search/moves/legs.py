@@ -109,7 +109,7 @@ def _heading(rotation):
     return np.arctan2(rotation[1, 0], rotation[0, 0])
 
 
-@compiled(kept=True)
+@compiled(kept=True, allocates=True)
 def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, right_rotation):
     """(n,) int; why the legs cannot take each of n stances with the first drop, 0 where they can with some drop.
 
