@@ -9,6 +9,7 @@ import sys
 import types
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from toolkit.centroidal.stages import blocks, newton, rows
@@ -128,6 +129,70 @@ def test_digest_ignores_words_and_what_is_not_reached(old, new):
 
 def test_digest_of_a_compiled_function_is_that_of_its_source():
     assert digest(compiled(made())) == digest(made())
+
+
+def test_digest_follows_what_the_compiler_may_do():
+    digests = {digest(compiled(made(), **options)) for options in ({}, {"reordered": True}, {"allocates": True})}
+    assert len(digests) == 3
+
+
+@compiled(allocates=True)
+def _counted(n):
+    return np.zeros(n)
+
+
+@compiled
+def _not_counted(values):
+    return values
+
+
+@compiled
+def _handed(n):
+    return _counted(n).sum()
+
+
+@compiled(allocates=True)
+def _freed(n):
+    return _counted(n).sum()
+
+
+@pytest.mark.parametrize(("function", "given"), [(_not_counted, np.ones(3)), (_handed, 3)])
+def test_references_to_arrays_that_change_hands_are_counted(function, given):
+    assert _freed(3) == 0.0
+    with pytest.raises(TypeError, match="allocates=True"):
+        function(given)
+
+
+PLAN = """
+import gc
+import json
+from numba.core.runtime import rtsys
+from tests.search.worlds import corridor
+from toolkit.pipeline import PipelineConfig, make_planner, run
+from toolkit.refine.local_search import RefineConfig
+from toolkit.robot.loader import load_robot
+from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.planner_config import PlannerConfig
+
+world, robot, counts = corridor(3), load_robot("humanoid30"), []
+search = PlannerConfig(search=AnaStarConfig(max_expansions=100))
+config = PipelineConfig(until="dynamics", refine=RefineConfig(optimisations=8))
+for _ in range(3):
+    assert run(robot, world, make_planner(robot, world, "kinematic", search), config).passed
+    gc.collect()
+    stats = rtsys.get_allocation_stats()
+    counts.append(stats.alloc - stats.free)
+print(json.dumps([counts, stats.alloc]))
+"""
+
+
+def test_what_kernels_allocate_is_freed():
+    environment = dict(os.environ, PYTHONPATH=str(ROOT), NUMBA_NRT_STATS="1")
+    done = subprocess.run([sys.executable, "-c", PLAN], env=environment, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    counts, allocated = json.loads(done.stdout.splitlines()[-1])
+    assert allocated > 1000
+    assert counts[0] == counts[1] == counts[2]
 
 
 @pytest.mark.parametrize("callee", [newton.factor, rows.add_squares, blocks.move])

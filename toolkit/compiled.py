@@ -66,7 +66,7 @@ def compiled(
         return _Inner(function, targetoptions=options | {"no_cpython_wrapper": True})
     dispatcher = _Kernel(function, targetoptions=options)
     with contextlib.suppress(RuntimeError):  # numba found no folder to write to
-        dispatcher._cache = _SourceCache(function)
+        dispatcher._cache = _SourceCache(dispatcher)
     return dispatcher
 
 
@@ -262,9 +262,9 @@ class _Index(IndexDataCacheFile):
 class _SourceCache(FunctionCache):
     """numba's cache of one function, whose index is dropped when the digest of the function changes."""
 
-    def __init__(self, py_func: Callable):
-        super().__init__(py_func)
-        self._digested = False
+    def __init__(self, function: Callable):
+        super().__init__(function.py_func if isinstance(function, Dispatcher) else function)
+        self._function, self._digested = function, False
 
     def holds(self, sig, codegen) -> bool:
         """Whether the disk holds the code for a signature."""
@@ -296,7 +296,7 @@ class _SourceCache(FunctionCache):
         """Stamp the index with the digest instead of the file's time; late, since callees may be defined late."""
         if not self._digested:
             self._digested = True
-            stamp = digest(self._py_func)
+            stamp = digest(self._function)
             self._cache_file = _Index(self._cache_path, self._impl.filename_base, stamp)
 
 
