@@ -14,7 +14,7 @@ def _doubled(values: np.ndarray) -> np.ndarray:
 
 def test_a_package_and_a_home_that_cannot_be_written(monkeypatch):
     monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
-    np.testing.assert_array_equal(compiled(_doubled, kept=True)(np.ones(2)), [2.0, 2.0])
+    np.testing.assert_array_equal(compiled(_doubled, kept=True, allocates=True)(np.ones(2)), [2.0, 2.0])
 
 
 def test_a_disk_that_is_full(monkeypatch):
@@ -23,7 +23,7 @@ def test_a_disk_that_is_full(monkeypatch):
 
     monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
     monkeypatch.setattr(caching.IndexDataCacheFile, "load", lambda *args: None)
-    np.testing.assert_array_equal(compiled(_doubled, kept=True)(np.ones(2)), [2.0, 2.0])
+    np.testing.assert_array_equal(compiled(_doubled, kept=True, allocates=True)(np.ones(2)), [2.0, 2.0])
 
 
 def test_an_index_that_names_a_type_which_is_no_longer_there(monkeypatch):
@@ -31,4 +31,4 @@ def test_an_index_that_names_a_type_which_is_no_longer_there(monkeypatch):
         raise AttributeError("Can't get attribute 'Gone'")
 
     monkeypatch.setattr(caching.IndexDataCacheFile, "_load_index", lost)
-    np.testing.assert_array_equal(compiled(_doubled, kept=True)(np.ones(2)), [2.0, 2.0])
+    np.testing.assert_array_equal(compiled(_doubled, kept=True, allocates=True)(np.ones(2)), [2.0, 2.0])
