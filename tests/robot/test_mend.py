@@ -195,3 +195,15 @@ def test_a_download_that_fails_is_one_line(tmp_path: Path, monkeypatch: pytest.M
     with pytest.raises(PackageError, match="far_description cannot be fetched: no route to host at all$"):
         load_robot(str(write_robot(tmp_path / "biped", toml=toml)))
     monkeypatch.delitem(sys.modules, "robot_descriptions", raising=False)
+
+
+def test_a_site_with_the_name_of_its_body(tmp_path: Path) -> None:
+    site = '<body name="left_knee_link"'
+    model = biped_mjcf()
+    assert site in model
+    at = model.index(">", model.index(site)) + 1
+    model = model[:at] + '<site name="left_knee_link"/><site/>' + model[at:]
+    robot = load_robot(str(write_robot(tmp_path / "biped", model)))
+    assert {robot.mujoco_model.site(i).name for i in range(robot.mujoco_model.nsite)} == {
+        limb.label for limb in robot.limbs
+    }

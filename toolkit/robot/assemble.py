@@ -88,6 +88,9 @@ def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
     motors = set_motors(description, source, bare, problems)
     bodies = {limb: _add_site(item, spec, bare, problems) for limb, item in description.limbs.items()}
     problems.check()
+    for site in list(spec.sites):  # the others may have a body's name, and placo has one list of both
+        if site.name not in {limb.label for limb in bodies}:
+            spec.delete(site)
     model = _compiled(source, spec)
     mjcf, assets = spec.to_xml(), dict(spec.assets)
     home = _home(description, model, keyframe, problems)
