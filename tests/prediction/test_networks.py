@@ -9,6 +9,7 @@ from tests.prediction.networks import write_random_networks
 from tests.prediction.test_features import random_case
 from toolkit.contacts.category import Category
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
+from toolkit.prediction.features import TIMING_AND_FRICTION
 from toolkit.prediction.network import load_network, network_path
 from toolkit.prediction.networks import NetworkEvaluator
 from toolkit.world.timing import Timing
@@ -27,18 +28,37 @@ class Seven(TransitionEvaluator):
 @pytest.fixture
 def networks(tmp_path):
     write_random_networks(tmp_path / "networks", "abc")
-    return {CATEGORY: load_network(network_path(tmp_path / "networks", CATEGORY), CATEGORY, "abc")}
+    network = load_network(network_path(tmp_path / "networks", CATEGORY), CATEGORY, "abc")
+    network.lower[TIMING_AND_FRICTION] = 0.2
+    return {CATEGORY: network}
 
 
 def test_what_was_not_trained_goes_to_the_stand_in_and_is_counted(networks):
     stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(0))
-    known, strange = (replace(transition, timing=Timing(0.5, swing)) for swing in (0.5, 3.0))  # trained: up to 1 s
+    known, strange = (replace(transition, timing=Timing(0.5, swing)) for swing in (0.5, 1e-3))
     judge = NetworkEvaluator(networks, Seven())
     batch = judge.evaluate(stance, com, velocity, [known, strange, strange])
     assert batch.untrained == 2 and batch.feasible[1:].all()
     np.testing.assert_array_equal(batch.objective[1:], 7.0)
     assert judge.evaluate(stance, com, velocity, [known]).untrained == 0
     assert NetworkEvaluator(networks).evaluate(stance, com, velocity, [strange]).untrained == 1  # judged all the same
+
+
+def test_more_time_and_friction_than_trained_are_judged_as_the_most_of_the_training(networks):
+    stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(0))
+    shift, swing, friction = networks[CATEGORY].upper[TIMING_AND_FRICTION].tolist()
+    contact = transition.contact
+
+    def case(factor):
+        feet = tuple(replace(item, friction=factor * friction) for item in stance.contacts)
+        new = replace(transition, timing=Timing(factor * shift, factor * swing))
+        new = replace(new, contact=replace(contact, friction=factor * friction))
+        return NetworkEvaluator(networks, Seven()).evaluate(replace(stance, contacts=feet), com, velocity, [new])
+
+    most, more = case(1.0), case(3.0)
+    assert most.untrained == more.untrained == 0
+    for field in ("feasible", "objective", "com", "com_velocity"):
+        np.testing.assert_array_equal(getattr(most, field), getattr(more, field))
 
 
 def test_a_judge_says_of_itself_what_a_search_has_to_know(networks):

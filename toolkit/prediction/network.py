@@ -105,7 +105,7 @@ class TransitionNetwork:
         category: Category of the transitions that they judge.
         classifier: Features -> (n, 1) log-odds of being feasible (a softmax over two classes is their logistic).
         regressor: Features -> (n, 7), see `outcome`.
-        lower, upper: (d,) range of the training features; timing and friction outside it are extrapolation.
+        lower, upper: (d,) range of the training features.
         metadata: The file's notes on its training.
     """
 
@@ -117,16 +117,23 @@ class TransitionNetwork:
     metadata: dict[str, str]
 
     @cached_property
-    def _trained(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest timing and friction of the training, with 1 % to spare."""
+    def _least(self) -> np.ndarray:
+        """Least timing and friction (3,) of the training, with 1 % of the ranges to spare."""
         lower, upper = self.lower[TIMING_AND_FRICTION], self.upper[TIMING_AND_FRICTION]
-        slack = 0.01 * (upper - lower) + 1e-6
-        return lower - slack, upper + slack
+        return lower - 0.01 * (upper - lower) - 1e-6
 
     def knows(self, features: np.ndarray) -> np.ndarray:
-        """(n,) bool: whether the timing and friction of features (n, d) lie within the training range."""
-        values, (least, most) = features[:, TIMING_AND_FRICTION], self._trained
-        return np.all((values >= least) & (values <= most), axis=1)
+        """(n,) bool: whether the timing and friction of features (n, d) are at least the least of the training."""
+        return np.all(features[:, TIMING_AND_FRICTION] >= self._least, axis=1)
+
+    def within(self, features: np.ndarray) -> np.ndarray:
+        """Features (n, d) with timing and friction of at most the greatest of the training.
+
+        Longer times and more friction hardly make a transition harder, so that a judgement there holds beyond.
+        """
+        within = features.copy()
+        within[:, TIMING_AND_FRICTION] = np.minimum(features[:, TIMING_AND_FRICTION], self.upper[TIMING_AND_FRICTION])
+        return within
 
     def feasible(self, features: np.ndarray) -> np.ndarray:
         """(n,) bool; whether transitions with features (n, d) are feasible."""

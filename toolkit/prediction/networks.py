@@ -55,11 +55,13 @@ def digest(folder: Path) -> str:
 
 @dataclass(frozen=True)
 class NetworkEvaluator(TransitionEvaluator):
-    """Judges by networks; hands transitions that lie outside the trained timings and frictions to another judge.
+    """Judges by networks; hands transitions with less time or friction than in the training to another judge.
+
+    Those with more are judged as with the most of the training.
 
     Attributes:
         networks: Networks by category.
-        stand_in: Judges what the networks have not been trained for; None: the networks judge this as well.
+        stand_in: Judges what is quicker or more slippery than the training; None: the networks judge this as well.
         sliding: See `TransitionEvaluator`.
     """
 
@@ -102,6 +104,7 @@ class NetworkEvaluator(TransitionEvaluator):
                     rows, features = rows[inside], features[inside]
                     if not len(rows):
                         continue
+            features = network.within(features)
             accepted = network.feasible(features)
             feasible[rows] = accepted
             if accepted.any():

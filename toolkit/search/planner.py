@@ -41,7 +41,7 @@ from toolkit.world.world import World
 
 _STRIKES = 2  # failures of the whole sequence in like transitions after which the search avoids them
 _UNTRAINED = (
-    "timing or friction outside what the networks were trained for; the optimiser judged there instead, which is slower"
+    "times or friction below what the networks were trained for; the optimiser judged there instead, which is slower"
 )
 
 
