@@ -7,8 +7,8 @@ import pytest
 from toolkit.geometry.pose import Pose, rotation_exponential
 from toolkit.wholebody import plan as wholebody
 from toolkit.wholebody.avoidance import BODY, CLOSE
-from toolkit.wholebody.ik import momentum_at
-from toolkit.wholebody.lean import AROUND, WORTH, lean_ahead
+from toolkit.wholebody.ik import WholeBodyIK, momentum_at
+from toolkit.wholebody.lean import AROUND, WORTH, Lean, lean_ahead
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import LEVEL, Manner, solve_ik, whole_body
 from toolkit.world.scene import compose_scene
@@ -95,3 +95,16 @@ def test_trunk_and_arms_turn_against_the_swinging_leg_where_that_is_wanted(robot
             spin.append(data.subtree_angmom[1, 2] - momentum_at(flat_walk.motion, time)[2])
         errors.append(np.linalg.norm(spin))
     assert errors[1] < 0.7 * errors[0]
+
+
+def test_the_base_turns_to_a_lean_without_rocking(robot, flat_walk, paths):
+    tick, wanted = 0.01, 0.1
+    ik = WholeBodyIK(robot, tick)
+    ik.start(robot.home, paths, flat_walk.motion)
+    ik.lean = Lean(np.array([0.0, 1.0]), np.tile([0.0, wanted, 0.0], (2, 1)))
+    pitch = []
+    for _ in range(200):
+        rotation = Pose.from_quaternion(np.zeros(3), ik.advance(0.0, paths, flat_walk.motion)[3:7]).rotation
+        pitch.append(np.arcsin(-rotation[2, 0]))
+    assert max(pitch) < 1.2 * wanted
+    np.testing.assert_allclose(pitch[100:], wanted, atol=0.02 * wanted)

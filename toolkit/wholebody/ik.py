@@ -159,7 +159,7 @@ class WholeBodyIK:
         Raises:
             PlanningError: The quadratic program has no solution.
         """
-        angles = self.joints
+        angles, upright = self.joints, np.array(self.base.R_world_frame)
         self._set_targets(time, paths, motion)
         self._set_ranges(angles, [arm for arm in self.arm_joints if paths.authority(arm, time) == 0.0])
         step = self._ease * (self._posture(time, angles, paths, motion) - angles)
@@ -169,8 +169,9 @@ class WholeBodyIK:
             for name in names:
                 task.set_joint(name, targets[name])
         before = self.order.qpos_from_q(self.wrapper.state.q)
-        turned = self.wrapper.get_T_world_frame(self.robot.base)[:3, :3] @ rotation_exponential(self.drift[3:6])
-        self.steady.R_world_frame = turned
+        wanted = rotation_vector(upright.T @ self.base.R_world_frame)
+        turn = wanted + weights.KEPT_TURN * (self.drift[3:6] - wanted)
+        self.steady.R_world_frame = self.wrapper.get_T_world_frame(self.robot.base)[:3, :3] @ rotation_exponential(turn)
         self._set_dampers(before, angles, time, paths)
         self._solve(time)
         self._spare_motors(time, before, motion)

@@ -5,6 +5,8 @@ Weights per squared m go with the inverse square of the lengths, times with the 
 
 from __future__ import annotations
 
+import math
+
 # Weights of tasks per squared m or rad, from the strongest.
 FOOT_POSITION, FOOT_ORIENTATION = 1e6, 1e5  # of a foot in contact
 COM = 1e5
@@ -13,7 +15,11 @@ PALM_POSITION, PALM_NORMAL, PALM_TWIST = 1e5, 1e4, 0.1  # a palm may turn about 
 AIR_POSITION, AIR_ORIENTATION = 1e4, 30.0
 EFFORT = 1e5  # per squared rad by which a joint's displacement asks its motor for more than its share
 BASE = 10.0
-STEADY = 1e3  # of the base from where the last tick's turn, made again, would take it
+STEADY = 1e3  # of the base from where the last tick's turn would take it
+# Share of the last tick's turn, less the wanted one, that the next begins with. The base is an oscillator with a
+# frequency of sqrt(BASE / STEADY) per tick: with all of it the pelvis rocks under the trunk, with this share it is
+# critically damped.
+KEPT_TURN = 1.0 - 2.0 * math.sqrt(BASE / STEADY)
 # Per squared rad of a tick's deviation from the planned angular momentum, divided by mass times squared CoM height.
 # A larger weight makes trunk and arms swing wide.
 ANGULAR_MOMENTUM = 5e3
