@@ -47,12 +47,11 @@ def test_what_was_not_trained_goes_to_the_stand_in_and_is_counted(networks):
 def test_more_time_and_friction_than_trained_are_judged_as_the_most_of_the_training(networks):
     stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(0))
     shift, swing, friction = networks[CATEGORY].upper[TIMING_AND_FRICTION].tolist()
-    contact = transition.contact
 
     def case(factor):
         feet = tuple(replace(item, friction=factor * friction) for item in stance.contacts)
-        new = replace(transition, timing=Timing(factor * shift, factor * swing))
-        new = replace(new, contact=replace(contact, friction=factor * friction))
+        contact = replace(transition.contact, friction=factor * friction)
+        new = replace(transition, timing=Timing(factor * shift, factor * swing), contact=contact)
         return NetworkEvaluator(networks, Seven()).evaluate(replace(stance, contacts=feet), com, velocity, [new])
 
     most, more = case(1.0), case(3.0)

@@ -85,12 +85,11 @@ def assemble(description: RobotDescription, source: ModelSource) -> Assembly:
     _check_names(source, problems)
     problems.check()
     bare = _compiled(source, skeleton(spec))
+    for site in list(spec.sites):  # one may have a body's name, and placo has one list of both; `bare` keeps them
+        spec.delete(site)
     motors = set_motors(description, source, bare, problems)
     bodies = {limb: _add_site(item, spec, bare, problems) for limb, item in description.limbs.items()}
     problems.check()
-    for site in list(spec.sites):  # the others may have a body's name, and placo has one list of both
-        if site.name not in {limb.label for limb in bodies}:
-            spec.delete(site)
     model = _compiled(source, spec)
     mjcf, assets = spec.to_xml(), dict(spec.assets)
     home = _home(description, model, keyframe, problems)
@@ -258,8 +257,6 @@ def _add_site(item: LimbDescription, spec: mujoco.MjSpec, bare: mujoco.MjModel, 
             problems.add(f"[limbs.{label}] body '{item.body}' does not exist; {suggestion(body, bodies)}")
             return ""
         pose = item.pose
-    if label in sites:
-        spec.delete(spec.site(label))
     spec.body(body).add_site(
         name=label, pos=pose.position, quat=pose.quaternion_wxyz, size=[0.008] * 3, group=4, rgba=[0.9, 0.2, 0.2, 1.0]
     )
