@@ -1,4 +1,5 @@
 import mujoco
+import numpy as np
 import pytest
 
 from toolkit.execution.contact_meter import ContactMeter
@@ -33,3 +34,19 @@ def test_a_patch_that_should_be_free_touches_unplanned(landed):
     assert meter.unplanned and meter.unplanned_time == pytest.approx(data.time)
     assert all("floor" in world for _, world in meter.unplanned_names)
     assert meter.normal_force[Limb.LEFT_FOOT] > 0.0
+
+
+def test_the_wrench_is_that_of_all_contacts(landed):
+    meter, data = landed
+    meter.read(data)
+    scene, wrench, force = meter._index.scene, np.zeros((2, 6)), np.zeros(6)
+    for number in range(data.ncon):
+        contact = data.contact[number]
+        limb = meter._index.patch_limb[contact.geom].max()
+        mujoco.mj_contactForce(scene, data, number, force)
+        sign = 1.0 if meter._index.robot_geom[contact.geom[1]] else -1.0
+        linear, angular = sign * force.reshape(2, 3) @ contact.frame.reshape(3, 3)
+        lever = contact.pos - data.site_xpos[meter._index.sites[limb]]
+        wrench[limb] += np.hstack([linear, angular + np.cross(lever, linear)])
+    assert np.count_nonzero(wrench) == wrench.size
+    np.testing.assert_allclose(meter.wrench[list(FEET)], wrench, atol=1e-9)

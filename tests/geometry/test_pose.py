@@ -30,6 +30,12 @@ def test_quaternion_and_rotation_agree(quaternion):
     np.testing.assert_allclose(rotation_from_quaternion(back), rotation, rtol=0, atol=1e-8)
 
 
+def test_quaternions_of_many_rotations_are_those_of_each():
+    rotations = rotation_from_quaternion(np.random.default_rng(0).normal(size=(3, 4, 4)))
+    each = [[quaternion_from_rotation(rotation) for rotation in row] for row in rotations]
+    np.testing.assert_array_equal(quaternion_from_rotation(rotations), each)
+
+
 def test_poses_compose_and_invert():
     rng = np.random.default_rng(1)
     a, b = (Pose(rotation_from_quaternion(rng.normal(size=4)), rng.normal(size=3)) for _ in range(2))

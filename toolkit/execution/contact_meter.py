@@ -29,7 +29,6 @@ class ContactMeter:
         self.unplanned_time: float | None = None
         self.trunk_touched = ""
         self.friction_mismatches = 0
-        self._force = np.zeros(6)
 
     def read(self, data: mujoco.MjData) -> None:
         """Read the contacts of the physics step just made."""
@@ -51,25 +50,30 @@ class ContactMeter:
         wrong = contact.friction[touching, 0] != scene.geom_friction[world_geom, 0]
         self.friction_mismatches += int(np.count_nonzero(wrong))
         limbs = index.patch_limb[robot_geom]
-        position, frame = contact.pos[touching], contact.frame[touching].reshape(-1, 3, 3)
-        for k, number in enumerate(touching):
-            limb = limbs[k]
-            if limb < 0 or not self.expected[limb]:
-                self._note(int(robot_geom[k]), int(world_geom[k]), data.time)
-            if limb < 0:
-                continue
-            mujoco.mj_contactForce(scene, data, int(number), self._force)
-            # The force acts on the second geom, in rows of the contact's frame (normal first).
-            sign = 1.0 if second[k] else -1.0
-            force, moment = sign * (self._force[:3] @ frame[k]), sign * (self._force[3:] @ frame[k])
-            lever = position[k] - data.site_xpos[index.sites[limb]]
-            self.wrench[limb, :3] += force
-            self.wrench[limb, 3:] += moment
-            self.wrench[limb, 3] += lever[1] * force[2] - lever[2] * force[1]
-            self.wrench[limb, 4] += lever[2] * force[0] - lever[0] * force[2]
-            self.wrench[limb, 5] += lever[0] * force[1] - lever[1] * force[0]
+        for k in np.flatnonzero((limbs < 0) | ~self.expected[limbs]).tolist():
+            self._note(int(robot_geom[k]), int(world_geom[k]), data.time)
+        of_patch = limbs >= 0
+        touching, limbs, second = touching[of_patch], limbs[of_patch], second[of_patch]
+        # The force acts on the second geom, in rows of the contact's frame (normal first).
+        local = np.where(second, 1.0, -1.0)[:, None, None] * self._local_forces(data, touching)
+        frame = contact.frame[touching].reshape(-1, 3, 3)
+        force, moment = np.swapaxes(local @ frame, 0, 1)
+        centres = np.zeros((4, 3))
+        centres[list(index.sites)] = data.site_xpos[list(index.sites.values())]
+        lever = contact.pos[touching] - centres[limbs]
+        np.add.at(self.wrench, limbs, np.hstack([force, moment + np.cross(lever, force)]))
         for limb, site in index.sites.items():
             self.normal_force[limb] = self.wrench[limb, :3] @ data.site_xmat[site, 2::3]
+
+    @staticmethod
+    def _local_forces(data: mujoco.MjData, contacts: np.ndarray) -> np.ndarray:
+        """Forces and moments (n, 2, 3) in N and N m of some contacts, in their frames; the cone is elliptic."""
+        columns = np.arange(6)
+        exerted = columns < data.contact.dim[contacts][:, None]
+        rows = data.contact.efc_address[contacts][:, None] + columns
+        force = np.zeros(exerted.shape)
+        force[exerted] = data.efc_force[rows[exerted]]
+        return force.reshape(-1, 2, 3)
 
     def _note(self, robot_geom: int, world_geom: int, time: float) -> None:
         """Keep an unplanned contact."""

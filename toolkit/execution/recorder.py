@@ -112,5 +112,5 @@ class Recorder:
         pose = np.full((self.count, 4, 7), np.nan)
         for limb in self.index.sites:
             pose[:, limb, :3] = self.limb_position[: self.count, limb]
-            pose[:, limb, 3:] = [quaternion_from_rotation(each) for each in self.limb_rotation[: self.count, limb]]
+            pose[:, limb, 3:] = quaternion_from_rotation(self.limb_rotation[: self.count, limb])
         return pose

@@ -23,21 +23,18 @@ def rotation_from_quaternion(quaternion_wxyz: np.ndarray) -> np.ndarray:
 
 
 def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternion (4,), scalar first and not negative, of one rotation matrix (3, 3)."""
+    """Unit quaternions (..., 4), scalar first and not negative, of rotation matrices (..., 3, 3)."""
     r = np.asarray(rotation, float)
     # Bar-Itzhack: the dominant eigenvector of a symmetric 4 x 4 matrix; accurate near every singular case.
-    k = np.array(
-        [
-            [r[0, 0] - r[1, 1] - r[2, 2], 0, 0, 0],
-            [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], 0, 0],
-            [r[2, 0] + r[0, 2], r[2, 1] + r[1, 2], r[2, 2] - r[0, 0] - r[1, 1], 0],
-            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], r[0, 0] + r[1, 1] + r[2, 2]],
-        ]
-    )
+    k = np.zeros((*r.shape[:-2], 4, 4))
+    x, y, z = np.moveaxis(np.diagonal(r, axis1=-2, axis2=-1), -1, 0)
+    k[..., 0, 0], k[..., 1, 1], k[..., 2, 2], k[..., 3, 3] = x - y - z, y - x - z, z - x - y, x + y + z
+    for i, j, axis in ((0, 1, 2), (2, 0, 1), (1, 2, 0)):
+        k[..., max(i, j), min(i, j)] = r[..., j, i] + r[..., i, j]
+        k[..., 3, axis] = r[..., j, i] - r[..., i, j]
     _, vectors = np.linalg.eigh(k)  # reads the lower triangle
-    x, y, z, w = vectors[:, -1]
-    q = np.array([w, x, y, z])
-    return -q if w < 0 else q
+    q = np.roll(vectors[..., -1], 1, axis=-1)
+    return np.where(q[..., :1] < 0.0, -q, q)
 
 
 def rotation_about_z(angle: np.ndarray | float) -> np.ndarray:
