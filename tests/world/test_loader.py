@@ -100,9 +100,15 @@ CASES = {
         r"no site 'goal'; add <site name=\"goal\" type=\"cylinder\"",
     ),
     "goal_not_a_cylinder": (mjcf_of(FLOOR).replace('"cylinder"', '"sphere"'), "'goal' is not a cylinder; write it as"),
-    "start_in_the_air": (mjcf_of(FLOOR, start="0 0 0.5"), r"'start' is in the air: .* \(0, 0, 0.5\); move it"),
-    "start_under_the_ground": (mjcf_of(FLOOR, start="0 0 -0.5"), "'start' is in the air"),
-    "start_beside_the_ground": (mjcf_of('<geom type="box" size="1 1 1" pos="3 0 -1"/>'), "'start' is in the air"),
+    "start_in_the_air": (
+        mjcf_of(FLOOR, start="0 0 0.5"),
+        r"'start' at \(0, 0, 0.5\) is in the air: .* z = 0 m; move it",
+    ),
+    "start_under_the_ground": (mjcf_of(FLOOR, start="0 0 -0.5"), "'start' at .* is under the ground: .* z = 0 m"),
+    "start_beside_the_ground": (
+        mjcf_of('<geom type="box" size="1 1 1" pos="3 0 -1"/>'),
+        "'start' at .* is beside the ground",
+    ),
     "start_tilted": (mjcf_of(FLOOR, start='0 0 0" euler="90 0 0'), "'start' is tilted; turn it about z only"),
     "no_geom": (mjcf_of(), "no usable surface for feet; add a static colliding geom"),
     "only_a_wall": (mjcf_of('<geom type="plane" size="0 0 1" euler="90 0 0"/>'), "no usable surface for feet"),
@@ -121,7 +127,7 @@ CASES = {
     ),
     "palms_alone": (
         mjcf_of(FLOOR + WALL + LEFT_PALM.format("0 0.6 1"), start="0 0 1"),
-        "'start' is in the air: .*; a robot that starts with its palms in contact needs ground for both feet too",
+        "'start' at .* is .*; a robot that starts with its palms in contact needs ground for both feet too",
     ),
     "palms_and_no_ground": (
         mjcf_of(WALL.replace("1 0.1 1", "1 0.01 1") + LEFT_PALM.format("0 0.6 1")),

@@ -171,14 +171,13 @@ def _check_ground(path: Path, start: Pose, surfaces: tuple[Surface, ...], palms:
     angles = np.arange(8) * np.pi / 4
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
     spots = start.position[:2] + np.concatenate([[[0.0, 0.0]], _AROUND_START / 2 * ring, _AROUND_START * ring])
-    z = start.position[2]
-    for surface in surfaces:
-        if surface.serves_foot:
-            height = surface.height(spots)
-            if ((height <= z + _ABOVE_START) & (height >= z - _BELOW_START)).any():
-                return
-    raise WorldError(
-        f"{path}: site 'start' is in the air: no surface for feet within {_BELOW_START:g} m below "
-        f"({start.position[0]:.3g}, {start.position[1]:.3g}, {z:.3g}); move it onto the ground"
-        f"{_also_feet(palms)}"
-    )
+    x, y, z = start.position
+    rises = np.concatenate([surface.height(spots) - z for surface in surfaces if surface.serves_foot] or [[np.nan]])
+    if ((rises <= _ABOVE_START) & (rises >= -_BELOW_START)).any():
+        return
+    name, remedy = f"{path}: site 'start' at ({x:.3g}, {y:.3g}, {z:.3g})", f"move it onto the ground{_also_feet(palms)}"
+    if np.isnan(rises).all():
+        raise WorldError(f"{name} is beside the ground: no surface for feet under it or above it; {remedy}")
+    rise = rises[np.nanargmin(np.abs(rises))]
+    where = "under the ground" if rise > 0.0 else "in the air"
+    raise WorldError(f"{name} is {where}: the nearest surface for feet is at z = {z + rise:.3g} m; {remedy}")
