@@ -1,5 +1,6 @@
 """A statically balanced walk on any terrain, made by hand: the whole-body stage needs no optimiser to be tested."""
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -150,3 +151,13 @@ def palm_walk(robot) -> MotionPlan:
     ]
     geom = f'<geom name="wall" type="box" size="2 0.05 0.9" pos="0 {wall[1] + 0.05} 0.9" friction="0.8"/>'
     return planned_walk(robot, world_of(geom), moves)
+
+
+@pytest.fixture
+def hand(robot):
+    if Limb.LEFT_PALM not in robot.limbs:
+        pytest.skip("a robot without palms")
+    data = mujoco.MjData(robot.mujoco_model)
+    data.qpos[:] = robot.home
+    mujoco.mj_forward(robot.mujoco_model, data)
+    return data.site(robot.limbs[Limb.LEFT_PALM].site).xpos.copy()

@@ -17,16 +17,6 @@ from toolkit.world.scene import compose_scene
 TICK = 0.01  # s
 
 
-@pytest.fixture
-def hand(robot):
-    if Limb.LEFT_PALM not in robot.limbs:
-        pytest.skip("a robot without palms")
-    data = mujoco.MjData(robot.mujoco_model)
-    data.qpos[:] = robot.home
-    mujoco.mj_forward(robot.mujoco_model, data)
-    return data.site(robot.limbs[Limb.LEFT_PALM].site).xpos.copy()
-
-
 def side_wall(y):
     return world_of(f'<geom name="wall" type="box" size="3 0.05 1.5" pos="0 {y + 0.05} 1.5"/>')
 

@@ -132,6 +132,10 @@ class Dampers(NamedTuple):
     bound: np.ndarray
     weight: np.ndarray
 
+    def joined(self, others: Dampers) -> Dampers:
+        """These and others."""
+        return Dampers(*(np.concatenate(each) for each in zip(self, others, strict=True)))
+
 
 class Avoidance:
     """Distances between the links, and to the world, in the composed scene, tick after tick."""

@@ -19,6 +19,7 @@ from toolkit.geometry.pose import Pose, mean_pose, rotation_exponential, rotatio
 from toolkit.robot.model import RobotModel
 from toolkit.robot.placo import pinocchio_map, placo_wrapper
 from toolkit.wholebody import ik_config as weights
+from toolkit.wholebody.arms_ahead import ArmsAhead
 from toolkit.wholebody.avoidance import Avoidance
 from toolkit.wholebody.effort import Effort
 from toolkit.wholebody.lean import Lean
@@ -39,13 +40,15 @@ class WholeBodyIK:
         avoidance: Avoidance | None = None,
         lean: Lean | None = None,
         turning: float = 1.0,
+        ahead: ArmsAhead | None = None,
     ):
         """Set up the tasks for a tick in s.
 
-        `avoidance` keeps all links clear, `lean` turns the base, and `turning` is a factor on the weight of the planned
-        angular momentum about the vertical.
+        `avoidance` keeps all links clear, `lean` turns the base, `turning` is a factor on the weight of the planned
+        angular momentum about the vertical, and `ahead` lets arms give way early.
         """
         self.robot, self.tick, self.avoidance, self.lean, self.turning = robot, tick, avoidance, lean, turning
+        self.ahead = ahead
         self.pace, self.per_area = robot.scale.time * robot.rotor_factor, 1.0 / robot.scale.length**2
         self.wrapper = placo_wrapper(robot)
         self.order = pinocchio_map(robot, self.wrapper.model)
@@ -258,6 +261,8 @@ class WholeBodyIK:
         reaching = {palm for palm in self.palms if paths.authority(palm, time) > 0.0}
         standing = next((foot for foot in FEET if paths.segment(foot, time).path is None), None)
         found = self.avoidance.dampers(qpos, self.drift, self.tick, reaching, standing)
+        if self.ahead is not None:
+            found = found.joined(self.ahead.dampers(time, angles, self.tick, reaching))
         if len(found.bound):
             matrix, share = np.zeros((len(found.bound), len(qpos))), np.sqrt(found.weight)
             matrix[:, self.order.q_index] = share[:, None] * found.matrix

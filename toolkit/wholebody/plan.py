@@ -17,6 +17,7 @@ from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
 from toolkit.mjcf import warnings_refused
 from toolkit.robot.model import RobotModel
+from toolkit.wholebody.arms_ahead import ArmsAhead
 from toolkit.wholebody.avoidance import BODY, CLOSE, FAR, Avoidance, Damper
 from toolkit.wholebody.check import CheckReport, check
 from toolkit.wholebody.ik import WholeBodyIK, first_guess
@@ -98,17 +99,19 @@ def solve_ik(
     scene: mujoco.MjModel | None = None,
     lean: Lean | None = None,
     manner: Manner = Manner(),
+    ahead: ArmsAhead | None = None,
 ) -> np.ndarray:
     """(T, 7 + n) qpos on a uniform time grid (T,) in s; all links keep clear in `scene` unless it is None.
 
-    The base is upright with the heading of the feet where nothing is in the way, or as `lean` wants it.
+    The base is upright with the heading of the feet where nothing is in the way, or as `lean` wants it. With `ahead`
+    arms give way early.
 
     Raises:
         PlanningError: A quadratic program has no solution.
     """
     tick = float(times[1] - times[0]) / SUBSTEPS
     avoidance = None if scene is None else Avoidance(robot, scene, manner.links)
-    solver = WholeBodyIK(robot, tick, avoidance, lean, manner.turning)
+    solver = WholeBodyIK(robot, tick, avoidance, lean, manner.turning, ahead)
     qpos = np.empty((len(times), len(robot.home)))
     qpos[0] = solver.start(first_guess(robot, paths, motion), paths, motion)
     for index in range(1, len(times)):
@@ -169,19 +172,22 @@ def _checked(
 ) -> tuple[np.ndarray, CheckReport]:
     """The postures (T, 7 + n) with their checks: of the first pass that holds, or else of the first one.
 
-    Each pass leans ahead of what the base did in the one before, unless links are kept apart in another way.
+    Each pass leans ahead of what the base did in the one before, unless links are kept apart in another way. Where arms
+    touched the world in the first one, they give way early in the others.
     """
     robot, motion = plan.robot, plan.motion
     found: list[tuple[np.ndarray, CheckReport]] = []
-    lean, before = None, None
+    lean, before, ahead = None, None, None
     for manner in passes:
-        if manner is before and lean is None:
+        if manner is before and lean is None and (ahead is None or len(found) > 1):
             continue
-        qpos = solve_ik(robot, paths, motion, times, scene, lean if manner is before else None, manner)
+        qpos = solve_ik(robot, paths, motion, times, scene, lean if manner is before else None, manner, ahead)
         found.append((qpos, check(robot, scene, paths, motion, times, qpos)))
         if not found[-1][1].findings:
             return found[-1]
         lean, before = lean_ahead(paths, times, qpos, robot.scale.time), manner
+        if len(found) == 1 and (arms := ArmsAhead(robot, scene, times, qpos)).touch:
+            ahead = arms
     return found[0]
 
 
