@@ -1,5 +1,7 @@
 """Leaning ahead: the base turns early and smoothly to where it had to turn in a hurry."""
 
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
@@ -63,10 +65,12 @@ def test_passes_end_with_the_first_that_holds(robot, flat_walk, monkeypatch):
     """A failing check is answered by passes with a lean, and by one that keeps less distance; a passing one is not."""
     scene, passes = compose_scene(robot, flat_walk.world), []
 
-    def solved(robot, paths, motion, times, scene=None, lean=None, manner=USUAL):
+    def solved(robot, paths, motion, times, scene=None, lean=None, manner=USUAL, ahead=None):
         passes.append((lean is not None, manner.links))
+        early.append(ahead is not None)
         return solve_ik(robot, paths, motion, times, scene, lean, manner)
 
+    early = []
     monkeypatch.setattr(wholebody, "solve_ik", solved)
     assert whole_body(flat_walk, scene).trajectory.feasible and passes == [(False, BODY)]
     passes.clear()
@@ -77,7 +81,12 @@ def test_passes_end_with_the_first_that_holds(robot, flat_walk, monkeypatch):
     passes.clear()
     monkeypatch.setattr("toolkit.wholebody.lean.WORTH", np.inf)  # no lean is worth it
     whole_body(flat_walk, scene)
-    assert passes == [(False, BODY), (False, CLOSE)]
+    assert passes == [(False, BODY), (False, CLOSE)] and not any(early)
+    passes.clear()
+    early.clear()
+    monkeypatch.setattr(wholebody, "ArmsAhead", lambda *_: SimpleNamespace(touch=True))
+    whole_body(flat_walk, scene)
+    assert passes == [(False, BODY), (False, BODY), (False, CLOSE)] and early == [False, True, True]
 
 
 def test_trunk_and_arms_turn_against_the_swinging_leg_where_that_is_wanted(robot, flat_walk, paths):

@@ -29,6 +29,7 @@ class ContactMeter:
         self.unplanned_time: float | None = None
         self.trunk_touched = ""
         self.friction_mismatches = 0
+        self._limbs, self._sites = (np.array(each, int) for each in zip(*index.sites.items(), strict=True))
 
     def read(self, data: mujoco.MjData) -> None:
         """Read the contacts of the physics step just made."""
@@ -59,11 +60,12 @@ class ContactMeter:
         frame = contact.frame[touching].reshape(-1, 3, 3)
         force, moment = np.swapaxes(local @ frame, 0, 1)
         centres = np.zeros((4, 3))
-        centres[list(index.sites)] = data.site_xpos[list(index.sites.values())]
+        centres[self._limbs] = data.site_xpos[self._sites]
         lever = contact.pos[touching] - centres[limbs]
-        np.add.at(self.wrench, limbs, np.hstack([force, moment + np.cross(lever, force)]))
-        for limb, site in index.sites.items():
-            self.normal_force[limb] = self.wrench[limb, :3] @ data.site_xmat[site, 2::3]
+        moment += lever[:, [1, 2, 0]] * force[:, [2, 0, 1]] - lever[:, [2, 0, 1]] * force[:, [1, 2, 0]]
+        np.add.at(self.wrench, limbs, np.hstack([force, moment]))
+        normals = data.site_xmat[self._sites, 2::3]
+        self.normal_force[self._limbs] = (self.wrench[self._limbs, :3] * normals).sum(1)
 
     @staticmethod
     def _local_forces(data: mujoco.MjData, contacts: np.ndarray) -> np.ndarray:
