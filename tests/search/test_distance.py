@@ -1,3 +1,6 @@
+import copy
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
@@ -5,6 +8,7 @@ import pytest
 from tests.search.worlds import FLOOR, box, make_world
 from toolkit.contacts.footholds import Footholds
 from toolkit.contacts.projection import Projector
+from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 from toolkit.search.costs.heuristic import EuclideanDistance
 from toolkit.search.costs.terrain_distance import TerrainDistance
@@ -29,6 +33,25 @@ def test_body_box_holds_the_body_but_not_the_arms(robot):
     assert 0.8 * robot.com_height < shape.top < 2.5 * robot.com_height
     assert 0.3 * robot.com_height < shape.bottom < 0.7 * robot.com_height
     assert 0.08 < shape.half_depth < 0.4 and 0.15 < shape.half_width < 0.5
+
+
+def test_body_box_is_as_wide_as_the_shoulders_but_not_as_the_hands(robot):
+    """A shape that the second joint of an arm carries makes the body wider, and one of a wrist does not."""
+
+    def half_width(joint, radius):
+        model = copy.copy(robot.mujoco_model)
+        body = model.jnt_bodyid[robot.arm_sides[Limb.LEFT_PALM][joint] + 1]
+        geom = model.body_geomadr[body]
+        model.geom_type[geom], model.geom_size[geom] = mujoco.mjtGeom.mjGEOM_SPHERE, radius
+        data = mujoco.MjData(model)
+        data.qpos[:] = robot.home
+        mujoco.mj_kinematics(model, data)
+        return BodyBox.of(dataclasses.replace(robot, mujoco_model=model)).half_width, data.geom_xpos[geom, 1] + radius
+
+    wide, side = half_width(1, 0.2)
+    np.testing.assert_allclose(wide, side, atol=1e-9)
+    assert wide > BodyBox.of(robot).half_width
+    assert half_width(-1, 0.2)[0] == BodyBox.of(robot).half_width
 
 
 def test_flat_ground_is_the_straight_line(robot):

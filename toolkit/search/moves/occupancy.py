@@ -10,6 +10,7 @@ import numpy as np
 from toolkit.compiled import compiled
 from toolkit.errors import RobotError
 from toolkit.geometry.limb import Limb
+from toolkit.robot.mend import geom_spheres
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.obstacles import world_triangles
 
@@ -35,6 +36,8 @@ class BodyBox(NamedTuple):
     @classmethod
     def of(cls, robot: RobotModel) -> BodyBox:
         """The box around torso, head, thighs and shoulders in the home posture; arms with palms may fold in.
+
+        What the first two joints of an arm carry does not; it may be as near to walls as an arm.
 
         Raises:
             RobotError: there is no shape to put a box around.
@@ -64,7 +67,21 @@ class BodyBox(NamedTuple):
         width = max(-low[1], high[1])
         for limb, arm in robot.arms.items():
             width = max(width, abs(arm.shoulder_in_com[1]) + 1.5 * float(robot.half_sizes[limb].min()))
-        return cls(max(-low[0], high[0]) + margin, width + margin, bottom, float(high[2]) + margin)
+        width = max(width + margin, _shoulders(robot, data))
+        return cls(max(-low[0], high[0]) + margin, width, bottom, float(high[2]) + margin)
+
+
+def _shoulders(robot: RobotModel, data: mujoco.MjData) -> float:
+    """How far in m what the first two joints of the arms with palms carry reaches to the side, in a posture as set."""
+    model, width = robot.mujoco_model, 0.0
+    carried = [int(model.jnt_bodyid[joint + 1]) for limb in robot.arms for joint in robot.arm_sides[limb][:2]]
+    collides = (model.geom_contype | model.geom_conaffinity) != 0
+    for geom in np.flatnonzero(collides & np.isin(model.geom_bodyid, carried)).tolist():
+        body = int(model.geom_bodyid[geom])
+        points, radius = geom_spheres(model, geom)
+        sideways = points @ data.xmat[body].reshape(3, 3)[1] + data.xpos[body, 1]
+        width = max(width, float(np.abs(sideways).max()) + radius)
+    return width
 
 
 class Occupancy(NamedTuple):
