@@ -10,6 +10,7 @@ from toolkit import pipeline
 from toolkit.errors import PlanningError
 from validation.jobs import Record
 from validation.map_families import Cell
+from validation.map_scale import world_of
 from validation.options import TrialSettings
 from validation.run_trial import StageLog, make_planner, robot_of
 
@@ -25,8 +26,9 @@ _STOPPED = {"every stance": "all stances seen", "time limit": "time", "expansion
 
 
 def map_trial(settings: TrialSettings, cell: Cell) -> Record:
-    """The record of a cell."""
-    world = cell.world()
+    """The record of a cell, whose world is to the scale of the robot's legs."""
+    robot = robot_of(settings.robot, settings.robots)
+    world = world_of(cell, robot.scale.length)
     log = StageLog()
     config = pipeline.PipelineConfig(
         seed=cell.seed,
@@ -35,7 +37,6 @@ def map_trial(settings: TrialSettings, cell: Cell) -> Record:
         execution=settings.execution,
     )
     try:
-        robot = robot_of(settings.robot, settings.robots)
         result = pipeline.run(robot, world, make_planner(settings, world), config, log)
     except PlanningError as error:
         reason = " ".join(str(error).split()).removeprefix(f"{world.path}: ")

@@ -3,6 +3,7 @@
 import io
 import json
 
+import mujoco
 import numpy as np
 import pytest
 from rich.console import Console
@@ -16,6 +17,7 @@ from validation.growing import state_of
 from validation.jobs import Job, PoolOptions, run_jobs
 from validation.map_families import FAMILIES, QUICK, SEEDS, Cell, cells_of
 from validation.map_picture import draw_map
+from validation.map_scale import scaled, world_of
 from validation.map_table import hole_table, holes_of, summarise, table, wilson
 from validation.map_trial import ERROR, FAILURES, IMPOSSIBLE, NO_SEQUENCE, PASS, completed, in_short, map_trial
 from validation.trial_file import TrialFolder
@@ -104,6 +106,27 @@ def test_a_world_is_moved_as_a_whole():
     ]:
         np.testing.assert_allclose(turn @ one + [x, y, 0.0], other, atol=1e-5)
     assert after.start.yaw == pytest.approx(before.start.yaw + yaw)
+
+
+@pytest.mark.parametrize("name", ["slope_down", "mesh_ground", "field_ground", "rubble_corridor"])
+def test_worlds_to_scale_are_similar(name):
+    """All lengths shrink alike, of boxes, meshes and height fields: points, areas; angles and friction stay."""
+    cell, factor = Cell(name, FAMILIES[name].values()[0], 2), 0.7
+    one, other = cell.world(), world_of(cell, factor)
+    np.testing.assert_allclose(factor * one.goal.position, other.goal.position, atol=1e-6)
+    assert other.goal.radius == pytest.approx(factor * one.goal.radius)
+    x, y = factor * np.random.default_rng(0).uniform(-0.5, 0.5, (2, 300))
+    points = other.goal.position[:2] + np.column_stack([x, y])
+    np.testing.assert_allclose(ground(other, points), factor * ground(one, points / factor), atol=1e-4)
+    assert np.linalg.norm(other.mujoco_model.geom_friction - one.mujoco_model.geom_friction) == 0.0
+    assert world_of(cell, 1.0).mujoco_model.geom_pos.tolist() == one.mujoco_model.geom_pos.tolist()
+
+
+def test_light_and_pictures_are_scaled_with_the_world():
+    light = '<light pos="2 2 2" dir="0 0 -1"/>'
+    text = f'<mujoco><statistic center="1 2 3" extent="4"/><worldbody>{light}</worldbody></mujoco>'
+    model = mujoco.MjModel.from_xml_string(scaled(text, 0.5))
+    assert (model.stat.extent, model.light_pos.tolist(), model.light_dir.tolist()) == (2.0, [[1, 1, 1]], [[0, 0, -1]])
 
 
 @pytest.mark.parametrize(("name", "angle"), [("slope_down", 12.0), ("slope_up", 20.0), ("slope_across", 15.0)])
