@@ -10,6 +10,7 @@ from toolkit import cli
 from toolkit.errors import PlanningError
 from toolkit.pipeline.candidate import refined_solution
 from toolkit.refine import RefineConfig
+from toolkit.refine.local_search import arrives
 from toolkit.refine.variants import left_out
 from toolkit.report.console import make_console
 from toolkit.report.plan_file import write_plan
@@ -38,8 +39,8 @@ from validation.truth import Outcome, Truth
 DESCRIPTION = """\
 Compare the plan of a run (one search, choice by the true cost, local search) with the best plan known: that of several
 planners and many seeds, followed by a long local search from the best of them. Also leave one or two contacts out of
-the plan of the run, in every way that the screens allow, and see whether it gets cheaper. The best plans are kept as
-files.
+the plan of the run, in every way that the screens allow and that still arrives, and see whether it gets cheaper. The
+best plans are kept as files.
 """
 KINDS = ("rubble_field", "rubble_corridor")
 PLANNERS = ("learned", "kinematic", "quasi-static")
@@ -86,8 +87,8 @@ def regret_trial(settings: TrialSettings, case: Case, effort: Effort) -> Record:
         outcome = _improved(truth, tested, effort.motions)
         if outcome.cost.total < best.cost.total:
             best, finder = outcome, planner
-    sequence = returned.plan.sequence
-    fewer = [truth(variant).cost.total for variant in left_out(sequence, chosen.screen)]
+    shorter = left_out(returned.plan.sequence, chosen.screen)
+    fewer = [truth(variant).cost.total for variant in shorter if arrives(variant, returned.plan)]
     place = settings.out / "known"
     place.mkdir(parents=True, exist_ok=True)
     write_plan(place / f"{case.name}.json", best.plan, refined_solution(best.plan, best.cost, 0.0))

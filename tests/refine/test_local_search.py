@@ -9,7 +9,7 @@ from toolkit.centroidal.plan import keeps_margins, plan_motion, slid
 from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.sequence import SequenceConfig
 from toolkit.refine.foresight import Foresight, travel
-from toolkit.refine.local_search import LocalSearch, RefineConfig
+from toolkit.refine.local_search import LocalSearch, RefineConfig, arrives
 from toolkit.refine.variants import left_out
 from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.plan_cost import plan_cost
@@ -78,6 +78,12 @@ def test_no_one_and_no_two_contacts_can_be_left_out_for_less(walk, better):
         other = workshop.optimise(variant)
         arrives = np.hypot(*(variant.stances[-1].mean_feet.position - walk.world.goal.position)[:2]) <= 0.14
         assert not arrives or total(other) > 0.98 * total(found)
+
+
+def test_a_walk_that_ends_early_does_not_arrive(walk, plan):
+    half = replace(walk.sequence, transitions=walk.sequence.transitions[: len(walk.sequence.transitions) // 2])
+    assert arrives(walk.sequence, plan)
+    assert not arrives(half, plan)
 
 
 def test_the_same_plan_gives_the_same_improvement(walk, plan, better):

@@ -134,7 +134,7 @@ class LocalSearch:
         best: tuple[MotionPlan, PlanCost] | None = None
         least, tried = cost.total * (1.0 - self._config.gain), 0
         for variant in self._variants(sequence, plan, cost, screen, all_kinds=all_kinds):
-            if not allowed(variant) or not _arrives(variant, plan):
+            if not allowed(variant) or not arrives(variant, plan):
                 continue
             if best is not None and tried >= self._config.batch:
                 break
@@ -228,7 +228,7 @@ def _contacts_of(sequence: ContactSequence, index: int) -> list[int]:
     return [*last.values(), index]
 
 
-def _arrives(sequence: ContactSequence, base: MotionPlan) -> bool:
+def arrives(sequence: ContactSequence, base: MotionPlan) -> bool:
     """Whether a sequence ends where plans may end, or no farther from the goal than a given plan."""
     goal = base.world.goal
 
