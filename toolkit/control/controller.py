@@ -11,6 +11,7 @@ from toolkit.control.corrector import PENDULUM_RATE, Cones, Corrector, MotionTar
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.joint_box import JointBox
 from toolkit.control.limb_target import LimbTargets, rotation_sine
+from toolkit.control.link_clearance import MAX_PAIRS, LinkClearance
 from toolkit.control.qp import FORCE_UNIT, ContactQP
 from toolkit.control.sampled_plan import Reference
 from toolkit.control.touchdown import ContactTracker, LimbState
@@ -138,7 +139,7 @@ class Controller:
         self._moment_weight = MOMENT * FORCE_UNIT**2 / scale.length**2
         self.tracker = ContactTracker(reference, self.limbs, weight, limit, scale)
         self.targets = LimbTargets(reference, self.tracker)
-        self._box = JointBox(robot)
+        self._box, self._clearance = JointBox(robot), LinkClearance(robot, self.dynamics)
         self._torque_limit = TORQUE_FRACTION * robot.torque_limit
         self._limits = {
             urgent: Cones(
@@ -162,7 +163,7 @@ class Controller:
         self._diagonal[nv:] = self._force_weight
         self._target = np.zeros(nv + 18)
         self._tasks, self._wanted = np.zeros((6 + 24, nv)), np.zeros(6 + 24)
-        self._qps: dict[tuple[Limb, ...], ContactQP] = {}
+        self._qps: dict[tuple[tuple[Limb, ...], int], ContactQP] = {}
         self.failures = 0
 
     def tick(self, index: int, qpos: np.ndarray, qvel: np.ndarray, normal_force: np.ndarray) -> np.ndarray:
@@ -181,9 +182,11 @@ class Controller:
             self._com += self._corrector.com_shift
         self.targets.update(index, self.dynamics)
         limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
-        qp = self._qps.get(limbs)
+        self._clearance.update(qvel)
+        pairs = MAX_PAIRS if self._clearance.count else 0  # all others are spared these rows
+        qp = self._qps.get((limbs, pairs))
         if qp is None:
-            qp = self._qps[limbs] = ContactQP(limbs, self.dynamics.nv, self._force_unit)
+            qp = self._qps[limbs, pairs] = ContactQP(limbs, self.dynamics.nv, self._force_unit, pairs)
         self._sense_urgency()
         self._constrain(qp, index, qpos, qvel)
         self._pursue(qp, index, qpos, qvel)
@@ -207,6 +210,9 @@ class Controller:
             qp.set_normal_force(limb, tracker.min_force[limb], tracker.max_force[limb])
         self._box.update(qpos[7:], qvel[6:])
         qp.set_acceleration(self._box.lower, self._box.upper)
+        if self._clearance.count:
+            count = self._clearance.count
+            qp.set_clearance(self._clearance.rows[:count], self._clearance.lower[:count])
 
     def _pursue(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in the objective."""

@@ -23,6 +23,7 @@ class RobotDynamics:
     where gravity cancels in the second, so that no separate Jacobian of CoM or momentum is needed.
 
     Attributes:
+        model, data: The robot alone, and its state.
         nv: Number of degrees of freedom, 6 + n.
         mass: Mass in kg.
         limbs: The limbs that the robot has.
@@ -38,8 +39,8 @@ class RobotDynamics:
     """
 
     def __init__(self, robot: RobotModel):
-        self._model, self._data = robot.mujoco_model, mujoco.MjData(robot.mujoco_model)
-        model, data = self._model, self._data
+        self.model, self.data = robot.mujoco_model, mujoco.MjData(robot.mujoco_model)
+        model, data = self.model, self.data
         self.nv = model.nv
         self._base = model.body(robot.base).id
         self.mass = float(model.body_subtreemass[self._base])
@@ -68,7 +69,7 @@ class RobotDynamics:
 
     def update(self, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Evaluate everything at a state (7 + n,), (6 + n,) in MuJoCo's order."""
-        model, data = self._model, self._data
+        model, data = self.model, self.data
         data.qpos[:] = qpos
         data.qvel[:] = qvel
         mujoco.mj_kinematics(model, data)

@@ -21,6 +21,7 @@ class ContactQP:
         s.t. floating base:  M_b qdd - J_b.T w = -bias_b
              torque limits:  -tau_max <= M_j qdd - J_j.T w + bias_j <= tau_max
              wrench cones:   rows @ w <= 0, in the contact frames
+             clearance:      rows @ qdd >= b, where there are any
              boxes:          joint accelerations, normal forces.
 
     Wrenches stand in the contact frames, so that cone rows are constant. The Hessian is that of the stacked, weighted
@@ -32,8 +33,11 @@ class ContactQP:
         slots: By limb, the slice of x with its wrench in the force unit.
     """
 
-    def __init__(self, limbs: tuple[Limb, ...], nv: int, force_unit: float = FORCE_UNIT):
-        """Prepare the arrays; the force unit in N or N m keeps the Hessian's entries alike."""
+    def __init__(self, limbs: tuple[Limb, ...], nv: int, force_unit: float = FORCE_UNIT, pairs: int = 0):
+        """Prepare the arrays; the force unit in N or N m keeps the Hessian's entries alike.
+
+        There are rows for the clearance of so many pairs of links.
+        """
         self.limbs, self.nv, self._unit = limbs, nv, force_unit
         self.slots: dict[Limb, slice] = {}
         start = nv
@@ -43,7 +47,7 @@ class ContactQP:
         self.size = start
         foot, palm = len(foot_rows(1.0, np.ones(2))), len(friction_rows(1.0))
         cones = {limb: foot if limb.is_foot else palm for limb in limbs}
-        rows = nv + sum(cones.values())
+        rows = nv + sum(cones.values()) + pairs
         self._cone_rows: dict[Limb, slice] = {}
         start = nv
         for limb in limbs:
@@ -54,7 +58,9 @@ class ContactQP:
         self.rows = np.zeros((rows, self.size))
         self.upper = np.full(self.size + rows, UNBOUNDED)
         self.lower = np.full(self.size + rows, -UNBOUNDED)
-        self.upper[self.size + nv :] = 0.0
+        self.upper[self.size + nv : len(self.upper) - pairs] = 0.0
+        self._clearance = slice(rows - pairs, rows)
+        self.rows[self._clearance, 0] = 1.0
         self._sense = np.zeros(self.size + rows, np.int32)
         self._sense[self.size : self.size + 6] = 5
         self._cones: dict[Limb, tuple[float, ...]] = {}
@@ -102,6 +108,13 @@ class ContactQP:
         self.lower[6 : self.nv] = low
         self.upper[6 : self.nv] = high
 
+    def set_clearance(self, rows: np.ndarray, low: np.ndarray) -> None:
+        """Bound `rows @ qdd` from below, with rows (k, nv) and bounds (k,) for at most as many pairs as there are."""
+        first, count = self._clearance.start, len(rows)
+        self.rows[first : first + count, : self.nv] = rows
+        bound = self.lower[self.size + first :]
+        bound[:count], bound[count:] = low, -UNBOUNDED
+
     def set_objective(self, tasks: np.ndarray, wanted: np.ndarray, diagonal: np.ndarray, target: np.ndarray) -> None:
         """Set the objective.
 
@@ -135,12 +148,13 @@ class ContactQP:
         return None
 
     def solve_relaxed(self) -> np.ndarray | None:
-        """The same from scratch, without the boxes on joint accelerations and without least normal forces.
+        """The same from scratch, without bounds on joint accelerations and clearance and without least normal forces.
 
         The robot in free fall with zero torque satisfies what remains, up to passive joint forces.
         """
         upper, lower = self.upper.copy(), self.lower.copy()
         upper[: self.nv], lower[: self.nv] = UNBOUNDED, -UNBOUNDED
+        lower[self.size + self._clearance.start :] = -UNBOUNDED
         for slot in self.slots.values():
             lower[slot.start + 2] = 0.0
         x, _, flag, _ = daqp.solve(
