@@ -50,3 +50,31 @@ def test_the_wrench_is_that_of_all_contacts(landed):
         wrench[limb] += np.hstack([linear, angular + np.cross(lever, linear)])
     assert np.count_nonzero(wrench) == wrench.size
     np.testing.assert_allclose(meter.wrench[list(FEET)], wrench, atol=1e-9)
+
+
+def test_links_that_press_on_each_other_are_named(standing):
+    """The legs are crossed; what touches from the start does not count."""
+    robot = standing.robot
+    scene = compose_scene(robot, standing.world)
+    data, index = mujoco.MjData(scene), SceneIndex(scene, robot)
+    data.qpos[:] = robot.home
+    data.qpos[2] += 0.5
+    hip = 7 + robot.joints_to(Limb.LEFT_FOOT)[:3]
+    free = ContactMeter(index)
+    mujoco.mj_step(scene, data)
+    free.read(data)
+    assert free.press is None
+    for joint in hip:
+        for angle in (-0.4, 0.4):
+            data.qpos[:] = robot.home
+            data.qpos[2] += 0.5
+            data.qpos[joint] += angle
+            data.qvel[:] = 0.0
+            mujoco.mj_step(scene, data)
+            free.read(data)
+    assert free.press is not None and free.press.force > 0.05 * 9.81 * robot.mass
+    assert all(scene.body(name).rootid[0] == scene.body_rootid[index.base] for name in free.press[:2])
+    from_the_start = ContactMeter(index)
+    for _ in range(2):
+        from_the_start.read(data)
+    assert from_the_start.press is None

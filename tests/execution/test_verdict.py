@@ -4,6 +4,7 @@ import pytest
 
 from toolkit.execution.check import Result
 from toolkit.execution.config import ExecutionConfig
+from toolkit.execution.contact_meter import Press
 from toolkit.execution.verdict import execution_checks, failure_reason, is_too_fast
 
 GOOD = {
@@ -49,6 +50,14 @@ def results(values):
 def test_a_good_execution_passes_every_check():
     assert set(results(GOOD).values()) == {Result.PASS}
     assert failure_reason(checked(GOOD), "") == ""
+
+
+def test_links_that_pressed_are_named_where_a_run_fails():
+    press = Press("left_thigh", "right_thigh", 3.254, 91.3)
+    words = "; left_thigh and right_thigh pressed on each other with 91 N at 3.25 s"
+    assert failure_reason(checked(GOOD), "", press) == ""
+    assert failure_reason(checked(GOOD), "it sank", press) == "the robot fell: it sank" + words
+    assert failure_reason(checked(GOOD | {"slip": BROKEN["slip"]}), "", press).endswith("the limit is 0.02" + words)
 
 
 def test_every_check_has_a_broken_input():

@@ -1,11 +1,30 @@
-"""ContactMeter: the contact forces between a robot and the world, and its unplanned contacts."""
+"""ContactMeter: the contact forces between a robot and the world, its unplanned contacts, and links that press."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from toolkit.execution.scene_index import SceneIndex
+
+_PRESSING = 0.05  # of the robot's weight; links that touch each other with more push it off its plan
+
+
+class Press(NamedTuple):
+    """Two links of a robot that press on each other.
+
+    Attributes:
+        first, second: Names of their bodies.
+        time: When they were seen to, s.
+        force: Normal force between them then, N.
+    """
+
+    first: str
+    second: str
+    time: float
+    force: float
 
 
 class ContactMeter:
@@ -19,6 +38,8 @@ class ContactMeter:
         unplanned_time: Time of the first of them in s; None before.
         trunk_touched: Name of a trunk geom that touched the world; "" if none did.
         friction_mismatches: Number of contacts so far whose friction was not the world geom's.
+        press: The first links of the robot that pressed on each other, by more than a part of its weight. None: none
+            did, but for those that touch from the start.
     """
 
     def __init__(self, index: SceneIndex):
@@ -29,6 +50,11 @@ class ContactMeter:
         self.unplanned_time: float | None = None
         self.trunk_touched = ""
         self.friction_mismatches = 0
+        self.press: Press | None = None
+        self._resting: set[tuple[int, int]] | None = None
+        scene = index.scene
+        weight = scene.body_subtreemass[index.base] * float(np.linalg.norm(scene.opt.gravity))
+        self._pressing = _PRESSING * float(weight)
         self._limbs, self._sites = (np.array(each, int) for each in zip(*index.sites.items(), strict=True))
 
     def read(self, data: mujoco.MjData) -> None:
@@ -38,11 +64,15 @@ class ContactMeter:
         self.normal_force[:] = 0.0
         count = data.ncon
         if not count:
+            self._resting = self._resting or set()
             return
         contact = data.contact
         geoms = contact.geom[:count]
         of_robot = index.robot_geom[geoms]
-        touching = np.flatnonzero((of_robot[:, 0] != of_robot[:, 1]) & (contact.efc_address[:count] >= 0))
+        pressed = contact.efc_address[:count] >= 0
+        if self.press is None:
+            self._note_press(data, geoms, of_robot.all(1) & pressed)
+        touching = np.flatnonzero((of_robot[:, 0] != of_robot[:, 1]) & pressed)
         if not len(touching):
             return
         second = of_robot[touching, 1]
@@ -76,6 +106,21 @@ class ContactMeter:
         force = np.zeros(exerted.shape)
         force[exerted] = data.efc_force[rows[exerted]]
         return force.reshape(-1, 2, 3)
+
+    def _note_press(self, data: mujoco.MjData, geoms: np.ndarray, own: np.ndarray) -> None:
+        """Keep two links that press on each other, given all pairs of geoms (n, 2) and which of them (n,) are links."""
+        rows = np.flatnonzero(own)
+        if not len(rows) and self._resting is not None:
+            return
+        bodies = np.sort(self._index.scene.geom_bodyid[geoms[rows]], axis=1)
+        if self._resting is None:
+            self._resting = set(map(tuple, bodies.tolist()))
+        force = data.efc_force[data.contact.efc_address[rows]]
+        for pair in set(map(tuple, bodies.tolist())) - self._resting:
+            total = float(force[(bodies == pair).all(1)].sum())
+            if total > self._pressing:
+                first, second = (self._index.scene.body(body).name for body in pair)
+                self.press = Press(first, second, float(data.time), total)
 
     def _note(self, robot_geom: int, world_geom: int, time: float) -> None:
         """Keep an unplanned contact."""

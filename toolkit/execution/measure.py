@@ -85,7 +85,7 @@ def measure(
     }
     checks = execution_checks(values, goal.radius, standard)
     when = _failure_time(fell, recorder, scuffed, slip, times, standard)
-    reason = failure_reason(checks, recorder.fall)
+    reason = failure_reason(checks, recorder.fall, recorder.meter.press)
     transition = None if when is None else standard.transition_at(when)
     simulated = len(controls.ctrl) * standard.timestep
     return Execution(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from toolkit.execution.check import Check, Result
 from toolkit.execution.config import ExecutionConfig
+from toolkit.execution.contact_meter import Press
 from toolkit.execution.standard import Standard
 
 RANGE_TOLERANCE = 1e-3  # rad; excess over joint ranges, because limits of the simulation are soft
@@ -40,14 +41,19 @@ def execution_checks(
     return tuple(Check(name, limit, unit, values[name]) for name, (limit, unit) in limits.items())
 
 
-def failure_reason(checks: tuple[Check, ...], fall_reason: str) -> str:
-    """One line on the fall or else on the first check that failed; "" where all passed."""
+def failure_reason(checks: tuple[Check, ...], fall_reason: str, press: Press | None = None) -> str:
+    """One line on the fall or else on the first check that failed, and on links that pressed; "" where all passed."""
+    failed = next((check for check in checks if check.result is not Result.PASS), None)
     if fall_reason:
-        return f"the robot fell: {fall_reason}"
-    for check in checks:
-        if check.result is not Result.PASS:
-            return f"{check.name} is {check.value:.3g} {check.unit}".rstrip() + f", the limit is {check.limit:.3g}"
-    return ""
+        reason = f"the robot fell: {fall_reason}"
+    elif failed is not None:
+        reason = f"{failed.name} is {failed.value:.3g} {failed.unit}".rstrip() + f", the limit is {failed.limit:.3g}"
+    else:
+        return ""
+    if press is None:
+        return reason
+    what = f"{press.first} and {press.second} pressed on each other"
+    return f"{reason}; {what} with {press.force:.0f} N at {press.time:.2f} s"
 
 
 def is_too_fast(checks: tuple[Check, ...], fall_reason: str) -> bool:
