@@ -263,3 +263,61 @@ def test_a_judge_is_asked_about_few_goals_out_of_a_state(answer):
     assert not AnaStar(Fan(), np.random.default_rng(0), AnaStarConfig(epsilon=0.0), judge=judge).run().paths
     most = 4 if answer is None else 1
     assert sorted(asked) == [(0, way, goal) for way in (0, 1) for goal in range(most)]
+
+
+class Ways:
+    """A start and many ways to goals, each over a state of its own."""
+
+    def __init__(self, costs):
+        self._costs = costs
+
+    def start(self):
+        return ()
+
+    def expand(self, state, slack):
+        if not state:
+            return [Edge((way,), cost - 1.0, None) for way, cost in enumerate(self._costs)]
+        return [Edge((*state, 0), 1.0, None)] if len(state) == 1 else []
+
+    def heuristic(self, states):
+        return [0.1 * (2 - len(state)) for state in states]
+
+    def is_goal(self, states):
+        return [len(state) == 2 for state in states]
+
+    def crowd(self, states):
+        return states
+
+
+def judged_ways(truth, costs):
+    """The cost of the best way and the ways that were judged, where the judge says what they truly cost."""
+    asked = []
+
+    def judge(states, payloads, edge):
+        way = edge.state[0]
+        asked.append(way)
+        return edge._replace(cost=edge.cost + truth[way] - costs[way])
+
+    config = AnaStarConfig(epsilon=0.5, layer=math.inf)
+    result = AnaStar(Ways(costs), np.random.default_rng(0), config, judge=judge).run()
+    return result.paths[-1].cost, asked
+
+
+def test_ways_that_the_judge_surely_makes_too_dear_are_not_judged():
+    rng = np.random.default_rng(5)
+    costs = rng.uniform(10.0, 13.0, 200)
+    truth = costs * rng.uniform(1.3, 1.35, 200)
+    best, asked = judged_ways(truth, costs)
+    could = [way for way in range(200) if costs[way] < truth.min()]  # which the costs alone do not rule out
+    assert len(could) > 150 and len(asked) < 60
+    assert best < 1.01 * truth.min()
+
+
+def test_ways_that_the_judge_makes_cheaper_are_judged_although_they_seem_too_dear():
+    rng = np.random.default_rng(6)
+    costs = rng.uniform(10.0, 13.0, 200)
+    truth = costs * rng.uniform(0.75, 0.8, 200)
+    best, asked = judged_ways(truth, costs)
+    assert best < min(
+        1.03 * truth.min(), truth[asked[0]]
+    )  # though all others cost more than that before they are judged

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import Any, Generic
@@ -31,6 +32,7 @@ from toolkit.search.anytime.graph import Edge, Fault, Judge, Path, Progress, Sea
 from toolkit.search.anytime.open_list import OpenList
 
 _TINY = 1e-9  # divisor in place of h = 0
+_LACKS = 10  # paths to goals, the last ones, whose costs tell what the judge adds at least
 _REFUSALS = 4  # goals out of one state, the cheapest first, that are of no use until the others count as refused
 _REFUSAL = 0.4  # units; added to h, for the order of expansion, where the judge refused a goal
 _MAX_STATES = 700_000  # a search that knows so many states ends, to bound its memory
@@ -111,8 +113,10 @@ class AnaStar(Generic[State]):
     ):
         self._problem, self._rng, self._judge = problem, rng, judge
         self._config = config or AnaStarConfig()
-        self._best = math.inf  # G
-        self._missing = 0.0  # cost that the judge added to the last edge to a goal out of the same state
+        self._best = math.inf  # cost of the best path
+        self._bar = math.inf  # G: that cost, or what the path would have cost without the judge where that is more
+        self._missing = -math.inf  # cost that the judge added to the last edge to a goal out of the same state
+        self._lacks: deque[float] = deque(maxlen=_LACKS)  # the same as parts of the paths' costs, of any state
         self._assumed, self._doubled_at = self._config.initial_cost, self._config.patience
         self._index: dict[State, int] = {}
         self._edge: list[Edge[State]] = []  # by which each node was reached
@@ -142,7 +146,7 @@ class AnaStar(Generic[State]):
         reported = 0.0
         if self._problem.is_goal([start])[0]:
             paths.append(Path((start,), (), 0.0, 1.0, 0.0, 0))
-            self._best = 0.0
+            self._best = self._bar = 0.0
         else:
             h = float(self._problem.heuristic([start])[0])
             self._improve(Edge(start, 0.0), 0.0, h, -1, self._problem.crowd([start])[0])
@@ -173,7 +177,7 @@ class AnaStar(Generic[State]):
             self._expanded_in[crowd] = self._expanded_in.get(crowd, 0) + 1
             if not paths:
                 self._crowding = config.crowding * (1.0 + len(expanded) / config.patience)
-            self._missing = 0.0
+            self._missing = -math.inf
             path = self._reach_one_of(node, goals, began, len(expanded))
             if path is not None:
                 paths.append(path)
@@ -189,7 +193,7 @@ class AnaStar(Generic[State]):
     def _expand(self, node: int) -> list[Edge[State]] | None:
         """Open the children that may improve and return the edges to goals; None where the problem had no time left."""
         g, state = self._g[node], self._edge[node].state
-        edges = self._problem.expand(state, self._best - g)
+        edges = self._problem.expand(state, self._bar - g)
         if not edges:
             return None if edges is None else []
         states = [edge.state for edge in edges]
@@ -206,7 +210,7 @@ class AnaStar(Generic[State]):
 
     def _improve(self, edge: Edge[State], g: float, h: float, parent: int, crowd: Hashable) -> None:
         """Open a state, or reopen it, where the path to it is the cheapest so far and may lead to a better solution."""
-        if not g + h < self._best or h == math.inf:
+        if not g + h < self._bar or h == math.inf:
             return
         node = self._index.get(edge.state)
         if node is None:
@@ -228,7 +232,7 @@ class AnaStar(Generic[State]):
         g, h = self._g[node], self._h[node] + self._edge[node].delay
         if self._config.crowding > 0:
             h += self._crowding * self._config.unit * self._expanded_in.get(self._crowd[node], 0)
-        target = self._best if self._best < math.inf else self._assumed
+        target = self._bar if self._bar < math.inf else self._assumed
         if target == math.inf:
             return h
         margin = target - g
@@ -283,11 +287,13 @@ class AnaStar(Generic[State]):
         """Take an edge to a goal if it improves on the best solution and the judge agrees.
 
         Edges to goals out of one state are judged in the order of their costs. What the judge added to the one before
-        is assumed to be missing in the next one too.
+        is assumed to be missing in the next one too, and the least part that it added to any of the last few in all.
         """
-        if not self._g[node] + edge.cost + self._missing < self._best:
+        cost = self._g[node] + edge.cost
+        if not (cost < self._bar and cost + max(self._missing, cost * self._usual_lack()) < self._best):
             return None
         states, payloads, cost = self._trail(node)
+        asked = edge
         if self._judge is not None:
             key = (self._edge[node].state, edge.state)
             if key in self._forbidden:
@@ -300,17 +306,23 @@ class AnaStar(Generic[State]):
                 self._forbidden.add(key)
                 self._refuse(node, edge)
                 return None
-            self._missing = max(judged.cost - edge.cost, 0.0)
+            self._missing = judged.cost - edge.cost
+            self._lacks.append(self._missing / max(self._g[node] + edge.cost, _TINY))
             edge = judged
         cost += edge.cost
         if not cost < self._best:
             return None
         seconds = time.perf_counter() - began
-        self._best = cost
+        self._best, self._bar = cost, max(cost, self._g[node] + asked.cost)
         self._crowding = self._config.crowding
         bound = cost / max(self._lower_bound(), _TINY) if cost > 0 else 1.0
         self._prune()
         return Path((*states, edge.state), (*payloads, edge.payload), cost, bound, seconds, expansions)
+
+    def _usual_lack(self) -> float:
+        """The least part of a path's cost that the judge added to any of the last few; 0 for too few."""
+        least = min(self._lacks, default=0.0)
+        return least if len(self._lacks) >= _LACKS // 2 else min(least, 0.0)
 
     def _trail(self, node: int) -> tuple[list[State], list[Any], float]:
         """States from the start to a node, payloads between them and the sum of the edge costs.
@@ -341,4 +353,4 @@ class AnaStar(Generic[State]):
 
     def _prune(self) -> None:
         """Close what cannot improve on the new G and sort the rest by the new e."""
-        self._open.reset([n for n in self._open if self._g[n] + self._h[n] < self._best], self._priority)
+        self._open.reset([n for n in self._open if self._g[n] + self._h[n] < self._bar], self._priority)
