@@ -318,6 +318,5 @@ def test_ways_that_the_judge_makes_cheaper_are_judged_although_they_seem_too_dea
     costs = rng.uniform(10.0, 13.0, 200)
     truth = costs * rng.uniform(0.75, 0.8, 200)
     best, asked = judged_ways(truth, costs)
-    assert best < min(
-        1.03 * truth.min(), truth[asked[0]]
-    )  # though all others cost more than that before they are judged
+    assert len(asked) > 1  # though all others seem dearer than the first one truly is
+    assert best < 1.04 * truth.min()
