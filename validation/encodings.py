@@ -1,7 +1,6 @@
 """Encodings of transitions compared.
 
-Orientations as axes of the contacts' frames (ours) stand against Tait-Bryan angles (the paper's), and features without
-the direction to the goal against features with it.
+Orientations as axes of the contacts' frames (ours) stand against Tait-Bryan angles (the paper's).
 """
 
 from __future__ import annotations
@@ -13,11 +12,9 @@ import numpy as np
 from toolkit.contacts.category import Category
 from toolkit.errors import InputError
 from toolkit.learning.samples import Samples
-from toolkit.prediction.features import CONTACT
+from toolkit.prediction.features import CONTACT, ahead
 
 AXES, ANGLES = "axes of each contact's frame", "Tait-Bryan angles with copies at ±2π"
-GOAL = "axes, and the direction and nearness of the goal"
-NEARBY = 0.6  # m; goals farther away are as far as this
 NEAR = 0.5  # rad; angles so near to ±π are copied
 MOST_COPIES = 3  # of one sample
 
@@ -86,14 +83,6 @@ def with_copies(features: np.ndarray, contacts: int, *, near: float = NEAR) -> t
     return np.concatenate([features, copies[kept]]), np.concatenate([sources[0], rows[kept]])
 
 
-def with_goal(samples: Samples) -> Samples:
-    """The samples with three features before the others: the goal's direction in the plane, and its distance in m."""
-    way = samples.goal[:, :2]
-    distance = np.linalg.norm(way, axis=1, keepdims=True)
-    seen = [way / np.maximum(distance, 1e-3), np.minimum(distance, NEARBY), samples.features]
-    return replace(samples, features=np.concatenate(seen, axis=1).astype(np.float32))
-
-
 def compare_encodings(
     train: Samples, test: Samples, category: Category, *, epochs: int, seed: int = 0
 ) -> dict[str, EncodingScore]:
@@ -117,18 +106,16 @@ def compare_encodings(
     config = FitConfig(epochs=epochs, seed=seed)
     contacts = len(category.contact_limbs)
     results = {}
-    for name in (AXES, ANGLES, GOAL):
+    for name in (AXES, ANGLES):
         learnt, asked = train, test
         if name == ANGLES:
             features, rows = with_copies(tait_bryan(train.features, category), contacts)
             learnt = replace(train.select(rows), features=features.astype(np.float32))
             asked = replace(test, features=tait_bryan(test.features, category).astype(np.float32))
-        elif name == GOAL:
-            learnt, asked = with_goal(train), with_goal(test)
         trained = train_networks(learnt, config)
         feasible = trained.feasible(asked.features)
         good = asked.known
-        outputs, targets = trained.predict(asked.features[good]), asked.targets[good]
+        outputs, targets = trained.predict(asked.features[good], ahead(asked.goal[good])), asked.targets[good]
         results[name] = EncodingScore(
             inputs=learnt.features.shape[1],
             rows=len(learnt),

@@ -51,7 +51,7 @@ class Judge:
 
     def __init__(self, robot: RobotModel, world: World):
         self._robot, self._world = robot, world
-        self._networks = NetworkEvaluator(load_networks(robot), OptimiserEvaluator(robot))
+        self._networks = NetworkEvaluator(load_networks(robot), world.goal, OptimiserEvaluator(robot))
 
     def __call__(self, sequence: ContactSequence, plan: MotionPlan) -> Judgement:
         """Judge the transitions one after the other, each from the state that the one before it is predicted to leave.

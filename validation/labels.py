@@ -19,7 +19,7 @@ from toolkit.learning.label import LabelledSequence, label
 from toolkit.learning.samples import PLANNED
 from toolkit.learning.scout import Scout
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
-from toolkit.prediction.features import encode
+from toolkit.prediction.features import ahead, encode
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.prediction.network import TransitionNetwork
 from toolkit.prediction.networks import load_networks
@@ -213,13 +213,14 @@ def chained(labelled: LabelledSequence, networks: Mapping[Category, TransitionNe
     """Predictions along a sequence, each from the one before."""
     count, rejected, predicted, error = len(labelled.sequence.transitions), 0, 0.0, None
     com, velocity = labelled.parts.com[0], labelled.parts.com_velocity[0]
+    goal = labelled.goal
     for index in range(count):
         problem = labelled.problem(index)
         network = networks[category_of(problem.stance, problem.transition)]
         _, true = encode(problem.stance, problem.com, problem.com_velocity, [problem.transition])
         rejected += int(not network.feasible(true)[0])
         frame, features = encode(problem.stance, com, velocity, [problem.transition])
-        outputs = network.predict(features)[0].astype(float)
+        outputs = network.predict(features, ahead(frame.point(goal)))[0].astype(float)
         predicted += outputs[0]
         com, velocity = frame.point_back(outputs[1:4]), frame.vector_back(outputs[4:7])
         if index + 1 == CHAIN:

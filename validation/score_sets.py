@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.learning.evaluate import score
 from toolkit.learning.samples import Samples
+from toolkit.prediction.features import ahead
 from toolkit.prediction.network import TransitionNetwork
 
 TAILS = (50.0, 90.0, 99.0)  # %; quantiles of the errors
@@ -84,8 +85,8 @@ class Scores:
 
 def _errors(network: TransitionNetwork, samples: Samples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Errors of transitions with a known outcome: of the objective over the set's mean, CoM (m), velocity (m/s)."""
-    targets = samples.targets[samples.known]
-    outputs = network.predict(samples.features[samples.known])
+    samples = samples.select(samples.known)
+    targets, outputs = samples.targets, network.predict(samples.features, ahead(samples.goal))
     relative = np.abs(outputs[:, 0] - targets[:, 0]) / targets[:, 0].mean()
     com, velocity = (np.linalg.norm((outputs - targets)[:, part], axis=1) for part in (slice(1, 4), slice(4, 7)))
     return relative, com, velocity

@@ -32,6 +32,7 @@ from toolkit.prediction.network import (
     training_summary,
 )
 from toolkit.prediction.networks import NetworkEvaluator
+from toolkit.world.world import Goal
 
 CATEGORY = Category.BREAK_ONLY_PALM
 
@@ -51,14 +52,15 @@ def test_a_network_computes_what_its_layers_say(saved):
     path, values = saved
     network = load_network(path, CATEGORY, "abc")
     x = np.random.default_rng(1).normal(size=(5, feature_size(CATEGORY))).astype(np.float32)
-    y = x
+    goal = np.array([0.3, -0.5], np.float32)
+    y = np.concatenate([x, np.tile(goal, (5, 1))], axis=1)
     for layer in range(4):
         y = y @ values[f"regressor.{layer}.weight"] + values[f"regressor.{layer}.bias"]
         y = y if layer == 3 else np.maximum(y, 0)
     y[:, 0] = OBJECTIVE_SCALE * np.expm1(np.maximum(y[:, 0], 0))
     y[:, 1:4] += x[:, -9:-6]  # where the CoM is, from which it goes on
-    np.testing.assert_allclose(network.predict(x), y, rtol=1e-4, atol=1e-4)  # float32 sums
-    assert (network.predict(x)[:, 0] >= 0).all()
+    np.testing.assert_allclose(network.predict(x, goal), y, rtol=1e-4, atol=1e-4)  # float32 sums
+    assert (network.predict(x, goal)[:, 0] >= 0).all()
 
 
 @pytest.mark.parametrize(
@@ -171,7 +173,7 @@ def test_a_balanced_test_set_keeps_a_quarter_of_each_label(saved):
 def test_a_query_with_nan_is_refused(saved):
     from tests.prediction.test_features import random_case
 
-    evaluator = NetworkEvaluator({CATEGORY: load_network(saved[0], CATEGORY, "abc")})
+    evaluator = NetworkEvaluator({CATEGORY: load_network(saved[0], CATEGORY, "abc")}, Goal(np.ones(3), 0.2))
     stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(6))
     batch = evaluator.evaluate(stance, com, velocity, [transition])
     assert batch.com.shape == (1, 3)
@@ -229,4 +231,14 @@ def test_weights_in_half_precision_hardly_change_a_network():
     net = Perceptron(tuple(weights), tuple(biases))
     half = stored(net, lower, upper)
     assert all(weight.dtype == np.float16 for weight in half.weights)
+    np.testing.assert_allclose(restored(half, lower, upper)(inputs), net(inputs), atol=0.01)
+
+
+def test_inputs_after_the_features_are_stored_as_they_are():
+    rng = np.random.default_rng(3)
+    net = Perceptron((rng.normal(size=(5, 2)).astype(np.float32),), (np.zeros(2, np.float32),))
+    lower, upper = np.full(3, 10.0, np.float32), np.full(3, 12.0, np.float32)
+    half = stored(net, lower, upper)
+    np.testing.assert_array_equal(half.weights[0][3:], net.weights[0][3:].astype(np.float16))
+    inputs = np.concatenate([rng.uniform(lower, upper, (9, 3)), rng.uniform(-1.0, 1.0, (9, 2))], axis=1)
     np.testing.assert_allclose(restored(half, lower, upper)(inputs), net(inputs), atol=0.01)

@@ -11,11 +11,12 @@ from toolkit.errors import DatasetError
 from toolkit.learning.descent import FitConfig, draw
 from toolkit.learning.fit import fit_category, train_networks
 from toolkit.learning.samples import Samples
-from toolkit.prediction.features import COM, feature_size
+from toolkit.prediction.features import AHEAD, COM, ahead, feature_size
 from toolkit.prediction.network import load_network, network_path, training_summary
 
 CATEGORY = Category.MOVE_FOOT
 CONFIG = FitConfig(epochs=12, batch=64, seed=1)
+HERE = np.zeros(AHEAD)
 
 
 def samples(n=2500, seed=0):
@@ -43,7 +44,7 @@ def test_networks_learn(trained):
     fresh = samples(500, seed=9)
     good = fresh.feasible
     assert (trained.feasible(fresh.features) == good).mean() > 0.95
-    outputs, targets = trained.predict(fresh.features[good]), fresh.targets[good]
+    outputs, targets = trained.predict(fresh.features[good], HERE), fresh.targets[good]
     for columns in ([0], [1, 2, 3], [4, 5, 6]):
         spread = np.abs(targets[:, columns] - targets[:, columns].mean(0)).mean()
         assert np.abs(outputs[:, columns] - targets[:, columns]).mean() < 0.25 * spread
@@ -52,11 +53,22 @@ def test_networks_learn(trained):
         assert curve.validation[curve.best] == curve.validation.min()
 
 
+def test_where_the_goal_lies_is_learnt():
+    def towards(rows):
+        rows.targets[:, 4:6] = 0.3 * ahead(rows.goal)
+        return replace(rows, targets=np.where(rows.feasible[:, None], rows.targets, np.nan))
+
+    trained, fresh = train_networks(towards(samples()), replace(CONFIG, epochs=20)), towards(samples(500, seed=9))
+    good = fresh.feasible
+    error = trained.predict(fresh.features[good], ahead(fresh.goal[good]))[:, 4:6] - fresh.targets[good, 4:6]
+    assert np.abs(error).mean() < 0.25 * np.abs(fresh.targets[good, 4:6]).mean()
+
+
 def test_the_same_seed_gives_the_same_networks(trained):
     again, other = train_networks(samples(), CONFIG), train_networks(samples(), FitConfig(epochs=12, batch=64, seed=2))
     features = samples(50, seed=3).features
-    np.testing.assert_array_equal(again.predict(features), trained.predict(features))
-    assert not np.array_equal(other.predict(features), trained.predict(features))
+    np.testing.assert_array_equal(again.predict(features, HERE), trained.predict(features, HERE))
+    assert not np.array_equal(other.predict(features, HERE), trained.predict(features, HERE))
 
 
 def test_a_file_holds_what_was_trained(tmp_path, trained):
@@ -72,7 +84,7 @@ def test_a_file_holds_what_was_trained(tmp_path, trained):
     assert {state[0] for state in seen} == {"classifier", "regressor"} == set(curves)
     network = load_network(network_path(tmp_path, CATEGORY), CATEGORY, "abc")
     features = samples(50, seed=3).features
-    found, wanted = network.predict(features), trained.predict(features)  # files hold half precision
+    found, wanted = network.predict(features, HERE), trained.predict(features, HERE)  # files hold half precision
     np.testing.assert_allclose(found, wanted, rtol=0.02, atol=0.002)
     assert (network.feasible(features) == trained.feasible(features)).mean() >= 0.98
     np.testing.assert_array_equal(network.upper, samples().features.max(0))
@@ -87,7 +99,7 @@ def test_only_known_outcomes_are_learnt():
     without = replace(few, targets=np.where(hidden[:, None], np.nan, few.targets))
     trained, fresh = train_networks(without, replace(CONFIG, epochs=20)), samples(500, seed=9)
     assert (trained.feasible(fresh.features) == fresh.feasible).mean() > 0.85
-    assert np.isfinite(trained.predict(fresh.features)).all()
+    assert np.isfinite(trained.predict(fresh.features, HERE)).all()
 
 
 def test_the_test_split_is_not_looked_at():
@@ -97,7 +109,7 @@ def test_the_test_split_is_not_looked_at():
     spoilt = replace(rows, features=np.where(tested[:, None], 1e6, rows.features).astype(np.float32))
     fresh = samples(50, seed=3).features
     one, other = (train_networks(each, replace(CONFIG, epochs=3)) for each in (rows, spoilt))
-    np.testing.assert_array_equal(one.predict(fresh), other.predict(fresh))
+    np.testing.assert_array_equal(one.predict(fresh, HERE), other.predict(fresh, HERE))
     np.testing.assert_array_equal(one.feasible(fresh), other.feasible(fresh))
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.learning.test_fit import samples
+from tests.learning.test_fit import HERE, samples
 from toolkit import train
 from toolkit.contacts.category import Category
 from toolkit.errors import InputError, NetworkError
@@ -59,7 +59,7 @@ def test_regressors_are_refined(dataset, tmp_path):
     after = load_network(tmp_path / "category_0.safetensors", Category.MOVE_FOOT, robot.fingerprint)
     # With a step size of nothing the network is what it was, through scaling and back in single precision.
     features = samples(50, seed=3).features
-    np.testing.assert_allclose(after.predict(features), before.predict(features), rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(after.predict(features, HERE), before.predict(features, HERE), rtol=1e-3, atol=1e-3)
     np.testing.assert_array_equal(before.classifier.weights[0], after.classifier.weights[0])
     config = training_summary(after)["config"]
     assert config["batch"] == 64

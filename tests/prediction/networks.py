@@ -4,7 +4,7 @@ import numpy as np
 from safetensors.numpy import save_file
 
 from toolkit.contacts.category import Category
-from toolkit.prediction.features import TARGETS, feature_size
+from toolkit.prediction.features import AHEAD, TARGETS, feature_size
 from toolkit.prediction.network import HIDDEN, SCHEMA, network_path
 
 
@@ -12,8 +12,8 @@ def random_tensors(rng, category):
     """Tensors of one file."""
     size = feature_size(category)
     result = {"features.lower": -np.ones(size, np.float32), "features.upper": np.ones(size, np.float32)}
-    for name, outputs in (("classifier", 1), ("regressor", TARGETS)):
-        widths = [size, HIDDEN, HIDDEN, HIDDEN, outputs]
+    for name, inputs, outputs in (("classifier", size, 1), ("regressor", size + AHEAD, TARGETS)):
+        widths = [inputs, HIDDEN, HIDDEN, HIDDEN, outputs]
         for layer in range(4):
             weight = rng.normal(size=(widths[layer], widths[layer + 1])) / np.sqrt(widths[layer])
             result[f"{name}.{layer}.weight"] = weight.astype(np.float32)

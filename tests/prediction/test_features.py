@@ -8,7 +8,7 @@ from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_about_z
-from toolkit.prediction.features import MIRROR, encode, feature_size
+from toolkit.prediction.features import MIRROR, ahead, encode, feature_size
 from toolkit.world.timing import Timing
 
 REFLECT = np.diag(MIRROR)
@@ -94,6 +94,28 @@ def test_every_input_of_the_optimiser_changes_the_features():
         encode(stance.replace(lower), com, velocity, [transition]),
     ):
         assert not np.allclose(changed[1], base)
+
+
+def test_the_goal_is_seen_as_a_direction_that_shortens_on_arrival():
+    way = np.array([[3.0, 4.0, 7.0], [0.0, -0.3, 0.0], [0.0, 0.0, 1.0], [1e9, 0.0, 0.0]])
+    seen = ahead(way, 0.3)
+    np.testing.assert_allclose(seen[0], 4.7 / 5.2 * np.array([0.6, 0.8]), rtol=1e-12)
+    np.testing.assert_array_equal(seen[1:3], 0.0)  # within the region
+    np.testing.assert_allclose(seen[3], [1.0, 0.0], rtol=0, atol=1e-8)
+    np.testing.assert_array_equal(ahead(way, np.full(4, 0.3)), seen)
+
+
+def test_a_mirrored_goal_is_seen_mirrored():
+    case = random_case(Category.MOVE_FOOT, np.random.default_rng(7))
+    goal = np.array([1.0, 2.0, 3.0])
+    seen = [
+        ahead(encode(*item[:3], [item[3]])[0].point(place))
+        for item, place in (
+            (case, goal),
+            (mirrored(case), REFLECT @ goal),
+        )
+    ]
+    np.testing.assert_allclose(*seen, rtol=0, atol=1e-12)
 
 
 def test_transitions_of_two_limbs_are_refused():

@@ -13,8 +13,10 @@ from toolkit.prediction.features import TIMING_AND_FRICTION
 from toolkit.prediction.network import load_network, network_path
 from toolkit.prediction.networks import NetworkEvaluator
 from toolkit.world.timing import Timing
+from toolkit.world.world import Goal
 
 CATEGORY = Category.MOVE_FOOT
+GOAL = Goal(np.array([2.0, 1.0, 0.0]), 0.2)
 
 
 class Seven(TransitionEvaluator):
@@ -36,12 +38,13 @@ def networks(tmp_path):
 def test_what_was_not_trained_goes_to_the_stand_in_and_is_counted(networks):
     stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(0))
     known, strange = (replace(transition, timing=Timing(0.5, swing)) for swing in (0.5, 1e-3))
-    judge = NetworkEvaluator(networks, Seven())
+    judge = NetworkEvaluator(networks, GOAL, Seven())
     batch = judge.evaluate(stance, com, velocity, [known, strange, strange])
     assert batch.untrained == 2 and batch.feasible[1:].all()
     np.testing.assert_array_equal(batch.objective[1:], 7.0)
     assert judge.evaluate(stance, com, velocity, [known]).untrained == 0
-    assert NetworkEvaluator(networks).evaluate(stance, com, velocity, [strange]).untrained == 1  # judged all the same
+    alone = NetworkEvaluator(networks, GOAL)
+    assert alone.evaluate(stance, com, velocity, [strange]).untrained == 1  # judged all the same
 
 
 def test_more_time_and_friction_than_trained_are_judged_as_the_most_of_the_training(networks):
@@ -52,7 +55,7 @@ def test_more_time_and_friction_than_trained_are_judged_as_the_most_of_the_train
         feet = tuple(replace(item, friction=factor * friction) for item in stance.contacts)
         contact = replace(transition.contact, friction=factor * friction)
         new = replace(transition, timing=Timing(factor * shift, factor * swing), contact=contact)
-        return NetworkEvaluator(networks, Seven()).evaluate(replace(stance, contacts=feet), com, velocity, [new])
+        return NetworkEvaluator(networks, GOAL, Seven()).evaluate(replace(stance, contacts=feet), com, velocity, [new])
 
     most, more = case(1.0), case(3.0)
     assert most.untrained == more.untrained == 0
@@ -66,6 +69,6 @@ def test_a_judge_says_of_itself_what_a_search_has_to_know(networks):
     assert (plain.costly, plain.rejection, plain.stand_in) == (False, "dynamics", None)
     assert plain.halt(stance, com, velocity, [transition], 0.6) is None
     assert plain.evaluate(stance, com, velocity, [transition]).untrained == 0
-    assert NetworkEvaluator(networks, stand_in).stand_in is stand_in
+    assert NetworkEvaluator(networks, GOAL, stand_in).stand_in is stand_in
     with pytest.raises(TypeError, match="abstract"):
         TransitionEvaluator()

@@ -1,12 +1,11 @@
-"""The paper's angles say what the axes say, and the goal is seen from the feet."""
+"""The paper's angles say what the axes say."""
 
 import numpy as np
 
 from tests.prediction.test_features import random_case
 from toolkit.contacts.category import Category
-from toolkit.learning.samples import Samples
 from toolkit.prediction.features import encode
-from validation.encodings import NEARBY, tait_bryan, with_goal
+from validation.encodings import tait_bryan
 
 
 def test_tait_bryan_angles_give_the_axes_back():
@@ -18,13 +17,3 @@ def test_tait_bryan_angles_give_the_axes_back():
     np.testing.assert_allclose(features[0, 3:6], [cy * cp, sy * cp, -sp], rtol=0, atol=1e-12)
     expected = [cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr]
     np.testing.assert_allclose(features[0, 6:9], expected, rtol=0, atol=1e-12)
-
-
-def test_the_goal_has_a_direction_and_a_distance_that_ends():
-    goal = np.array([[3.0, 4.0, 0.2], [0.0, -0.3, 0.0], [0.0, 0.0, 0.0]], np.float32)
-    features = np.arange(6, dtype=np.float32).reshape(3, 2)
-    samples = Samples(features, np.ones(3, bool), np.ones((3, 7), np.float32), goal, np.zeros(3, np.int32))
-    seen = with_goal(samples).features
-    np.testing.assert_array_equal(seen[:, 3:], features)
-    expected = [[0.6, 0.8, NEARBY], [0.0, -1.0, 0.3], [0.0, 0.0, 0.0]]
-    np.testing.assert_allclose(seen[:, :3], expected, atol=1e-6)

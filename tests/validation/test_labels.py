@@ -40,7 +40,7 @@ class Exact:
     def feasible(self, features):
         return np.ones(len(features), bool)
 
-    def predict(self, features):
+    def predict(self, features, goal):
         problem = self._labelled.problem(self._index)
         frame, _ = encode(problem.stance, problem.com, problem.com_velocity, [problem.transition])
         objective, com, velocity = self._labelled.outcome(self._index)

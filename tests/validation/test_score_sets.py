@@ -12,7 +12,9 @@ from validation.score_sets import TAILS, Scores
 @pytest.fixture
 def network():
     """Stands for a network: the first feature decides the label, the others are the targets."""
-    return SimpleNamespace(feasible=lambda features: features[:, 0] > 0.0, predict=lambda features: features[:, 1:])
+    return SimpleNamespace(
+        feasible=lambda features: features[:, 0] > 0.0, predict=lambda features, goal: features[:, 1:]
+    )
 
 
 def samples(error: float, com: float, wrong: int) -> Samples:

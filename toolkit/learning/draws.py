@@ -93,7 +93,7 @@ def _judge(place: Place, rng: np.random.Generator) -> TransitionEvaluator:
     """A judge of one of all kinds, with random weights."""
     robot = place.robot
     if place.steep:
-        return NetworkEvaluator(dict(place.networks)) if place.networks else OptimiserEvaluator(robot)
+        return NetworkEvaluator(dict(place.networks), place.world.goal) if place.networks else OptimiserEvaluator(robot)
     kinds = ["kinematic", "kinematic", "quasi-static"] + 3 * ["learned"] * bool(place.networks)
     match kinds[int(rng.integers(len(kinds)))]:
         case "kinematic":
@@ -103,7 +103,7 @@ def _judge(place: Place, rng: np.random.Generator) -> TransitionEvaluator:
         case "quasi-static":
             return QuasiStaticEvaluator(robot)
         case _:
-            return NetworkEvaluator(dict(place.networks))
+            return NetworkEvaluator(dict(place.networks), place.world.goal)
 
 
 def _factors(quota: Quota, rng: np.random.Generator) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.errors import DatasetError
 from toolkit.learning.samples import Samples
+from toolkit.prediction.features import AHEAD, ahead
 from toolkit.prediction.network import TransitionNetwork
 
 
@@ -52,7 +53,7 @@ def score(network: TransitionNetwork, samples: Samples) -> Score:
     if not known.any():
         raise DatasetError(f"category {int(network.category)}: no outcome to test on; collect more")
     targets = samples.targets[known]
-    outputs = network.predict(samples.features[known])
+    outputs = network.predict(samples.features[known], ahead(samples.goal[known]))
     error = np.abs(outputs[:, 0] - targets[:, 0])
     return Score(
         samples=len(samples),
@@ -88,6 +89,6 @@ def query_seconds(network: TransitionNetwork, batch: int) -> float:
     for _ in range(200):
         start = time.perf_counter()
         network.feasible(features)
-        network.predict(features)
+        network.predict(features, np.zeros(AHEAD))
         times.append(time.perf_counter() - start)
     return float(np.median(times))

@@ -18,7 +18,7 @@ from toolkit.learning.descent import Curve, FitConfig, descend
 from toolkit.learning.layers import Scaling, perceptron
 from toolkit.learning.samples import Samples, Split, join
 from toolkit.learning.tasks import Classification, Regression
-from toolkit.prediction.features import COM, TARGETS, TIMING
+from toolkit.prediction.features import AHEAD, COM, TARGETS, TIMING, ahead
 from toolkit.prediction.network import (
     SCHEMA,
     Perceptron,
@@ -29,12 +29,14 @@ from toolkit.prediction.network import (
     outcome,
     stored,
     training_summary,
+    with_goal,
 )
 from toolkit.robot.scale import Scale
 
 BLURRED = 2  # copies of each sample whose CoM state is disturbed
 # m and m/s for a body of the usual size (`toolkit.robot.scale`); usual errors of predicted states
 COM_BLUR, VELOCITY_BLUR = np.array([0.015, 0.015, 0.008]), np.array([0.04, 0.04, 0.02])
+SHORT = 0.1  # m for a body of the usual size; a search ends up to so far within its goal region
 MINIMUM = 50  # least number of samples with each label
 OBJECTIVE_LIMIT = 5e4  # the regressor does not learn from transitions with a larger objective
 
@@ -54,9 +56,9 @@ class TrainedNetworks:
         """(n,) bool; whether the transitions with features (n, d) are feasible."""
         return feasibility(self.classifier, features)
 
-    def predict(self, features: np.ndarray) -> np.ndarray:
-        """(n, 7) objective, CoM (m) and CoM velocity (m/s) of the transitions with features (n, d)."""
-        return outcome(self.regressor, features)
+    def predict(self, features: np.ndarray, goal: np.ndarray) -> np.ndarray:
+        """(n, 7) objective, CoM (m) and CoM velocity (m/s) of the transitions with features (n, d); see `outcome`."""
+        return outcome(self.regressor, features, goal)
 
 
 def check_device(device: str) -> None:
@@ -84,7 +86,8 @@ def train_networks(
 
     The classifier minimises the logistic loss, the regressor the smooth L1 loss of its scaled outputs. These are the
     compressed objective, not centred, as in the original, and the z-scored displacement and velocity of the CoM. The
-    worlds of the validation split decide on early stopping, those of the test split are not used.
+    regressor is told where the sequence ends, as a search ends within its goal region. The worlds of the validation
+    split decide on early stopping, those of the test split are not used.
 
     Args:
         samples: Labelled transitions of one category.
@@ -116,20 +119,21 @@ def train_networks(
 
     kept = np.flatnonzero(samples.known & (samples.targets[:, 0] < OBJECTIVE_LIMIT))
     kept = np.repeat(kept, 1 + BLURRED)
-    features = features[kept]
-    blurred = np.arange(len(kept)) % (1 + BLURRED) > 0
-    _blur(features, blurred, Scale(config.length), np.random.default_rng(config.seed))
+    features, rng = features[kept], np.random.default_rng(config.seed)
+    _blur(features, np.arange(len(kept)) % (1 + BLURRED) > 0, Scale(config.length), rng)
+    goal = ahead(samples.goal[kept].astype(np.float64), config.length * rng.uniform(0.0, SHORT, len(kept)))
     targets = samples.targets[kept].astype(np.float64)
     targets[:, 0] = compressed(targets[:, 0])
     targets[:, 1:4] -= features[:, COM]
     out_mean = np.concatenate([[0.0], targets[:, 1:].mean(0)])
+    mean, std = np.append(mean, np.zeros(AHEAD)), np.append(std, np.ones(AHEAD))
     scaling = Scaling(mean, std, out_mean, np.maximum(targets.std(0), 1e-4))
-    regressor = perceptron(size, TARGETS)
+    regressor = perceptron(size + AHEAD, TARGETS)
     if start is not None:
         scaling.unfold(start, regressor)
     task = Regression(
         tensor(samples.features[kept, TIMING]),
-        tensor((features - mean) / std),
+        tensor((with_goal(features, goal) - mean) / std),
         tensor((targets - out_mean) / scaling.out_std),
     )
     held_out = _held_out(samples.select(kept))

@@ -71,18 +71,18 @@ def make_planner(
         config = replace(config, one_timing=True, cost=replace(config.cost, time=0.0))
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
     optimiser = OptimiserEvaluator(robot)
-    judge = _networks(robot, optimiser) if kind == "learned" else optimiser
+    judge = _networks(robot, world, optimiser) if kind == "learned" else optimiser
     at_rest = OptimiserEvaluator(robot, final_at_rest=True)
     return ContactPlanner(
         robot, world, judge, config, partial(_objective, robot, world, BodyRoom(robot, world)), at_rest
     )
 
 
-def _networks(robot: RobotModel, stand_in: OptimiserEvaluator) -> NetworkEvaluator:
+def _networks(robot: RobotModel, world: World, stand_in: OptimiserEvaluator) -> NetworkEvaluator:
     """The robot's networks, with those for sliding ground where it has them."""
     folder = robot.folder / "networks" / SLIDING
-    sliding = NetworkEvaluator(load_networks(robot, folder), stand_in) if folder.is_dir() else None
-    return NetworkEvaluator(load_networks(robot), stand_in, sliding)
+    sliding = NetworkEvaluator(load_networks(robot, folder), world.goal, stand_in) if folder.is_dir() else None
+    return NetworkEvaluator(load_networks(robot), world.goal, stand_in, sliding)
 
 
 def _objective(robot: RobotModel, world: World, surroundings: BodyRoom, sequence: ContactSequence) -> float | Failure:

@@ -6,6 +6,9 @@ with its position and the x and z axes of its frame (9 numbers). The axes are co
 paper's copies of samples at +-2 pi are not needed (`validation.encodings` compares both).
 
 Order: left foot, right foot, (left palm), (right palm), (new contact), CoM, CoM velocity, shift, swing, friction.
+
+Whether a transition is feasible depends on these alone. Its outcome in a whole motion depends on what comes after it
+too; the regressors see of that where the goal lies (`ahead`).
 """
 
 from __future__ import annotations
@@ -27,10 +30,12 @@ from toolkit.geometry.pose import Pose
 MIRROR = np.array([1.0, -1.0, 1.0])
 CONTACT = 9  # numbers per contact
 STATE = 9  # numbers after the contacts: CoM, CoM velocity, shift, swing, friction
+AHEAD = 2  # numbers that say where the goal lies
 TARGETS = 7  # objective, CoM, CoM velocity
 COM = slice(-9, -6)  # columns of the initial CoM
 TIMING = slice(-3, -1)
 TIMING_AND_FRICTION = slice(-3, None)
+_HALFWAY = 0.5  # m; so far away, the goal is halfway between here and far away
 
 
 def feature_size(category: Category) -> int:
@@ -77,6 +82,21 @@ class Canonical:
         rows[:, 0] = position - self.world_from_parent.position
         rows[:, 1], rows[:, 2] = rotation[:, :, 0], rotation[:, :, 2]
         return self.vector(rows).reshape(-1, CONTACT)
+
+
+def ahead(way: np.ndarray, radius: float | np.ndarray = 0.0) -> np.ndarray:
+    """Where the goal lies, as the regressors see it.
+
+    Args:
+        way: (..., 2) or (..., 3) m, canonical; from the mean of the parent's feet to the middle of the goal region.
+        radius: m; of the goal region, one or (...) of them.
+
+    Returns:
+        (..., 2); the direction to the goal region, whose length is 0 in it and 1 far away from it.
+    """
+    distance = np.maximum(np.linalg.norm(way[..., :2], axis=-1), 1e-9)
+    left = np.maximum(distance - radius, 0.0)
+    return way[..., :2] * (left / (left + _HALFWAY) / distance)[..., None]
 
 
 def _parent_frame(stance: Stance) -> Pose:

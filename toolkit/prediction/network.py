@@ -12,9 +12,9 @@ from safetensors import SafetensorError, safe_open
 
 from toolkit.contacts.category import Category
 from toolkit.errors import NetworkError
-from toolkit.prediction.features import COM, TARGETS, TIMING_AND_FRICTION, feature_size
+from toolkit.prediction.features import AHEAD, COM, TARGETS, TIMING_AND_FRICTION, feature_size
 
-SCHEMA = "transition-network-4"
+SCHEMA = "transition-network-5"
 HIDDEN = 256
 LAYERS = 4  # three hidden ones and the output
 OBJECTIVE_SCALE = 30.0  # objectives below it are learnt in proportion to themselves, larger ones to their logarithm
@@ -47,10 +47,10 @@ def stored(net: Perceptron, lower: np.ndarray, upper: np.ndarray) -> Perceptron:
 
     Args:
         net: The perceptron.
-        lower: (d,) least inputs of the training.
-        upper: (d,) greatest ones.
+        lower: (d,) least features of the training.
+        upper: (d,) greatest ones. Inputs after them are within -1 and 1 as they are.
     """
-    centre, reach = _middle(lower, upper)
+    centre, reach = _middle(lower, upper, len(net.weights[0]))
     first, bias = net.weights[0] * reach[:, None], net.biases[0] + centre @ net.weights[0]
     weights = [weight.astype(np.float16) for weight in (first, *net.weights[1:])]
     return Perceptron(tuple(weights), (bias.astype(np.float32), *net.biases[1:]))
@@ -58,16 +58,18 @@ def stored(net: Perceptron, lower: np.ndarray, upper: np.ndarray) -> Perceptron:
 
 def restored(net: Perceptron, lower: np.ndarray, upper: np.ndarray) -> Perceptron:
     """The perceptron of one that was `stored`."""
-    centre, reach = _middle(lower, upper)
+    centre, reach = _middle(lower, upper, len(net.weights[0]))
     weights = [weight.astype(np.float32) for weight in net.weights]
     weights[0] /= reach[:, None]
     return Perceptron(tuple(weights), (net.biases[0] - centre @ weights[0], *net.biases[1:]))
 
 
-def _middle(lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Middle and half width of ranges; 1 where there is no width."""
-    reach = (upper - lower) / 2
-    return (lower + upper) / 2, np.where(reach > 0.0, reach, 1.0).astype(np.float32)
+def _middle(lower: np.ndarray, upper: np.ndarray, inputs: int) -> tuple[np.ndarray, np.ndarray]:
+    """Middle and half width of the ranges of inputs; 1 where there is no width, and where none is given."""
+    middle, reach = np.zeros(inputs, np.float32), np.ones(inputs, np.float32)
+    middle[: len(lower)], half = (lower + upper) / 2, (upper - lower) / 2
+    reach[: len(lower)] = np.where(half > 0.0, half, 1.0)
+    return middle, reach
 
 
 def feasibility(classifier: Perceptron, features: np.ndarray) -> np.ndarray:
@@ -85,13 +87,20 @@ def expanded(output: np.ndarray) -> np.ndarray:
     return OBJECTIVE_SCALE * np.expm1(np.clip(output, 0.0, 20.0))
 
 
-def outcome(regressor: Perceptron, features: np.ndarray) -> np.ndarray:
-    """(n, 7) float32 objective, CoM and velocity of transitions (n, d), canonical.
+def with_goal(features: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """Inputs (n, d + 2) float32 of the regressor: features (n, d), and `features.ahead` (n, 2) or (2,)."""
+    inputs = np.empty((len(features), features.shape[1] + AHEAD), np.float32)
+    inputs[:, :-AHEAD], inputs[:, -AHEAD:] = features, goal
+    return inputs
+
+
+def outcome(regressor: Perceptron, features: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """(n, 7) float32 objective, CoM and velocity of transitions (n, d), canonical; `goal` is `ahead` (n, 2) or (2,).
 
     The regressor gives the compressed objective, which spans four orders of magnitude, and the change of the CoM, which
     is small. Both are easier to learn in this form.
     """
-    outputs = regressor(features)
+    outputs = regressor(with_goal(features, goal))
     outputs[:, 0] = expanded(outputs[:, 0])
     outputs[:, 1:4] += features[:, COM]
     return outputs
@@ -104,7 +113,7 @@ class TransitionNetwork:
     Attributes:
         category: Category of the transitions that they judge.
         classifier: Features -> (n, 1) log-odds of being feasible (a softmax over two classes is their logistic).
-        regressor: Features -> (n, 7), see `outcome`.
+        regressor: Features and where the goal lies -> (n, 7), see `outcome`.
         lower, upper: (d,) range of the training features.
         metadata: The file's notes on its training.
     """
@@ -139,9 +148,9 @@ class TransitionNetwork:
         """(n,) bool; whether transitions with features (n, d) are feasible."""
         return feasibility(self.classifier, features)
 
-    def predict(self, features: np.ndarray) -> np.ndarray:
-        """(n, 7) float32 objective (not negative), CoM and velocity for features (n, d)."""
-        return outcome(self.regressor, features)
+    def predict(self, features: np.ndarray, goal: np.ndarray) -> np.ndarray:
+        """(n, 7) float32 objective (not negative), CoM and velocity for features (n, d); see `outcome`."""
+        return outcome(self.regressor, features, goal)
 
 
 def network_path(folder: Path, category: Category) -> Path:
@@ -176,8 +185,8 @@ def load_network(path: Path, category: Category, fingerprint: str) -> Transition
     size = feature_size(category)
     lower, upper = (_tensor(path, tensors, f"features.{name}", (size,)) for name in ("lower", "upper"))
     parts = []
-    for name, outputs in (("classifier", 1), ("regressor", TARGETS)):
-        widths = [size, *[HIDDEN] * (LAYERS - 1), outputs]
+    for name, inputs, outputs in (("classifier", size, 1), ("regressor", size + AHEAD, TARGETS)):
+        widths = [inputs, *[HIDDEN] * (LAYERS - 1), outputs]
         weights, biases = [], []
         for layer in range(LAYERS):
             weights.append(_tensor(path, tensors, f"{name}.{layer}.weight", (widths[layer], widths[layer + 1])))

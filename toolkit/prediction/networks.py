@@ -16,9 +16,10 @@ from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.errors import NetworkError
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
-from toolkit.prediction.features import encode
+from toolkit.prediction.features import ahead, encode
 from toolkit.prediction.network import TransitionNetwork, load_network, network_path
 from toolkit.robot.model import RobotModel
+from toolkit.world.world import Goal
 
 SLIDING = "sliding"
 """Folder, within that of the networks, of those for ground that holds no resting foot.
@@ -61,11 +62,13 @@ class NetworkEvaluator(TransitionEvaluator):
 
     Attributes:
         networks: Networks by category.
+        goal: Where the sequences lead.
         stand_in: Judges what is quicker or more slippery than the training; None: the networks judge this as well.
         sliding: See `TransitionEvaluator`.
     """
 
     networks: dict[Category, TransitionNetwork]
+    goal: Goal
     stand_in: TransitionEvaluator | None = None
     sliding: TransitionEvaluator | None = None
 
@@ -108,7 +111,8 @@ class NetworkEvaluator(TransitionEvaluator):
             accepted = network.feasible(features)
             feasible[rows] = accepted
             if accepted.any():
-                outputs = network.predict(features[accepted]).astype(float)
+                way = ahead(frame.point(self.goal.position), self.goal.radius)
+                outputs = network.predict(features[accepted], way).astype(float)
                 kept = rows[accepted]
                 objective[kept] = outputs[:, 0]
                 end_com[kept] = frame.point_back(outputs[:, 1:4])

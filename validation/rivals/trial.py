@@ -147,7 +147,7 @@ class _Arena:
     @property
     def graph(self) -> ContactGraph:
         """The graph of the planner with its own judges."""
-        return contact_graph(self.planner, judge_of(self.robot, self.settings.planner))
+        return contact_graph(self.planner, judge_of(self.robot, self.world, self.settings.planner))
 
     @property
     def limits(self) -> Limits:
@@ -156,10 +156,10 @@ class _Arena:
         return Limits(self.seconds, 10**9 if expansions is None else expansions)
 
 
-def judge_of(robot: RobotModel, planner: str) -> TransitionEvaluator:
+def judge_of(robot: RobotModel, world: World, planner: str) -> TransitionEvaluator:
     """The judge of transitions of a kind of planner, as the pipeline makes it."""
     if planner == "learned":
-        return NetworkEvaluator(load_networks(robot), OptimiserEvaluator(robot))
+        return NetworkEvaluator(load_networks(robot), world.goal, OptimiserEvaluator(robot))
     return OptimiserEvaluator(robot) if planner == "optimiser" else KinematicEvaluator(robot)
 
 
