@@ -23,9 +23,9 @@ from validation.tables import failure_section, markdown_table, show_results, val
 from validation.trial_file import TrialFile
 
 DESCRIPTION = """\
-Random worlds whose answer is known, without a search. Half of them have a way by construction (all families of the map,
+Random worlds whose answer is known, without a search. Most of them have a way by construction (all families of the map,
 and rows of gaps, ledges, slots, ceilings, bars and beams): the planner is asked whether it can prove that nothing leads
-to the goal, and must not. The other half have an obstacle that cannot be passed: it should prove it, and soon.
+to the goal, and must not. The others have an obstacle that cannot be passed: it should prove it, and soon.
 """
 WAY, NO_WAY = "a way", "no way"
 SHARE, SECONDS = 0.8, 5.0  # of the worlds without a way that should be proven, each within so many s
@@ -77,16 +77,22 @@ def main(argv: list[str] | None = None) -> int:
     """Run the experiment; returns the exit code."""
     parser = options.plain_parser("proofs", DESCRIPTION)
     parser.add_argument(
-        "--worlds", type=cli.positive(int), default=2000, help="worlds of each half (default: %(default)s)"
+        "--worlds", type=cli.positive(int), default=2000, help="worlds with a way (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--impossible",
+        type=cli.positive(int),
+        metavar="N",
+        help="worlds without a way (default: a quarter of those with one)",
     )
     parser.epilog = options.GOAL_CODES
     args = parser.parse_args(argv)
     console, settings = make_console(), options.trial_settings(args)
-    seeds = range(args.seed_offset, args.seed_offset + args.worlds)
+    counts = {WAY: args.worlds, NO_WAY: args.impossible or -(-args.worlds // 4)}
     jobs = [
         Job(f"{kind}-{seed}", proof_trial, (settings.robot, settings.robots, seed, kind))
-        for seed in seeds
-        for kind in (WAY, NO_WAY)
+        for kind, count in counts.items()
+        for seed in range(args.seed_offset, args.seed_offset + count)
     ]
     store = TrialFile(args.out / "trials.jsonl", settings.deciding())
     records = run_jobs(jobs, store, options.pool_of(args), console, "worlds")
@@ -97,7 +103,11 @@ def main(argv: list[str] | None = None) -> int:
         sections=[("Worlds without a way", table(records)), ("Not as they should be", failure_section(records))],
         content={"trials": records},
         goals=goals_of(records),
-        settings={"robot": settings.robot, "worlds": args.worlds, "seed_offset": args.seed_offset},
+        settings={
+            "robot": settings.robot,
+            "worlds": ", ".join(f"{count} with {kind}" for kind, count in counts.items()),
+            "seed_offset": args.seed_offset,
+        },
     )
     show_results(console, path)
     return options.goal_code(goals_of(records))

@@ -40,7 +40,7 @@ def test_most_impossible_worlds_are_proven_so():
 
 def test_the_program_tells_wrong_proofs_and_shares(tmp_path):
     folders = ["--workers", "0", "--out", str(tmp_path / "out"), "--results", str(tmp_path / "results")]
-    assert proofs.main(["--worlds", "2", *folders]) == 0
+    assert proofs.main(["--worlds", "2", "--impossible", "2", *folders]) == 0
     found = result(folders, "proofs")
     assert len(found["trials"]) == 4
     assert {goal["result"] for goal in found["goals"]} == {"met"}
