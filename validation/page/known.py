@@ -34,7 +34,8 @@ def category_section() -> Section:
     header = ("index", "contacts before", "transition", "inputs, ours", "inputs, the paper")
     note = (
         "Ours has three more inputs for shift, swing and friction, so that one network serves all timings and grounds, "
-        "and writes an orientation as two axes in place of three angles, which have no place where they jump."
+        "and writes an orientation as two axes in place of three angles, which have no place where they jump. A "
+        "regressor has two more, which say where the goal lies."
     )
     content = [dict(zip(header, row, strict=True)) for row in rows]
     return Section("Contact transition categories", f"{markdown_table(header, rows)}\n\n{note}", [], content)
