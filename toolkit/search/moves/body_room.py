@@ -15,7 +15,8 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.moves.foot_collision import FootCollision
 from toolkit.search.moves.legs import Legs, legs_of, reach
 from toolkit.search.moves.limits import drops, margins
-from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
+from toolkit.search.moves.obstacles import world_triangles
+from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free, edge_of
 from toolkit.search.moves.shanks import Shanks, leg_free, shanks_of
 from toolkit.world.world import World
 
@@ -66,8 +67,9 @@ class BodyRoom:
             float(drops(robot)[-1]),
             robot.scale.length,
         )
-        self._occupancy: Occupancy | None = None
-        self._bounds = np.zeros((2, 3))  # of the occupancy
+        self._occupancy: Occupancy | None = None  # made when the first triangle is at the height of the body
+        self._bounds: np.ndarray | None = None  # (2, 3) m; of the occupancy
+        self._heights = np.zeros((0, 2))  # m; lowest and highest point of each triangle within these bounds
 
     def sink(self, stance: Stance) -> float:
         """See `Surroundings`."""
@@ -121,12 +123,19 @@ class BodyRoom:
         box, scale = self._walker.box, self._walker.scale
         around = scale * _AROUND
         low, high = places.min(0) + [-around, -around, box.bottom], places.max(0) + [around, around, box.top]
+        model, bounds = self._world.mujoco_model, self._bounds
+        if bounds is None or (low < bounds[0]).any() or (high > bounds[1]).any():
+            if bounds is not None:
+                low, high = np.minimum(low, bounds[0]), np.maximum(high, bounds[1])
+            bounds = self._bounds = np.stack([low - around, high + around])
+            heights = world_triangles(model, *bounds)[:, :, 2]
+            self._heights, self._occupancy = np.column_stack([heights.min(1), heights.max(1)]), None
+        edge = edge_of(bounds[0], bounds[1], scale * _CELL)
+        if not ((self._heights[:, 1] >= low[2] - edge) & (self._heights[:, 0] <= high[2] + edge)).any():
+            return None
+        if self._occupancy is None:
+            self._occupancy = Occupancy.of(model, *bounds, cell=scale * _CELL)
         occupancy = self._occupancy
-        if occupancy is None or (low < self._bounds[0]).any() or (high > self._bounds[1]).any():
-            if occupancy is not None:
-                low, high = np.minimum(low, self._bounds[0]), np.maximum(high, self._bounds[1])
-            self._bounds = np.stack([low - around, high + around])
-            occupancy = self._occupancy = Occupancy.of(self._world.mujoco_model, *self._bounds, cell=scale * _CELL)
         first, last = (np.floor((end - occupancy.corner) / occupancy.cell).astype(int) for end in (low, high))
         near = occupancy.below[first[0] : last[0] + 1, first[1] : last[1] + 1]
         return occupancy if (near[:, :, last[2] + 1] > near[:, :, first[2]]).any() else None

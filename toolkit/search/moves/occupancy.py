@@ -84,6 +84,11 @@ def _shoulders(robot: RobotModel, data: mujoco.MjData) -> float:
     return width
 
 
+def edge_of(lower: np.ndarray, upper: np.ndarray, cell: float) -> float:
+    """Edge of the cells in m between two corners (3,) m: `cell`, or more where these would be too many."""
+    return max(cell, float((np.maximum(upper - lower, 0.0).prod() / _MAX_CELLS) ** (1 / 3)))
+
+
 class Occupancy(NamedTuple):
     """Occupied cells of a box of the world.
 
@@ -100,8 +105,7 @@ class Occupancy(NamedTuple):
     @classmethod
     def of(cls, model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray, cell: float = 0.05) -> Occupancy:
         """Occupancy of the box between two corners (3,) m; every cell that a triangle touches counts."""
-        extent = np.maximum(upper - lower, 0.0)
-        cell = max(cell, float((extent.prod() / _MAX_CELLS) ** (1 / 3)))
+        extent, cell = np.maximum(upper - lower, 0.0), edge_of(lower, upper, cell)
         shape = np.ceil(extent / cell).astype(np.int64) + 1
         triangles = world_triangles(model, lower, upper)
         occupied = np.zeros(tuple(shape), np.bool_)
