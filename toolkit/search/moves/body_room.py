@@ -125,9 +125,8 @@ class BodyRoom:
         low, high = places.min(0) + [-around, -around, box.bottom], places.max(0) + [around, around, box.top]
         model, bounds = self._world.mujoco_model, self._bounds
         if bounds is None or (low < bounds[0]).any() or (high > bounds[1]).any():
-            if bounds is not None:
-                low, high = np.minimum(low, bounds[0]), np.maximum(high, bounds[1])
-            bounds = self._bounds = np.stack([low - around, high + around])
+            wide = (low, high) if bounds is None else (np.minimum(low, bounds[0]), np.maximum(high, bounds[1]))
+            bounds = self._bounds = np.stack([wide[0] - around, wide[1] + around])
             heights = world_triangles(model, *bounds)[:, :, 2]
             self._heights, self._occupancy = np.column_stack([heights.min(1), heights.max(1)]), None
         edge = edge_of(bounds[0], bounds[1], scale * _CELL)
