@@ -69,7 +69,7 @@ class BodyRoom:
         )
         self._occupancy: Occupancy | None = None  # made when the first triangle is at the height of the body
         self._bounds: np.ndarray | None = None  # (2, 3) m; of the occupancy
-        self._heights = np.zeros((0, 2))  # m; lowest and highest point of each triangle within these bounds
+        self._triangles = np.zeros((0, 3, 3))  # m; of the world within these bounds
 
     def sink(self, stance: Stance) -> float:
         """See `Surroundings`."""
@@ -123,17 +123,16 @@ class BodyRoom:
         box, scale = self._walker.box, self._walker.scale
         around = scale * _AROUND
         low, high = places.min(0) + [-around, -around, box.bottom], places.max(0) + [around, around, box.top]
-        model, bounds = self._world.mujoco_model, self._bounds
+        bounds = self._bounds
         if bounds is None or (low < bounds[0]).any() or (high > bounds[1]).any():
             wide = (low, high) if bounds is None else (np.minimum(low, bounds[0]), np.maximum(high, bounds[1]))
             bounds = self._bounds = np.stack([wide[0] - around, wide[1] + around])
-            heights = world_triangles(model, *bounds)[:, :, 2]
-            self._heights, self._occupancy = np.column_stack([heights.min(1), heights.max(1)]), None
-        edge = edge_of(bounds[0], bounds[1], scale * _CELL)
-        if not ((self._heights[:, 1] >= low[2] - edge) & (self._heights[:, 0] <= high[2] + edge)).any():
+            self._triangles, self._occupancy = world_triangles(self._world.mujoco_model, *bounds), None
+        edge, heights = edge_of(bounds[0], bounds[1], scale * _CELL), self._triangles[:, :, 2]
+        if not ((heights.max(1) >= low[2] - edge) & (heights.min(1) <= high[2] + edge)).any():
             return None
         if self._occupancy is None:
-            self._occupancy = Occupancy.of(model, *bounds, cell=scale * _CELL)
+            self._occupancy = Occupancy.by(self._triangles, bounds[0], bounds[1], scale * _CELL)
         occupancy = self._occupancy
         first, last = (np.floor((end - occupancy.corner) / occupancy.cell).astype(int) for end in (low, high))
         near = occupancy.below[first[0] : last[0] + 1, first[1] : last[1] + 1]

@@ -104,10 +104,14 @@ class Occupancy(NamedTuple):
 
     @classmethod
     def of(cls, model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray, cell: float = 0.05) -> Occupancy:
-        """Occupancy of the box between two corners (3,) m; every cell that a triangle touches counts."""
+        """Occupancy of the box between two corners (3,) m of a world."""
+        return cls.by(world_triangles(model, lower, upper), lower, upper, cell)
+
+    @classmethod
+    def by(cls, triangles: np.ndarray, lower: np.ndarray, upper: np.ndarray, cell: float) -> Occupancy:
+        """Occupancy of the box between two corners (3,) m; every cell that a triangle (t, 3, 3) touches counts."""
         extent, cell = np.maximum(upper - lower, 0.0), edge_of(lower, upper, cell)
         shape = np.ceil(extent / cell).astype(np.int64) + 1
-        triangles = world_triangles(model, lower, upper)
         occupied = np.zeros(tuple(shape), np.bool_)
         scratch = np.empty((3, 12, 3))
         _rasterise(np.ascontiguousarray((triangles - lower) / cell), occupied, *scratch)
