@@ -18,7 +18,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.moves.body_room import BodyRoom
 from toolkit.search.moves.limits import drops
-from toolkit.search.moves.occupancy import BodyBox
+from toolkit.search.moves.occupancy import BodyBox, body_free
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.world.timing import Timing
@@ -97,6 +97,31 @@ def test_the_way_knows_that_a_door_narrower_than_the_shoulders_is_passed_sideway
         distance = planner.ground.way(planner.ground.start_stance()).distance
         ahead, sideways = (at(distance, 0.8, 0.0, yaw=yaw) for yaw in (0.0, np.pi / 2))
         assert (ahead > sideways + 0.15) != forward
+
+
+@pytest.mark.parametrize("turn", [0.0, 20.0, 50.0])
+def test_the_way_leads_straight_through_a_door_just_where_the_screens_let_the_body_through(robot, turn):
+    """The grid has no other opinion of the body than the screens, wherever their cells lie."""
+    shoulders, yaw = 2 * BodyBox.of(robot).half_width, np.radians(turn)
+    ahead, aside = np.array([np.cos(yaw), np.sin(yaw), 0.0]), np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+    floor = box(0.6 * ahead - [0, 0, 0.05], [1.5, 1.0, 0.05], [0, 0, turn])
+    seen = []
+    for width in shoulders + np.array([-0.06, -0.03, -0.01, 0.02, 0.1]):
+        walls = (0.95 * ahead + side * (width / 2 + 3.0) * aside + [0, 0, 1.0] for side in (-1, 1))
+        door = [box(centre, [0.05, 3.0, 1.0], [0, 0, turn]) for centre in walls]
+        world = make_world(floor, *door, goal=1.8 * ahead, heading=turn)
+        distances = terrain(robot, world)
+        distance = distances.distance(world.start, 0.4, narrow=True)
+        assert distance is not None
+        fits = any(
+            body_free(distances.occupancy, distances.box, *(0.95 * ahead + shift * aside), yaw + heading)
+            for shift in np.linspace(-0.05, 0.05, 21)
+            for heading in np.radians(np.linspace(-4.0, 4.0, 5))
+        )
+        forward, sideways = (at(distance, *(0.7 * ahead), yaw=yaw + heading) for heading in (0.0, np.pi / 2))
+        assert (forward < sideways) == fits
+        seen.append(fits)
+    assert any(seen) and not all(seen)
 
 
 def test_a_body_does_not_pass_through_a_wall_between_two_stances(robot):

@@ -71,6 +71,22 @@ def spread(levels, disc, merge, result):
                         add_level(result[a, b], z, merge)
 
 
+@compiled
+def _least_drop_near(occupancy, body, x, y, z, yaw):
+    """Number of the least of the drops with which the body fits at a node or at one of the places around; -1: none."""
+    least = lowest_drop(occupancy, body.box, body.drops, x, y, z, yaw)
+    if least == 0 or lowest_drop(occupancy, body.core, body.drops, x, y, z, yaw) < 0:
+        return least
+    for k in range(len(body.places)):
+        dx, dy, turn = body.places[k]
+        drop = lowest_drop(occupancy, body.box, body.drops, x + dx, y + dy, z, yaw + turn)
+        if drop == 0:
+            return 0
+        if drop > 0 and (least < 0 or drop < least):
+            least = drop
+    return least
+
+
 @compiled(kept=True)
 def number_nodes(levels, corner, cell, occupancy, body, nodes, low):
     """Number the cells in which the body fits, in nodes (nx, ny, 4, yaws), and return their number.
@@ -87,7 +103,7 @@ def number_nodes(levels, corner, cell, occupancy, body, nodes, low):
                     break
                 x, y = corner[0] + a * cell, corner[1] + b * cell
                 for k in range(yaws):
-                    drop = lowest_drop(occupancy, body.box, body.drops, x, y, z, k * np.pi / yaws)
+                    drop = _least_drop_near(occupancy, body, x, y, z, k * np.pi / yaws)
                     if drop >= 0:
                         nodes[a, b, m, k] = count
                         low[a, b, m, k] = drop > 0

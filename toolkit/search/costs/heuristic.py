@@ -55,6 +55,8 @@ class GridBody(NamedTuple):
 
     Attributes:
         box: The body, standing straight.
+        core: A part of it; where this does not fit at a node, the places around it are not tried.
+        places: (n, 3) m, m, rad; places around each node. One where the body fits is enough.
         drops: (k,) m; rising heights by which the CoM may be lower.
         turn: Cost in m of one layer of yaw.
         sideways: Length that is added to a m of way across the heading.
@@ -62,6 +64,8 @@ class GridBody(NamedTuple):
     """
 
     box: BodyBox
+    core: BodyBox
+    places: np.ndarray
     drops: np.ndarray
     turn: float
     sideways: float

@@ -27,10 +27,10 @@ _USED = 0.9  # part of the friction that motions use where feet slide; the rest 
 _TURN = 1e-4  # m; cost of one layer of yaw, only there to prefer straight ways
 _WIDE, _CELL = Mesh(cell=0.1, yaws=8), 0.05  # and the edge in m of the cells that a body may hit
 # Where no way is wide enough for these: narrow places that bodies pass sideways. A quarter turn takes about six steps,
-# and steps to the side lead half as far as others. Cells count as occupied that are only touched, so the body loses
-# what that adds.
+# and steps to the side lead half as far as others. The places where a body fits may lie between those of the grid, so
+# it is tried at several around each: thirds of a cell and of a layer of yaw, where the body fits but for `_BETWEEN`.
 _NARROW, _FINE = Mesh(cell=0.05, yaws=24), 0.025
-_QUARTER, _SIDEWAYS, _TOUCHED = 1.0, 1.0, 0.04  # m of a quarter turn, m added to a m of way to the side, m
+_QUARTER, _SIDEWAYS, _BETWEEN = 1.0, 1.0, 0.04  # m of a quarter turn, m added to a m of way to the side, m
 
 
 def resting_surfaces(surfaces: Sequence[Surface], friction: float | None) -> tuple[Surface, ...]:
@@ -107,14 +107,17 @@ class TerrainDistance:
         return None
 
     def _grid(self, occupancy: Occupancy, stride: float) -> GridDistance:
-        body = GridBody(self.box, self._drops, self._scale * _TURN, 0.0, _BENT)
+        body = GridBody(self.box, self.box, np.zeros((0, 3)), self._drops, self._scale * _TURN, 0.0, _BENT)
         return self._distance(occupancy, body, _WIDE.scaled(self._scale), stride)
 
     def _narrow(self, stride: float) -> GridDistance:
-        depth, width = (half - self._scale * _TOUCHED for half in (self.box.half_depth, self.box.half_width))
-        box = self.box._replace(half_depth=depth, half_width=width)
-        body = GridBody(box, self._drops, self._scale * 2 * _QUARTER / _NARROW.yaws, _SIDEWAYS, _BENT)
-        return self._distance(self.occupancy, body, _NARROW.scaled(self._scale), stride)
+        depth, width = (half - self._scale * _BETWEEN for half in (self.box.half_depth, self.box.half_width))
+        core, mesh = self.box._replace(half_depth=depth, half_width=width), _NARROW.scaled(self._scale)
+        thirds = [np.array([0.0, -1.0, 1.0]) * step / 3 for step in (mesh.cell, mesh.cell, np.pi / mesh.yaws)]
+        places = np.stack(np.meshgrid(*thirds, indexing="ij"), axis=-1).reshape(-1, 3)[1:]  # the first is the node
+        turn = self._scale * 2 * _QUARTER / mesh.yaws
+        body = GridBody(self.box, core, places, self._drops, turn, _SIDEWAYS, _BENT)
+        return self._distance(self.occupancy, body, mesh, stride)
 
     def _distance(self, occupancy: Occupancy, body: GridBody, mesh: Mesh, stride: float) -> GridDistance:
         bounds, goal = self._bounds[self._detour], self._world.goal
