@@ -1,5 +1,6 @@
 """The pipeline's order of things: what is optimised, which sequence is chosen, and what is searched again."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,7 +32,7 @@ def solution(name, *limbs, start=(), seconds=0.0):
         return SimpleNamespace(name=f"{name} at {timing.swing:g}" + ("" if only is None else f" in {only}"))
 
     sequence.timed = timed
-    return SimpleNamespace(name=name, sequence=sequence, seconds=seconds)
+    return SimpleNamespace(name=name, sequence=sequence, seconds=seconds, plan=None)
 
 
 class Planner:
@@ -91,7 +92,7 @@ class Run:
             def __init__(self, *parts):
                 pass
 
-            def optimise(self, sequence):
+            def optimise(self, sequence, known=None):
                 optimised.append(sequence.name)
                 failure = Failure("no motion", since, 0) if cost.get(sequence.name, 0.0) == np.inf else None
                 return SimpleNamespace(name=sequence.name, sequence=sequence), failure
@@ -403,6 +404,25 @@ def test_what_touches_or_slips_in_execution_is_tried_once_more_in_another_manner
     monkeypatch.setattr(trial, "whole_body", whole_body)
     monkeypatch.setattr(trial, "execute", execute)
     monkeypatch.setattr(trial.Tester, "_scene", None)
-    tester = trial.Tester(None, None, pipeline.PipelineConfig(), pipeline.Observer())  # pyright: ignore
+    robot = SimpleNamespace(scale=USUAL)
+    tester = trial.Tester(robot, None, pipeline.PipelineConfig(), pipeline.Observer())  # pyright: ignore
     tested = tester.test(SimpleNamespace(plan=None, failure=None))  # pyright: ignore
     assert manners == [Manner(), *again] and tested.passed == bool(again)
+
+
+def test_a_motion_of_the_search_is_made_once_more_only_for_other_settings(monkeypatch):
+    """It counts as the plan where a run would make the same one."""
+    made = []
+
+    def plan_motion(robot, world, sequence, config, surroundings):
+        made.append(config)
+        return SimpleNamespace(config=config, motion=SimpleNamespace(feasible=True))
+
+    monkeypatch.setattr(trial, "plan_motion", plan_motion)
+    monkeypatch.setattr(trial.Tester, "_surroundings", None)
+    robot, config = SimpleNamespace(scale=USUAL), pipeline.PipelineConfig()
+    tester = trial.Tester(robot, None, config, pipeline.Observer())  # pyright: ignore
+    known, _ = tester.optimise(solution("any").sequence)
+    other = trial.Tester(robot, None, replace(config, landing=None), pipeline.Observer())  # pyright: ignore
+    assert tester.optimise(solution("any").sequence, known)[0] is known and len(made) == 1
+    assert other.optimise(solution("any").sequence, known)[0] is not known and made[1].landing is None

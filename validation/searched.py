@@ -140,7 +140,7 @@ def search(settings: TrialSettings, world: World, kind: str, seed: Sequence[int]
     screen = result.screen
     assert screen is not None
     for solution in result.solutions:
-        outcome = truth(solution.sequence)
+        outcome = truth(solution.sequence, solution.plan)
         spent += outcome.seconds
         processor += outcome.processor_seconds
         found = solution.seconds

@@ -90,11 +90,11 @@ class Truth:
         self.cost = config.cost.on_ground(slides=slides(robot, world))
         self._known: dict[bytes, Outcome] = {}
 
-    def __call__(self, sequence: ContactSequence) -> Outcome:
-        """The outcome of a sequence."""
+    def __call__(self, sequence: ContactSequence, plan: MotionPlan | None = None) -> Outcome:
+        """The outcome of a sequence, of which a search may have made the plan already."""
         key = sequence.identity
         if key not in self._known:
-            self._known[key] = self._optimised(sequence)
+            self._known[key] = self._timed(lambda: self._tester.optimise(sequence, plan)[0])
         return self._known[key]
 
     def improved(self, plan: MotionPlan, origin: ContactSequence, screen: SequenceScreen, motions: int) -> Outcome:
@@ -109,9 +109,6 @@ class Truth:
         config = RefineConfig(optimisations=motions)
         local = LocalSearch(config, self.cost, lambda sequence: self._tester.optimise(sequence)[0], self._tester.slide)
         return self._timed(lambda: local.improved(plan, origin, screen, lambda sequence: True))
-
-    def _optimised(self, sequence: ContactSequence) -> Outcome:
-        return self._timed(lambda: self._tester.optimise(sequence)[0])
 
     def _timed(self, make: Callable[[], MotionPlan]) -> Outcome:
         """The plan that is made, its price, and how long making it took."""

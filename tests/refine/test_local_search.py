@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from toolkit.centroidal.plan import keeps_margins, plan_motion, slid
+from toolkit.centroidal.plan import MotionConfig, keeps_margins, plan_motion, slid
 from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.sequence import SequenceConfig
 from toolkit.refine.foresight import Foresight, travel
@@ -25,8 +25,8 @@ class Workshop:
 
     def optimise(self, sequence):
         self.sequences.append(sequence)
-        rests = {"initial_rest": 0.4, "final_rest": 0.6}
-        return plan_motion(self._walk.robot, self._walk.world, sequence, **rests, landing=None, config=SequenceConfig())
+        config = MotionConfig(initial_rest=0.4, final_rest=0.6)
+        return plan_motion(self._walk.robot, self._walk.world, sequence, config)
 
     def slide(self, plan, landing, share):
         self.slides.append(share.copy())

@@ -16,9 +16,10 @@ from toolkit.pipeline.config import PipelineConfig
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import AnaStarConfig
+from toolkit.search.moves import body_room
 from toolkit.search.moves.body_room import BodyRoom
 from toolkit.search.moves.limits import drops
-from toolkit.search.moves.occupancy import BodyBox, body_free
+from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.world.timing import Timing
@@ -159,6 +160,26 @@ def test_open_ground_and_far_walls_leave_all_room(robot):
     problem = walk_problem(robot, 0.0)
     for geoms in ([FLOOR], [FLOOR, box([0.3, 1.2, 1], [3, 0.05, 1]), box([0.3, -1.2, 1], [3, 0.05, 1])]):
         assert BodyRoom(robot, make_world(*geoms, goal=(5, 0, 0))).room(problem) is None
+
+
+def test_cells_are_made_where_something_is_at_the_height_of_the_body_and_once_for_the_whole_way(robot, monkeypatch):
+    made = []
+
+    class Counted(Occupancy):
+        @classmethod
+        def by(cls, *args):
+            made.append(args)
+            return Occupancy.by(*args)
+
+    monkeypatch.setattr(body_room, "Occupancy", Counted)
+    tile, far = box([1, 0, 0.05], [0.3, 1, 0.05]), box([2, 4, 1], [1, 0.1, 1])
+    for geoms, count in (([FLOOR, tile, far], 0), ([FLOOR, *slot(0.9, 1.0, 2.0)], 1)):
+        made.clear()
+        room = BodyRoom(robot, make_world(*geoms, goal=(5, 0, 0)))
+        for x in np.linspace(0.0, 5.0, 6):
+            room.sink(standing(robot, x))
+            room.room(walk_problem(robot, x))
+        assert len(made) == count
 
 
 def test_a_ceiling_lowers_the_com_where_it_is(robot):

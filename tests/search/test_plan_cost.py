@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.search.worlds import FLOOR, corridor, make_world
-from toolkit.centroidal.plan import plan_motion
+from toolkit.centroidal.plan import MotionConfig, plan_motion
 from toolkit.centroidal.problem import Weights
 from toolkit.centroidal.residual import check, objective
-from toolkit.centroidal.sequence import CALM, SequenceConfig
+from toolkit.centroidal.sequence import CALM
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.pipeline.planner import make_planner
 from toolkit.prediction.kinematic import KinematicEvaluator
@@ -40,8 +40,8 @@ def world():
 def plan(robot, world):
     """A short walk with its optimised motion."""
     solution = searched(robot, world, PlannerConfig(search=QUICK))[-1]
-    rests = {"initial_rest": 0.4, "final_rest": 1.0}
-    return plan_motion(robot, world, solution.sequence, **rests, landing=None, config=SequenceConfig())
+    config = MotionConfig(initial_rest=0.4, final_rest=1.0)
+    return plan_motion(robot, world, solution.sequence, config)
 
 
 @pytest.mark.parametrize("timings", [(), (FAST, SLOW)])

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -232,11 +234,18 @@ def test_timing_is_chosen(robot):
 def test_the_motion_of_the_whole_sequence_has_the_last_word(robot):
     world, base = make_world(FLOOR, goal=(0.6, 0, 0)), KinematicEvaluator(robot)
     plain = ContactPlanner(robot, world, base, QUICK).search(np.random.default_rng(0), 9.0)
-    refuse = ContactPlanner(robot, world, base, QUICK, lambda sequence: Failure("no"))
-    never = refuse.search(np.random.default_rng(0), 9.0)
-    costly = ContactPlanner(robot, world, base, QUICK, lambda sequence: 500.0).search(np.random.default_rng(0), 9.0)
-    assert plain.solutions and not never.solutions
-    found = costly.solutions[0]
+
+    def searched(feasible):
+        """With motions that are all the same; and the motion."""
+        motion = SimpleNamespace(feasible=feasible, objective=500.0, failure=None if feasible else Failure("no"))
+        plan = SimpleNamespace(motion=motion)
+        planner = ContactPlanner(robot, world, base, QUICK, lambda sequence: plan)
+        return planner.search(np.random.default_rng(0), 9.0).solutions, plan
+
+    solutions, plan = searched(feasible=True)
+    assert plain.solutions and not searched(feasible=False)[0]
+    assert plain.solutions[0].plan is None and all(solution.plan is plan for solution in solutions)
+    found = solutions[0]
     known = found.predicted - QUICK.cost.dynamics * found.objective.sum()
     assert found.cost == pytest.approx(known + 50.0) and known > 0.0
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.search.worlds import corridor
-from toolkit.centroidal.plan import MotionPlan, plan_motion
-from toolkit.centroidal.sequence import SequenceConfig
+from toolkit.centroidal.plan import MotionConfig, MotionPlan, plan_motion
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
@@ -97,8 +96,8 @@ def test_limbs_must_reach_in_the_motion(robot, found):
     sequence = ContactSequence(
         search.solutions[-1].sequence.start, search.solutions[-1].sequence.transitions[:3]
     )  # a short motion is enough
-    rests = {"initial_rest": 0.4, "final_rest": 1.0}
-    plan = plan_motion(robot, corridor(2), sequence, **rests, landing=None, config=SequenceConfig())
+    config = MotionConfig(initial_rest=0.4, final_rest=1.0)
+    plan = plan_motion(robot, corridor(2), sequence, config)
     assert plan.motion.feasible and search.screen is not None
     assert not search.screen.reach_codes(plan).any()
     raised = replace(plan.motion, com=plan.motion.com + [0.0, 0.0, 0.3])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,6 +20,22 @@ FRICTION_ROUNDING = 0.01  # smaller differences of the friction factor do not de
 
 
 @dataclass(frozen=True)
+class MotionConfig:
+    """Settings of the motion of a contact sequence from rest to rest.
+
+    Attributes:
+        initial_rest, final_rest: s at rest before the first transition and after the last one.
+        landing: How far feet may land from where the sequence has them; None for not at all.
+        optimiser: Settings of the optimiser.
+    """
+
+    initial_rest: float
+    final_rest: float
+    landing: RoomConfig | None = None
+    optimiser: SequenceConfig = field(default_factory=SequenceConfig)
+
+
+@dataclass(frozen=True)
 class MotionPlan:
     """Contacts and centroidal motion of a robot in a world.
 
@@ -29,6 +45,7 @@ class MotionPlan:
         sequence: The contacts, as in the motion.
         schedule: The times of the contacts.
         motion: The motion of CoM, momentum and contact forces, with its verdict.
+        config: The settings with which `plan_motion` made it; None where something else did.
     """
 
     robot: RobotModel
@@ -36,17 +53,14 @@ class MotionPlan:
     sequence: ContactSequence
     schedule: ContactSchedule
     motion: CentroidalMotion
+    config: MotionConfig | None = field(default=None, kw_only=True)
 
 
 def plan_motion(
     robot: RobotModel,
     world: World,
     sequence: ContactSequence,
-    *,
-    initial_rest: float,
-    final_rest: float,
-    landing: RoomConfig | None,
-    config: SequenceConfig,
+    config: MotionConfig,
     surroundings: Surroundings | None = None,
 ) -> MotionPlan:
     """Optimise the motion of a contact sequence from rest to rest.
@@ -58,27 +72,25 @@ def plan_motion(
         robot: The robot.
         world: The world, for the surfaces and the goal.
         sequence: The contacts, as the search proposes them.
-        initial_rest: s at rest before the first transition.
-        final_rest: s at rest after the last transition.
-        landing: How far feet may land from where the sequence has them; None for not at all.
-        config: Settings of the optimiser.
+        config: Settings.
         surroundings: What limits where the body may be; None: nothing does.
 
     Returns:
         The plan; `motion.feasible` says whether there is a motion.
     """
-    schedule = ContactSchedule.of(sequence, initial_rest=initial_rest, final_rest=final_rest)
+    landing, optimiser = config.landing, config.optimiser
+    schedule = ContactSchedule.of(sequence, initial_rest=config.initial_rest, final_rest=config.final_rest)
     com, rest = initial_com(robot, sequence.start), np.zeros(3)
     if surroundings is not None:
         com[2] -= surroundings.sink(sequence.start)
-    motion = optimise(robot, schedule, com, rest, config=config, surroundings=surroundings)
-    plan = MotionPlan(robot, world, sequence, schedule, motion)
+    motion = optimise(robot, schedule, com, rest, config=optimiser, surroundings=surroundings)
+    plan = MotionPlan(robot, world, sequence, schedule, motion, config=config)
     if landing is None or (motion.feasible and motion.kept is None):
         return plan
-    moved = slid(plan, landing, config, surroundings=surroundings)
+    moved = slid(plan, landing, optimiser, surroundings=surroundings)
     if moved is None or not moved.motion.feasible or (motion.feasible and not keeps_margins(moved, plan)):
         return plan
-    return moved
+    return replace(moved, config=config)
 
 
 def slid(

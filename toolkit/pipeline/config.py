@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from toolkit.centroidal.plan import MotionConfig
 from toolkit.centroidal.sequence import SequenceConfig
 from toolkit.contacts.room import RoomConfig
 from toolkit.execution.config import ExecutionConfig
@@ -50,3 +51,7 @@ class PipelineConfig:
     def rests(self, scale: Scale) -> dict[str, float]:
         """Seconds of a robot of some size at rest: `initial_rest` and `final_rest` by name."""
         return {"initial_rest": scale.time * self.initial_rest, "final_rest": scale.time * self.final_rest}
+
+    def motions(self, scale: Scale) -> MotionConfig:
+        """Settings of the motions of a robot of some size."""
+        return MotionConfig(**self.rests(scale), landing=self.landing, optimiser=self.sequence)

@@ -308,7 +308,7 @@ class _Run:
 
     def _candidate(self, solution: Solution, source: Source) -> Candidate:
         """A sequence of the last search, optimised."""
-        plan, failure = self._tester.optimise(solution.sequence)
+        plan, failure = self._tester.optimise(solution.sequence, solution.plan)
         if failure is not None:
             self._note(solution.sequence, failure)
         return self._entered(source, solution, plan, plan_cost(plan, self._weights), failure)

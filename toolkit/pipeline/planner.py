@@ -10,8 +10,6 @@ from typing import Protocol
 import numpy as np
 
 from toolkit.centroidal.plan import plan_motion
-from toolkit.contacts.failure import Failure
-from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import PlanningError
 from toolkit.mjcf import warnings_refused
 from toolkit.pipeline.config import PipelineConfig
@@ -73,9 +71,9 @@ def make_planner(
     optimiser = OptimiserEvaluator(robot)
     judge = _networks(robot, world, optimiser) if kind == "learned" else optimiser
     at_rest = OptimiserEvaluator(robot, final_at_rest=True)
-    return ContactPlanner(
-        robot, world, judge, config, partial(_objective, robot, world, BodyRoom(robot, world)), at_rest
-    )
+    motions, room = PipelineConfig().motions(robot.scale), BodyRoom(robot, world)  # as a run plans them by default
+    finish = partial(plan_motion, robot, world, config=motions, surroundings=room)
+    return ContactPlanner(robot, world, judge, config, finish, at_rest)
 
 
 def _networks(robot: RobotModel, world: World, stand_in: OptimiserEvaluator) -> NetworkEvaluator:
@@ -83,11 +81,3 @@ def _networks(robot: RobotModel, world: World, stand_in: OptimiserEvaluator) -> 
     folder = robot.folder / "networks" / SLIDING
     sliding = NetworkEvaluator(load_networks(robot, folder), world.goal, stand_in) if folder.is_dir() else None
     return NetworkEvaluator(load_networks(robot), world.goal, stand_in, sliding)
-
-
-def _objective(robot: RobotModel, world: World, surroundings: BodyRoom, sequence: ContactSequence) -> float | Failure:
-    """Objective of a sequence's motion as a run plans it by default, or why there is none."""
-    run = PipelineConfig()
-    settings = {"landing": run.landing, "config": run.sequence, "surroundings": surroundings}
-    motion = plan_motion(robot, world, sequence, **run.rests(robot.scale), **settings).motion
-    return motion.objective if motion.feasible else motion.failure or Failure(motion.outcome)

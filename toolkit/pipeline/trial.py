@@ -9,7 +9,7 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from toolkit.centroidal.plan import MotionPlan, keeps_margins, plan_motion, slid
+from toolkit.centroidal.plan import MotionConfig, MotionPlan, keeps_margins, plan_motion, slid
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.room import RoomConfig
 from toolkit.contacts.sequence import ContactSequence
@@ -74,6 +74,7 @@ class Tester:
     def __init__(self, robot: RobotModel, world: World, config: PipelineConfig, observer: Observer):
         """Prepare for a robot in a world; the observer is told of every stage after the optimiser."""
         self._robot, self._world, self._config, self._observer = robot, world, config, observer
+        self._motions = config.motions(robot.scale)
 
     @cached_property
     def _surroundings(self) -> BodyRoom:
@@ -85,9 +86,13 @@ class Tester:
         """Robot and world in one model, composed when the first sequence needs it."""
         return compose_scene(self._robot, self._world)
 
-    def optimise(self, sequence: ContactSequence) -> tuple[MotionPlan, Failure | None]:
-        """Optimise the motion of a sequence; also why there is none."""
-        plan = self._motion(sequence, self._config.landing)
+    def optimise(self, sequence: ContactSequence, known: MotionPlan | None = None) -> tuple[MotionPlan, Failure | None]:
+        """Optimise the motion of a sequence; also why there is none.
+
+        A `known` plan of it that was made with the settings of this run is taken as it is.
+        """
+        made = known is not None and known.config == self._motions
+        plan = known if known is not None and made else self._motion(sequence, self._motions)
         motion = plan.motion
         if motion.feasible:
             return plan, None
@@ -95,24 +100,15 @@ class Tester:
 
     def motion_of(self, sequence: ContactSequence) -> MotionPlan:
         """Optimise the motion of a sequence with its contacts where they are."""
-        return self._motion(sequence, None)
+        return self._motion(sequence, replace(self._motions, landing=None))
 
     def settled(self, plan: MotionPlan) -> MotionPlan:
         """A plan whose motion is that of its contacts where they are, so that they alone give the plan again."""
         settled = self.motion_of(plan.sequence)
         return settled if settled.motion.feasible and keeps_margins(settled, plan) else plan
 
-    def _motion(self, sequence: ContactSequence, landing: RoomConfig | None) -> MotionPlan:
-        config = self._config
-        return plan_motion(
-            self._robot,
-            self._world,
-            sequence,
-            **config.rests(self._robot.scale),
-            landing=landing,
-            config=config.sequence,
-            surroundings=self._surroundings,
-        )
+    def _motion(self, sequence: ContactSequence, config: MotionConfig) -> MotionPlan:
+        return plan_motion(self._robot, self._world, sequence, config, self._surroundings)
 
     def slide(self, plan: MotionPlan, landing: RoomConfig, share: np.ndarray) -> MotionPlan | None:
         """Move the landing points of a plan; see `toolkit.centroidal.plan.slid`."""

@@ -6,9 +6,9 @@ So the cost of a solution is the true one, and a search goes on until it finds w
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
-from toolkit.contacts.failure import Failure
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.search.anytime.graph import Edge, Fault
@@ -22,8 +22,20 @@ from toolkit.search.states.state import is_pending
 _WINDOWS = (1, 3, 6)  # transitions that are optimised together, in the order in which they are tried
 _REST = 0.6  # s for a body of the usual size (`toolkit.robot.scale`), on the final stance that are optimised with them
 
-Finish = Callable[[ContactSequence], float | Failure]
-"""Objective of the motion of a whole sequence from rest to rest, or why there is no such motion."""
+Finish = Callable[[ContactSequence], MotionPlan]
+"""The motion of a whole sequence from rest to rest, with its verdict."""
+
+
+class Arrived(NamedTuple):
+    """What the last payload of a path holds beside objective and timing where its sequence was optimised.
+
+    Attributes:
+        missing: Cost that the edges predict too little.
+        plan: The sequence with its motion.
+    """
+
+    missing: float
+    plan: MotionPlan
 
 
 class Arrival:
@@ -64,16 +76,16 @@ class Arrival:
         if at is None and not self._comes_to_rest(passed, transitions):
             self._tally.rejected[Reason.DYNAMICS] += 1
             return None
-        objective = self._finish(sequence) if at is None else Failure("avoided", transition=at)
-        if isinstance(objective, Failure):
+        plan = self._finish(sequence) if at is None else None
+        if plan is None or not plan.motion.feasible:
             self._tally.rejected[Reason.DYNAMICS] += 1
-            if at is None:
-                self._blame.add(sequence, objective.transition)
-            at = objective.transition
+            if plan is not None:
+                at = None if plan.motion.failure is None else plan.motion.failure.transition
+                self._blame.add(sequence, at)
             return None if at is None or at + 1 >= len(passed) else Fault(list(states).index(passed[at + 1]))
         predicted = sum(payload[0] for payload in judged) + edge.payload[0]
-        missing = self._cost.dynamics * (objective - predicted)
-        return edge._replace(cost=edge.cost + missing, payload=(*edge.payload, missing))
+        missing = self._cost.dynamics * (plan.motion.objective - predicted)
+        return edge._replace(cost=edge.cost + missing, payload=(*edge.payload, Arrived(missing, plan)))
 
     def _comes_to_rest(self, passed: list[bytes], transitions: list) -> bool:
         """Whether the last transition, or the last few of them together, end at rest."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.search.anytime.graph import Path
 from toolkit.search.moves.reasons import Reason
@@ -28,6 +29,7 @@ class Solution:
         com_velocity: Same shape, m/s; predicted velocity of the CoM.
         objective: (len(transitions),) predicted dynamics objective of each transition; NaN where none is predicted.
         predicted: Sum of the edge costs as the search predicted them; NaN where no search has.
+        plan: The sequence with its motion; None where the search has not optimised it.
     """
 
     sequence: ContactSequence
@@ -38,6 +40,7 @@ class Solution:
     com_velocity: np.ndarray
     objective: np.ndarray
     predicted: float = np.nan
+    plan: MotionPlan | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, reader: StateReader, path: Path[bytes]) -> Solution:
@@ -46,7 +49,7 @@ class Solution:
         payloads = [payload for payload in path.payloads if payload is not None]
         rows = unpack(states)
         transitions = tuple(reader.transition(*step) for step in zip(states[1:], payloads, strict=True))
-        corrections = sum(sum(payload[2:]) for payload in payloads)
+        arrived = next((each for payload in payloads[-1:] for each in payload[2:]), None)
         com, velocity = reader.motion(rows)
         return cls(
             sequence=ContactSequence(reader.stance(rows[0, CONTACTS]), transitions),
@@ -56,7 +59,8 @@ class Solution:
             com=com,
             com_velocity=velocity,
             objective=np.array([payload[0] for payload in payloads]),
-            predicted=path.cost - corrections,
+            predicted=path.cost - (0.0 if arrived is None else arrived.missing),
+            plan=None if arrived is None else arrived.plan,
         )
 
 

@@ -23,6 +23,7 @@ from toolkit.world.world import World
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _CELL = 0.025  # m; edge of the cells
 _AROUND = 1.0  # m around the feet that are looked at
+_SLACK = np.array([1.0, 1.0, 0.3])  # m; the cells that are made reach farther by this than what is looked at
 _AHEAD, _ASIDE = 0.12, 0.05  # m; the CoM may be so far from the middle of the feet when it meets a ceiling
 _FAR, _STEP = 0.12, 0.01  # m; walls farther away do not matter; spacing of tries
 _LEAST, _SWAY = 0.015, 0.05  # m; room that is left along the heading and across it, where walking needs more
@@ -67,9 +68,10 @@ class BodyRoom:
             float(drops(robot)[-1]),
             robot.scale.length,
         )
-        self._occupancy: Occupancy | None = None  # made when the first triangle is at the height of the body
-        self._bounds: np.ndarray | None = None  # (2, 3) m; of the occupancy
+        self._occupancy: Occupancy | None = None  # made when the first triangle is where the body is
+        self._bounds = np.stack([np.full(3, np.inf), np.full(3, -np.inf)])  # m; of the occupancy
         self._triangles = np.zeros((0, 3, 3))  # m; of the world within these bounds
+        self._corners = np.zeros((2, 0, 3))  # m; of the boxes around them
 
     def sink(self, stance: Stance) -> float:
         """See `Surroundings`."""
@@ -119,24 +121,36 @@ class BodyRoom:
         return ComRoom(sink, np.concatenate(knots), np.concatenate(normals), np.concatenate(bounds))
 
     def _around(self, places: np.ndarray) -> Occupancy | None:
-        """Cells around places (n, 3) m; None where nothing is there at the height of the body."""
-        box, scale = self._walker.box, self._walker.scale
-        around = scale * _AROUND
-        low, high = places.min(0) + [-around, -around, box.bottom], places.max(0) + [around, around, box.top]
-        bounds = self._bounds
-        if bounds is None or (low < bounds[0]).any() or (high > bounds[1]).any():
-            wide = (low, high) if bounds is None else (np.minimum(low, bounds[0]), np.maximum(high, bounds[1]))
-            bounds = self._bounds = np.stack([wide[0] - around, wide[1] + around])
-            self._triangles, self._occupancy = world_triangles(self._world.mujoco_model, *bounds), None
-        edge, heights = edge_of(bounds[0], bounds[1], scale * _CELL), self._triangles[:, :, 2]
-        if not ((heights.max(1) >= low[2] - edge) & (heights.min(1) <= high[2] + edge)).any():
+        """Cells around places (n, 3) m; None where nothing is there at the height of the body.
+
+        The cells are made once for the whole way from start to goal, and again where a robot leaves them.
+        """
+        low, high = self._reached(places)
+        if (low < self._bounds[0]).any() or (high > self._bounds[1]).any():
+            world, slack = self._world, self._walker.scale * _SLACK
+            first, last = self._reached(np.stack([world.start.position, world.goal.position]))
+            first, last = (
+                np.minimum.reduce([low, first, self._bounds[0]]),
+                np.maximum.reduce([high, last, self._bounds[1]]),
+            )
+            self._bounds = np.stack([first - slack, last + slack])
+            self._triangles, self._occupancy = world_triangles(world.mujoco_model, *self._bounds), None
+            self._corners = np.stack([self._triangles.min(1), self._triangles.max(1)])
+        bounds, cell = self._bounds, self._walker.scale * _CELL
+        edge, corners = edge_of(bounds[0], bounds[1], cell), self._corners
+        if not ((corners[1] >= low - edge) & (corners[0] <= high + edge)).all(1).any():
             return None
         if self._occupancy is None:
-            self._occupancy = Occupancy.by(self._triangles, bounds[0], bounds[1], scale * _CELL)
+            self._occupancy = Occupancy.by(self._triangles, bounds[0], bounds[1], cell)
         occupancy = self._occupancy
         first, last = (np.floor((end - occupancy.corner) / occupancy.cell).astype(int) for end in (low, high))
         near = occupancy.below[first[0] : last[0] + 1, first[1] : last[1] + 1]
         return occupancy if (near[:, :, last[2] + 1] > near[:, :, first[2]]).any() else None
+
+    def _reached(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(3,) m each; corners of what a body may meet at places (n, 3) m."""
+        box, around = self._walker.box, self._walker.scale * _AROUND
+        return places.min(0) + [-around, -around, box.bottom], places.max(0) + [around, around, box.top]
 
 
 def _feet(problem: CentroidalProblem) -> np.ndarray:
