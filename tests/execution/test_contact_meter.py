@@ -31,7 +31,8 @@ def test_a_patch_that_should_be_free_touches_unplanned(landed):
     meter, data = landed
     meter.expected[Limb.LEFT_FOOT] = False
     meter.read(data)
-    assert meter.unplanned and meter.unplanned_time == pytest.approx(data.time)
+    assert meter.unplanned and meter.first_touch is not None
+    assert meter.first_touch.time == pytest.approx(data.time)
     assert all("floor" in world for _, world in meter.unplanned_names)
     assert meter.normal_force[Limb.LEFT_FOOT] > 0.0
 

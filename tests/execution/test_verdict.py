@@ -4,7 +4,7 @@ import pytest
 
 from toolkit.execution.check import Result
 from toolkit.execution.config import ExecutionConfig
-from toolkit.execution.contact_meter import Press
+from toolkit.execution.contact_meter import Press, Touch
 from toolkit.execution.verdict import execution_checks, failure_reason, is_too_fast
 
 GOOD = {
@@ -55,9 +55,18 @@ def test_a_good_execution_passes_every_check():
 def test_links_that_pressed_are_named_where_a_run_fails():
     press = Press("left_thigh", "right_thigh", 3.254, 91.3)
     words = "; left_thigh and right_thigh pressed on each other with 91 N at 3.25 s"
-    assert failure_reason(checked(GOOD), "", press) == ""
-    assert failure_reason(checked(GOOD), "it sank", press) == "the robot fell: it sank" + words
-    assert failure_reason(checked(GOOD | {"slip": BROKEN["slip"]}), "", press).endswith("the limit is 0.02" + words)
+    assert failure_reason(checked(GOOD), "", press=press) == ""
+    assert failure_reason(checked(GOOD), "it sank", press=press) == "the robot fell: it sank" + words
+    reason = failure_reason(checked(GOOD | {"slip": BROKEN["slip"]}), "", press=press)
+    assert reason.endswith("the limit is 0.02" + words)
+
+
+def test_what_touched_first_is_named_where_that_is_the_failure():
+    touch, broken = Touch("left_forearm", "world/wall", 7.384), {"unplanned_contacts": BROKEN["unplanned_contacts"]}
+    words = "; left_forearm touched world/wall at 7.38 s"
+    assert failure_reason(checked(GOOD | broken), "", touch).endswith("the limit is 0" + words)
+    assert "touched" not in failure_reason(checked(GOOD | {"slip": BROKEN["slip"]}), "", touch)
+    assert "touched" not in failure_reason(checked(GOOD | broken), "it sank", touch)
 
 
 def test_every_check_has_a_broken_input():

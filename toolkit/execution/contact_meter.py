@@ -27,6 +27,19 @@ class Press(NamedTuple):
     force: float
 
 
+class Touch(NamedTuple):
+    """A touch that no plan wanted.
+
+    Attributes:
+        robot, world: Names of the geoms.
+        time: s.
+    """
+
+    robot: str
+    world: str
+    time: float
+
+
 class ContactMeter:
     """Reads contact forces after a physics step; they belong to the state before it.
 
@@ -34,8 +47,8 @@ class ContactMeter:
         wrench: (4, 6) N and N m; force and moment about each patch's centre in the last step, world frame.
         normal_force: (4,) N; the part of the force along the patch's z axis.
         expected: (4,) bool; limbs whose patch may touch now. All may at first; the run sets it from the plan.
-        unplanned: The (robot geom, world geom) pairs that have touched outside the expected patches.
-        unplanned_time: Time of the first of them in s; None before.
+        unplanned: The (robot geom, world geom) pairs that have touched outside the expected patches, the first one
+            first, and when in s.
         trunk_touched: Name of a trunk geom that touched the world; "" if none did.
         friction_mismatches: Number of contacts so far whose friction was not the world geom's.
         press: The first links of the robot that pressed on each other, by more than a part of its weight. None: none
@@ -46,8 +59,7 @@ class ContactMeter:
         self._index = index
         self.wrench, self.normal_force = np.zeros((4, 6)), np.zeros(4)
         self.expected = np.ones(4, bool)
-        self.unplanned: set[tuple[int, int]] = set()
-        self.unplanned_time: float | None = None
+        self.unplanned: dict[tuple[int, int], float] = {}
         self.trunk_touched = ""
         self.friction_mismatches = 0
         self.press: Press | None = None
@@ -124,10 +136,16 @@ class ContactMeter:
 
     def _note(self, robot_geom: int, world_geom: int, time: float) -> None:
         """Keep an unplanned contact."""
-        self.unplanned.add((robot_geom, world_geom))
-        self.unplanned_time = time if self.unplanned_time is None else self.unplanned_time
+        self.unplanned.setdefault((robot_geom, world_geom), time)
         if self._index.trunk_geom[robot_geom] and not self.trunk_touched:
             self.trunk_touched = self._index.geom_name(robot_geom)
+
+    @property
+    def first_touch(self) -> Touch | None:
+        """The first unplanned contact; None where there is none."""
+        for (robot_geom, world_geom), time in self.unplanned.items():
+            return Touch(self._index.geom_name(robot_geom), self._index.geom_name(world_geom), time)
+        return None
 
     @property
     def unplanned_names(self) -> tuple[tuple[str, str], ...]:

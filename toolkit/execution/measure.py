@@ -85,7 +85,7 @@ def measure(
     }
     checks = execution_checks(values, goal.radius, standard)
     when = _failure_time(fell, recorder, scuffed, slip, times, standard)
-    reason = failure_reason(checks, recorder.fall, recorder.meter.press)
+    reason = failure_reason(checks, recorder.fall, recorder.meter.first_touch, recorder.meter.press)
     transition = None if when is None else standard.transition_at(when)
     simulated = len(controls.ctrl) * standard.timestep
     return Execution(
@@ -160,8 +160,9 @@ def _failure_time(
     """Time in s at which the run went wrong: a fall, an unplanned contact, a scuff, or the swing before most slip."""
     if fell:
         return float(times[-1])
-    if recorder.meter.unplanned_time is not None:
-        return recorder.meter.unplanned_time
+    touch = recorder.meter.first_touch
+    if touch is not None:
+        return touch.time
     worst_scuff = max(scuffed, key=lambda each: each.impulse, default=None)
     if worst_scuff is not None and worst_scuff.impulse > standard.scuff_limit * recorder.mass:
         return worst_scuff.time

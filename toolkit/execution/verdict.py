@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from toolkit.execution.check import Check, Result
 from toolkit.execution.config import ExecutionConfig
-from toolkit.execution.contact_meter import Press
+from toolkit.execution.contact_meter import Press, Touch
 from toolkit.execution.standard import Standard
 
 RANGE_TOLERANCE = 1e-3  # rad; excess over joint ranges, because limits of the simulation are soft
@@ -41,8 +41,13 @@ def execution_checks(
     return tuple(Check(name, limit, unit, values[name]) for name, (limit, unit) in limits.items())
 
 
-def failure_reason(checks: tuple[Check, ...], fall_reason: str, press: Press | None = None) -> str:
-    """One line on the fall or else on the first check that failed, and on links that pressed; "" where all passed."""
+def failure_reason(
+    checks: tuple[Check, ...], fall_reason: str, touch: Touch | None = None, press: Press | None = None
+) -> str:
+    """One line on the fall or else on the first check that failed, and on what touched or pressed; "" where all passed.
+
+    The first unplanned contact is named where those are the failure, and links that pressed on each other anyway.
+    """
     failed = next((check for check in checks if check.result is not Result.PASS), None)
     if fall_reason:
         reason = f"the robot fell: {fall_reason}"
@@ -50,6 +55,8 @@ def failure_reason(checks: tuple[Check, ...], fall_reason: str, press: Press | N
         reason = f"{failed.name} is {failed.value:.3g} {failed.unit}".rstrip() + f", the limit is {failed.limit:.3g}"
     else:
         return ""
+    if touch is not None and not fall_reason and failed is not None and failed.name == "unplanned_contacts":
+        reason = f"{reason}; {touch.robot} touched {touch.world} at {touch.time:.2f} s"
     if press is None:
         return reason
     what = f"{press.first} and {press.second} pressed on each other"
