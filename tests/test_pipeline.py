@@ -224,8 +224,12 @@ def test_what_a_faster_pace_found_counts_at_both_timings_where_a_calmer_one_find
     assert timed.source == Source.TIMED and timed.search == 0 and timed.cost.total == 8.0
 
 
-def test_where_a_transition_fails_it_alone_is_slowed_down_at_first(monkeypatch):
-    """With the next calmer timing; where that has no motion or there is none, the next search follows as ever."""
+@pytest.mark.parametrize("failed_at", [0, 1], ids=["transition", "final rest"])
+def test_where_a_transition_fails_it_alone_is_slowed_down_at_first(monkeypatch, failed_at):
+    """With the next calmer timing; where that has no motion or there is none, the next search follows as ever.
+
+    The last transition is to blame for what fails in the final rest.
+    """
     for paces, cost, tested in (
         (2, {"fast": 10.0, "fast at 1": 10.0, "fast at 1 in 0": 10.5}, ["fast", "fast at 1 in 0"]),
         (2, {"fast": 10.0, "fast at 1": 10.0}, ["fast", "slow"]),
@@ -233,7 +237,7 @@ def test_where_a_transition_fails_it_alone_is_slowed_down_at_first(monkeypatch):
     ):
         planner = Planner([solution("fast", FOOT)], [])
         planner.paces, planner.calm = paces, [solution("slow", FOOT)]
-        run = Run(planner, {"fast at 1 in 0", "slow"}, monkeypatch, cost, failed_at=0)
+        run = Run(planner, {"fast at 1 in 0", "slow"}, monkeypatch, cost, failed_at=failed_at)
         assert run.tested == tested and run.result.passed
 
 

@@ -363,10 +363,16 @@ class _Run:
         return self._trials[-1].failure
 
     def _slowed(self, candidate: Candidate, failure: Failure) -> Candidate | None:
-        """A candidate with the transition to blame at the next calmer timing; None where that is not to be had."""
+        """A candidate with the transition to blame at the next calmer timing; None where that is not to be had.
+
+        The final rest counts as the last transition.
+        """
         index, sequence = failure.transition, candidate.plan.sequence
-        if index is None or not self._robot.stands_on_one_foot or not self._allowed(candidate):
+        if index is None or not sequence.transitions:
             return None
+        if not self._robot.stands_on_one_foot or not self._allowed(candidate):
+            return None
+        index = min(index, len(sequence.transitions) - 1)
         swing = sequence.transitions[index].timing.swing
         timing = next((each for each in self._searches[-1].calmer if each.swing > swing), None)
         if timing is None:
