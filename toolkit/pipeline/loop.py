@@ -23,7 +23,7 @@ from toolkit.refine.local_search import LocalSearch
 from toolkit.robot.model import RobotModel
 from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.plan_cost import PlanCost, plan_cost
-from toolkit.search.moves.exclusion import Blame
+from toolkit.search.moves.exclusion import Blame, to_blame
 from toolkit.search.result import SearchResult, Solution
 from toolkit.world.timing import Timing
 from toolkit.world.world import World
@@ -363,16 +363,11 @@ class _Run:
         return self._trials[-1].failure
 
     def _slowed(self, candidate: Candidate, failure: Failure) -> Candidate | None:
-        """A candidate with the transition to blame at the next calmer timing; None where that is not to be had.
-
-        The final rest counts as the last transition.
-        """
-        index, sequence = failure.transition, candidate.plan.sequence
-        if index is None or not sequence.transitions:
+        """A candidate with the transition to blame at the next calmer timing; None where that is not to be had."""
+        sequence = candidate.plan.sequence
+        index = to_blame(sequence, failure.transition)
+        if index is None or not self._robot.stands_on_one_foot or not self._allowed(candidate):
             return None
-        if not self._robot.stands_on_one_foot or not self._allowed(candidate):
-            return None
-        index = min(index, len(sequence.transitions) - 1)
         swing = sequence.transitions[index].timing.swing
         timing = next((each for each in self._searches[-1].calmer if each.swing > swing), None)
         if timing is None:

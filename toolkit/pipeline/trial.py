@@ -91,12 +91,12 @@ class Tester:
 
         A `known` plan of it that was made with the settings of this run is taken as it is.
         """
-        made = known is not None and known.config == self._motions
-        plan = known if known is not None and made else self._motion(sequence, self._motions)
-        motion = plan.motion
-        if motion.feasible:
+        plan = known
+        if plan is None or plan.config != self._motions:
+            plan = self._motion(sequence, self._motions)
+        if plan.motion.feasible:
             return plan, None
-        return plan, _because(f"no feasible centroidal motion: {motion.outcome}", motion.failure)
+        return plan, _because(f"no feasible centroidal motion: {plan.motion.outcome}", plan.motion.failure)
 
     def motion_of(self, sequence: ContactSequence) -> MotionPlan:
         """Optimise the motion of a sequence with its contacts where they are."""

@@ -75,7 +75,7 @@ def spread(levels, disc, merge, result):
 def _least_drop_near(occupancy, body, x, y, z, yaw):
     """Number of the least of the drops with which the body fits at a node or at one of the places around; -1: none."""
     least = lowest_drop(occupancy, body.box, body.drops, x, y, z, yaw)
-    if least == 0 or lowest_drop(occupancy, body.core, body.drops, x, y, z, yaw) < 0:
+    if least == 0 or not len(body.places) or lowest_drop(occupancy, body.core, body.drops, x, y, z, yaw) < 0:
         return least
     for k in range(len(body.places)):
         dx, dy, turn = body.places[k]

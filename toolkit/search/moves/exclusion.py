@@ -63,6 +63,14 @@ def excluded(exclusions: Sequence[Exclusion], before: np.ndarray, limb: np.ndarr
     return result
 
 
+def to_blame(sequence: ContactSequence, index: int | None) -> int | None:
+    """The transition to blame for a failure in a transition, the last one for the final rest; None where there is none.
+
+    `index` is `Failure.transition`.
+    """
+    return None if index is None or not sequence.transitions else min(index, len(sequence.transitions) - 1)
+
+
 class Blame:
     """The transitions that failed so far, and which of them are to be avoided.
 
@@ -84,13 +92,10 @@ class Blame:
         self._radius, self._place = scale * _RADIUS, scale * _PLACE
 
     def add(self, sequence: ContactSequence, index: int | None) -> None:
-        """Enter a failure in a transition; None: where it happened is unknown, and nothing is blamed.
-
-        The final rest counts as the last transition.
-        """
-        if index is None or not sequence.transitions:
+        """Enter a failure in a transition, as `to_blame` has it; None: where it happened is unknown."""
+        index = to_blame(sequence, index)
+        if index is None:
             return
-        index = min(index, len(sequence.transitions) - 1)
         failed = Exclusion.of(sequence.stances[index], sequence.transitions[index], self._radius)
         self._failed.append(failed)
         if sum(failed.covers(each) for each in self._failed) >= self._strikes:
