@@ -1,6 +1,7 @@
 """Searches in turn: the first sequence of the hasty one, then all that the patient one finds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,3 +80,29 @@ def test_hasty_searches_begin_again_until_one_finds_a_sequence():
     none, early = search_in_turn([(graph, short)] * 3 + [(graph, PATIENT)], np.random.default_rng(1), None, math.inf)
     alone = AnaStar(graph, np.random.default_rng(1), PATIENT).run()
     assert early == 0 and none.expansions == alone.expansions + 3
+
+
+def test_a_search_ends_when_it_has_settled_but_not_before_there_is_a_sequence():
+    settled = 0
+    for seed in range(30):
+        rng = np.random.default_rng
+        long = AnaStar(Graph(rng(seed), goals=4), rng(seed), PATIENT).run()
+        short = AnaStar(Graph(rng(seed), goals=4), rng(seed), replace(PATIENT, settled=3)).run()
+        if short.stopped_by != "settled":
+            assert short.stopped_by == "exhausted" and short.expansions == long.expansions
+            continue
+        settled += 1
+        assert short.expansions == short.paths[-1].expansions + 3
+        assert [path.states for path in short.paths] == [path.states for path in long.paths[: len(short.paths)]]
+        known = AnaStar(Graph(rng(seed), goals=4), rng(seed), replace(PATIENT, settled=3), known=True).run()
+        if not known.paths:
+            assert known.expansions == 3
+    assert settled > 10
+
+
+def test_the_last_search_settles_for_the_sequence_of_one_before_it():
+    graph = Graph(np.random.default_rng(0), goals=4)
+    searches = [(graph, HASTY), (graph, replace(PATIENT, settled=1))]
+    found, early = search_in_turn(searches, np.random.default_rng(1), None, math.inf)
+    assert (early, len(found.paths), found.stopped_by) == (1, 1, "settled")
+    assert found.expansions == found.paths[0].expansions + 1

@@ -12,6 +12,7 @@ from toolkit.search.planner_config import PlannerConfig
 
 _SHORTEST = 1.0  # m for a body of the usual size (`toolkit.robot.scale`); shorter ways are taken to be as long
 _ATTEMPTS = 20  # at a first sequence over ground on which no foot rests
+_SETTLED = 1000  # expansions on such ground without a cheaper sequence after which the cheapest is taken
 _LAYER = 0.13  # units; random expansions are as likely at every distance from the goal
 
 
@@ -89,6 +90,7 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
         epsilon=0.15,
         crowding=0.08,
         max_expansions=None if limit is None else 10 * limit,
+        settled=_SETTLED,
     )
     hasty = replace(
         patient,

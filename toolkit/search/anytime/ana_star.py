@@ -55,6 +55,7 @@ class AnaStarConfig:
         patience: See `crowding`.
         max_expansions: Limit on the expansions; None: no limit.
         persistence: Multiple of that limit up to which a search without solution goes on where no other one follows.
+        settled: Expansions in a row without a better solution that end a search once there is one; None: it goes on.
         first_only: Whether the first solution ends the search.
         unit: A cost that matters little beside that of a whole path, such as the least cost of a step's way.
     """
@@ -66,6 +67,7 @@ class AnaStarConfig:
     patience: int = 200
     max_expansions: int | None = None
     persistence: int = 1
+    settled: int | None = None
     first_only: bool = False
     unit: float = 1.0
 
@@ -76,7 +78,8 @@ class AnaStarResult(Generic[State]):
 
     Attributes:
         paths: Every solution, in the order in which they were found; their costs fall strictly.
-        stopped_by: "exhausted" (nothing left that could improve), "time", "expansions", "memory" or "solution".
+        stopped_by: "exhausted" (nothing left that could improve), "time", "expansions", "settled", "memory" or
+            "solution".
         lower_bound: No path can cost less, if h is admissible.
         seconds: Wall-clock time of the search.
         expansions: Number of states that were expanded.
@@ -102,6 +105,7 @@ class AnaStar(Generic[State]):
         config: Settings; the default ones where None.
         judge: Asked about every edge that reaches a goal. It returns that edge, or another edge in its place (with a
             different cost or payload), or None. After None the search goes on from there.
+        known: Whether there is a solution already, of another search.
     """
 
     def __init__(
@@ -110,7 +114,10 @@ class AnaStar(Generic[State]):
         rng: np.random.Generator,
         config: AnaStarConfig | None = None,
         judge: Judge[State] | None = None,
+        *,
+        known: bool = False,
     ):
+        self._known = known
         self._problem, self._rng, self._judge = problem, rng, judge
         self._config = config or AnaStarConfig()
         self._best = math.inf  # cost of the best path
@@ -143,7 +150,7 @@ class AnaStar(Generic[State]):
         config, paths, expanded = self._config, [], []
         most = config.max_expansions
         start = self._problem.start()
-        reported = 0.0
+        reported, improved = 0.0, 0
         if self._problem.is_goal([start])[0]:
             paths.append(Path((start,), (), 0.0, 1.0, 0.0, 0))
             self._best = self._bar = 0.0
@@ -159,6 +166,8 @@ class AnaStar(Generic[State]):
                 stopped_by = "solution"
             elif most is not None and len(expanded) >= (most if paths else config.persistence * most):
                 stopped_by = "expansions"
+            elif config.settled is not None and (paths or self._known) and len(expanded) - improved >= config.settled:
+                stopped_by = "settled"
             elif len(self._edge) >= _MAX_STATES:
                 stopped_by = "memory"
             if stopped_by != "exhausted":
@@ -181,6 +190,7 @@ class AnaStar(Generic[State]):
             path = self._reach_one_of(node, goals, began, len(expanded))
             if path is not None:
                 paths.append(path)
+                improved = len(expanded)
             if observer is not None and (now - reported >= _REPORT_INTERVAL or (paths and goals)):
                 reported = now
                 bound = paths[-1].bound if paths else math.inf

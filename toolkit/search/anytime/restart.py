@@ -59,7 +59,8 @@ def search_in_turn(
         least = 0.0 if whole else float(problem.heuristic([problem.start()])[0])
         best = min(paths, key=lambda path: path.cost, default=None)
         tell = None if observer is None else partial(_tell, observer, seconds, before, best, least)
-        result = AnaStar(problem, generator, config, judge).run(time_limit - seconds, tell)
+        search = AnaStar(problem, generator, config, judge, known=bool(paths))
+        result = search.run(time_limit - seconds, tell)
         for path in result.paths:
             loose, found = _loosened(path.bound, path.cost, least), seconds + path.seconds
             paths.append(replace(path, bound=loose, seconds=found, expansions=before + path.expansions))
