@@ -123,7 +123,7 @@ def add_planning_options(target: argparse.ArgumentParser) -> None:
         default=1000,
         metavar="N",
         help="states that the search expands at most, whatever the time (five times as many while nothing is found, "
-        "ten times where feet have to slide); reproducible (default: %(default)s)",
+        "ten times where feet have to slide, until N find nothing better); reproducible (default: %(default)s)",
     )
     target.add_argument("--no-palms", action="store_true", help="plan with the feet alone")
     target.add_argument("--steps", type=int, choices=(38, 60), default=60, help="foot transition model (default: 60)")

@@ -61,6 +61,7 @@ def test_a_sliding_search_begins_in_haste_and_asks_the_stand_in(quick, limit, pa
     assert (strategy.at_once, strategy.waiting) == (quick, quick.stand_in)
     assert strategy.hasty is not None and strategy.hasty.first_only and not strategy.patient.first_only
     assert (strategy.patient.max_expansions, strategy.hasty.max_expansions) == (patient, hasty)
+    assert strategy.patient.settled == limit
     assert strategy.patient.initial_cost == np.inf  # the cost so far would lead back
     assert strategy.cost.steep == 0.0
 

@@ -12,7 +12,6 @@ from toolkit.search.planner_config import PlannerConfig
 
 _SHORTEST = 1.0  # m for a body of the usual size (`toolkit.robot.scale`); shorter ways are taken to be as long
 _ATTEMPTS = 20  # at a first sequence over ground on which no foot rests
-_SETTLED = 1000  # expansions on such ground without a cheaper sequence after which the cheapest is taken
 _LAYER = 0.13  # units; random expansions are as likely at every distance from the goal
 
 
@@ -81,7 +80,7 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
 
     The cost so far does not count before there is a solution, since it would only lead back: it is high for all states
     that get far. Expansions are ten times as many, as most of them only show that the robot arrives too fast; the
-    hasty searches have 3 % of them each.
+    hasty searches have 3 % of them each. The usual number of them without a cheaper sequence ends the search.
     """
     limit = config.search.max_expansions
     patient = replace(
@@ -90,7 +89,7 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
         epsilon=0.15,
         crowding=0.08,
         max_expansions=None if limit is None else 10 * limit,
-        settled=_SETTLED,
+        settled=limit,
     )
     hasty = replace(
         patient,
