@@ -50,7 +50,7 @@ LEG_POSTURE = 0.005  # factor on the posture's weight for joints that carry a fo
 ARM_POSTURE = 0.01  # the same for an arm whose palm is in contact, and not quite where it was planned to be
 MOMENTUM_SCALE = 10.0  # kg m^2/s per unit of the task of angular momentum, for a body of the usual size
 FORCE, MOMENT = 1e-5, 2e-4  # weights on squared N and N m of deviation from the planned wrenches: they break ties
-PALM_SHARE = 100.0  # factor on both for palms: feet do what else it takes, until the CoM diverges
+PALM_SHARE = 100.0  # factor on the first for palms: feet do what else it takes, until the CoM diverges
 ACCELERATION = 1e-4  # weight on squared accelerations of joints and base: keeps the Hessian definite
 NESTING = 0.5  # where the controller's margins lie between the plan's (1) and the simulation's (0)
 DIVERGENCE = 0.01  # m; divergence of the CoM that halves the weights of angular momentum and base orientation...
@@ -241,7 +241,7 @@ class Controller:
             moments = slice(slot.start + 3, slot.stop)
             share = 1.0 if limb.is_foot else 1.0 + (PALM_SHARE - 1.0) * self._calm
             diagonal[slot] = share * self._force_weight
-            diagonal[moments] = share * self._moment_weight
+            diagonal[moments] = self._moment_weight  # palms have none
             target[slot] = aim.wrench[limb, : slot.stop - slot.start] / self._force_unit
         qp.set_objective(tasks[:rows], wanted[:rows], diagonal, target[: qp.size])
 

@@ -117,9 +117,8 @@ class AnaStar(Generic[State]):
         *,
         known: bool = False,
     ):
-        self._known = known
         self._problem, self._rng, self._judge = problem, rng, judge
-        self._config = config or AnaStarConfig()
+        self._config, self._known = config or AnaStarConfig(), known
         self._best = math.inf  # cost of the best path
         self._bar = math.inf  # G: that cost, or what the path would have cost without the judge where that is more
         self._missing = -math.inf  # cost that the judge added to the last edge to a goal out of the same state
@@ -150,7 +149,7 @@ class AnaStar(Generic[State]):
         config, paths, expanded = self._config, [], []
         most = config.max_expansions
         start = self._problem.start()
-        reported, improved = 0.0, 0
+        reported = 0.0
         if self._problem.is_goal([start])[0]:
             paths.append(Path((start,), (), 0.0, 1.0, 0.0, 0))
             self._best = self._bar = 0.0
@@ -160,13 +159,14 @@ class AnaStar(Generic[State]):
         stopped_by = "exhausted"
         while self._open:
             now = time.perf_counter() - began
+            idle = len(expanded) - (paths[-1].expansions if paths else 0)
             if now >= time_limit:
                 stopped_by = "time"
             elif config.first_only and paths:
                 stopped_by = "solution"
             elif most is not None and len(expanded) >= (most if paths else config.persistence * most):
                 stopped_by = "expansions"
-            elif config.settled is not None and (paths or self._known) and len(expanded) - improved >= config.settled:
+            elif config.settled is not None and (paths or self._known) and idle >= config.settled:
                 stopped_by = "settled"
             elif len(self._edge) >= _MAX_STATES:
                 stopped_by = "memory"
@@ -190,7 +190,6 @@ class AnaStar(Generic[State]):
             path = self._reach_one_of(node, goals, began, len(expanded))
             if path is not None:
                 paths.append(path)
-                improved = len(expanded)
             if observer is not None and (now - reported >= _REPORT_INTERVAL or (paths and goals)):
                 reported = now
                 bound = paths[-1].bound if paths else math.inf
