@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from toolkit import cli
-from toolkit.errors import PlanningError
+from toolkit.errors import InputError, PlanningError
 from toolkit.pipeline.candidate import refined_solution
 from toolkit.refine import RefineConfig
 from toolkit.refine.local_search import arrives
 from toolkit.refine.variants import left_out
 from toolkit.report.console import make_console
-from toolkit.report.plan_file import write_plan
+from toolkit.report.plan_file import read_plan, write_plan
 from validation import goals, options
 from validation.ablation import TIMING
 from validation.cases import Case, make_cases
@@ -40,7 +41,7 @@ DESCRIPTION = """\
 Compare the plan of a run (one search, choice by the true cost, local search) with the best plan known: that of several
 planners and many seeds, followed by a long local search from the best of them. Also leave one or two contacts out of
 the plan of the run, in every way that the screens allow and that still arrives, and see whether it gets cheaper. The
-best plans are kept as files.
+best plans are kept as files; with --known, those of earlier runs in the same worlds count as well.
 """
 KINDS = ("rubble_field", "rubble_corridor")
 PLANNERS = ("learned", "kinematic", "quasi-static")
@@ -63,8 +64,8 @@ class Effort:
     motions: int = 1000
 
 
-def regret_trial(settings: TrialSettings, case: Case, effort: Effort) -> Record:
-    """The record of one world."""
+def regret_trial(settings: TrialSettings, case: Case, effort: Effort, known: Path | None) -> Record:
+    """The record of one world; `known` is a folder with the best plans of earlier runs."""
     robot, world = robot_of(settings.robot, settings.robots), case.world()
     record: Record = {"kind": case.kind, "seed": case.seed, "passed": False, "stage": "planning"}
     truth, found = Truth(robot, world), list[tuple[str, Tested]]()
@@ -87,6 +88,10 @@ def regret_trial(settings: TrialSettings, case: Case, effort: Effort) -> Record:
         outcome = _improved(truth, tested, effort.motions)
         if outcome.cost.total < best.cost.total:
             best, finder = outcome, planner
+    if known is not None and (plan := known / f"{case.name}.json").exists():
+        outcome = truth(read_plan(plan))
+        if outcome.cost.total < best.cost.total:
+            best, finder = outcome, "an earlier run"
     shorter = left_out(returned.plan.sequence, chosen.screen)
     fewer = [truth(variant).cost.total for variant in shorter if arrives(variant, returned.plan)]
     place = settings.out / "known"
@@ -110,6 +115,22 @@ def regret_trial(settings: TrialSettings, case: Case, effort: Effort) -> Record:
 def _improved(truth: Truth, tested: Tested, motions: int) -> Outcome:
     """What the local search makes of an optimised sequence."""
     return truth.improved(tested.outcome.plan, tested.solution.sequence, tested.screen, motions)
+
+
+def check_known(folder: Path | None, cases: Sequence[Case]) -> None:
+    """Make sure that the plans of earlier runs are of the same worlds.
+
+    Raises:
+        InputError: There is no plan of any of the worlds, or a world of that name was another one.
+    """
+    if folder is None:
+        return
+    worlds = [(case, folder / f"{case.name}.xml") for case in cases]
+    if not any(path.exists() for _, path in worlds):
+        raise InputError(f"--known {folder}: holds no plan of these worlds; choose them by --kinds and --seed-offset")
+    for case, path in worlds:
+        if path.exists() and path.read_text(encoding="utf-8") != case.mjcf():
+            raise InputError(f"{path}: is another world than {case.name} of today; leave it out of --known")
 
 
 def summarise(kind: str, records: Sequence[Record]) -> dict[str, Any]:
@@ -174,14 +195,19 @@ def main(argv: list[str] | None = None) -> int:
         parser.add_argument(
             f"--{name}", type=cli.positive(int), default=value, metavar="N", help=f"{words} (default: {value})"
         )
+    parser.add_argument(
+        "--known", type=Path, metavar="DIR", help="best plans of earlier runs, as this program keeps them (OUT/known)"
+    )
     parser.epilog = options.GOAL_CODES
     args = parser.parse_args(argv)
     console = make_console()
     settings, first = options.settings_of(args), options.first_seed(args, "regret")
     effort = Effort(args.seeds, args.starts, args.motions)
+    efforts = {**vars(effort), "known": args.known and args.known.as_posix()}
     cases = make_cases(args.kinds, args.trials, first)
-    store = TrialFile(args.out / "trials.jsonl", settings.deciding() | {"effort": str(effort)})
-    jobs = [Job(case.name, regret_trial, (settings, case, effort)) for case in cases]
+    check_known(args.known, cases)
+    store = TrialFile(args.out / "trials.jsonl", settings.deciding() | efforts)
+    jobs = [Job(case.name, regret_trial, (settings, case, effort, args.known)) for case in cases]
     records = [
         {"kind": case.kind, "seed": case.seed, "passed": False, **record}
         for record, case in zip(run_jobs(jobs, store, options.pool_of(args), console, "worlds"), cases, strict=True)
@@ -195,7 +221,7 @@ def main(argv: list[str] | None = None) -> int:
         sections=[("Table", f"{table(rows)}\n\n{NOTE}"), ("Failures", failure_section(records))],
         content={"table": rows, "trials": records},
         goals=found,
-        settings={**settings.described(), "trials": args.trials, "seed_offset": first, **vars(effort)},
+        settings={**settings.described(), "trials": args.trials, "seed_offset": first, **efforts},
     )
     show_results(console, path)
     return options.goal_code(found)

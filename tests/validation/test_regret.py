@@ -1,10 +1,14 @@
 """Regret: how made-up plans stand beside the best known ones."""
 
+import json
+
 import pytest
 
+from toolkit.errors import InputError
 from validation import regret
+from validation.cases import make_cases
 from validation.goals import MET, NOT_MET
-from validation.regret import goals_of, summarise
+from validation.regret import check_known, goals_of, summarise
 
 
 def record(ratio, fewer):
@@ -26,6 +30,21 @@ def test_the_median_and_the_worst_world_count():
 @pytest.mark.slow
 def test_a_small_effort_keeps_the_best_plan_as_a_file(tmp_path):
     options = ["--kinds", "any_gap", "--trials", "1", "--seeds", "1", "--starts", "1", "--motions", "10"]
-    more = ["--workers", "0", "--expansions", "100", "--out", str(tmp_path / "out"), "--results", str(tmp_path)]
-    assert regret.main([*options, *more]) in (0, 1)  # goals are not the point of so small an effort
-    assert len(list((tmp_path / "out" / "known").iterdir())) == 2 and (tmp_path / "regret.md").is_file()
+    options += ["--workers", "0", "--expansions", "100", "--results", str(tmp_path)]
+    assert regret.main([*options, "--out", str(tmp_path / "out")]) in (0, 1)  # goals are not the point of so little
+    known = tmp_path / "out" / "known"
+    assert len(list(known.iterdir())) == 2 and (tmp_path / "regret.md").is_file()
+    regret.main([*options, "--out", str(tmp_path / "again"), "--known", str(known)])
+    trial = json.loads((tmp_path / "regret.json").read_text())["trials"][0]
+    assert trial["finder"] in ("the run itself", "an earlier run") and trial["regret"] < 1.01
+
+
+def test_known_plans_have_to_be_of_the_same_worlds(tmp_path):
+    case, other = make_cases(["any_gap"], 2, 5)
+    with pytest.raises(InputError, match="holds no plan"):
+        check_known(tmp_path, [case, other])
+    (tmp_path / f"{case.name}.xml").write_text(case.mjcf())
+    check_known(tmp_path, [case, other])
+    (tmp_path / f"{other.name}.xml").write_text(case.mjcf())
+    with pytest.raises(InputError, match="another world"):
+        check_known(tmp_path, [case, other])
