@@ -47,16 +47,23 @@ COLUMNS = (
     "arrived",
     "holds",
     "PASS",
+    "planning max [s]",
     "slip max [cm]",
     "torque / limit",
     "velocity / limit",
     "unplanned contacts",
     "palm force error",
     "CoM RMS [mm]",
+    "pace [m/s]",
     "real-time factor",
     "tick median [ms]",
     "tick 99 % [ms]",
 )
+
+PACES = {"flat": 0.4, "rubble_field": 0.2}
+"""m/s; least paces where the planner chooses the timing."""
+PLANNED_WITHIN = {"steep_slope_3m": 60.0}
+"""s; longest time of all searches, optimisations and local searches of a run there."""
 
 
 def summarise(kind: str, records: Sequence[Record]) -> dict[str, Any]:
@@ -67,6 +74,7 @@ def summarise(kind: str, records: Sequence[Record]) -> dict[str, Any]:
     for name in ("planned", "feasible", "wholebody", "arrived", "held", "passed"):
         summary[name] = sum(bool(record.get(name)) for record in records)
     return summary | {
+        "planning_seconds": largest(values(records, "planning_seconds")),
         "max_slip": largest(values(arrived, "max_slip")),
         "max_torque_ratio": largest(values(arrived, "max_torque_ratio")),
         "max_velocity_ratio": largest(values(arrived, "max_velocity_ratio")),
@@ -74,6 +82,7 @@ def summarise(kind: str, records: Sequence[Record]) -> dict[str, Any]:
         "palm_runs": len(values(arrived, "palm_force_error")),
         "palm_force_error": mean(values(arrived, "palm_force_error")),
         "com_rms_error": mean(values(arrived, "com_rms_error")),
+        "pace": median(values(arrived, "pace")),
         "real_time_factor": median(values(ran, "real_time_factor")),
         "tick_median": median(values(ran, "tick_median")),
         "tick_99": median(values(ran, "tick_99")),
@@ -86,12 +95,14 @@ def table(summaries: Sequence[dict[str, Any]]) -> str:
         (
             row["kind"],
             *(str(row[name]) for name in ("trials", "planned", "feasible", "wholebody", "arrived", "held", "passed")),
+            number(row["planning_seconds"], ".0f"),
             number(in_unit(row["max_slip"], 100), ".2f"),
             number(row["max_torque_ratio"], ".2f"),
             number(row["max_velocity_ratio"], ".2f"),
             f"{row['unplanned_contacts']:.0f}",
             "-" if row["palm_force_error"] is None else f"{row['palm_force_error']:.0%} ({row['palm_runs']} runs)",
             number(in_unit(row["com_rms_error"], 1e3), ".1f"),
+            number(row["pace"], ".2f"),
             number(row["real_time_factor"], ".2f"),
             number(in_unit(row["tick_median"], 1e3), ".2f"),
             number(in_unit(row["tick_99"], 1e3), ".2f"),
@@ -101,12 +112,17 @@ def table(summaries: Sequence[dict[str, Any]]) -> str:
     return markdown_table(COLUMNS, rows)
 
 
-def goals_of(summaries: Sequence[dict[str, Any]]) -> list[Goal]:
-    """What is asked of each kind of world, and of all together."""
+def goals_of(summaries: Sequence[dict[str, Any]], auto: bool = False) -> list[Goal]:
+    """What is asked of each kind of world, and of all together; more where the planner chooses the timing (`auto`)."""
     found = []
     for row in summaries:
         wanted, of = (45, 50) if kind_of(row["kind"]).random else (5, 5)
         found.append(goals.count(f"{row['kind']}: holds", row["held"], row["trials"], wanted, of))
+        if auto and row["kind"] in PACES:
+            found.append(goals.at_least(f"{row['kind']}: pace, median", row["pace"], PACES[row["kind"]], "m/s"))
+        if auto and row["kind"] in PLANNED_WITHIN:
+            limit = PLANNED_WITHIN[row["kind"]]
+            found.append(goals.at_most(f"{row['kind']}: planning, longest", row["planning_seconds"], limit, "s"))
     held = {
         "slip of any one stance": ("max_slip", ExecutionConfig().slip_limit, "m"),
         "torque over its limit": ("max_torque_ratio", 1.0, ""),
@@ -141,7 +157,7 @@ def main(argv: list[str] | None = None) -> int:
         title="Plans that hold in simulation",
         sections=[("Table", table(summaries)), ("Failures", failure_section(records))],
         content={"table": summaries, "trials": records},
-        goals=goals_of(summaries),
+        goals=goals_of(summaries, args.timing == "auto"),
         settings={**settings.described(), "trials": args.trials, "seed_offset": args.seed_offset},
     )
     show_results(console, path)

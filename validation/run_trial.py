@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from toolkit import pipeline
+from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import ToolkitError
 from toolkit.execution.config import SCUFF_LIMIT, ExecutionConfig
 from toolkit.execution.replay import replay_controls
@@ -27,6 +28,7 @@ from validation.cases import Case
 from validation.options import TrialSettings
 
 WORLD_FILE = "world.xml"  # in a run's folder, to run it again
+PLANNING = ("planning", "dynamics", "refinement")  # stages
 PALM_FORCE = 5.0  # N; planned palm forces below it are ramps and count nowhere
 
 
@@ -88,6 +90,7 @@ def execution_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
         "planned": bool(result.search.solutions),
         "tested": len(result.trials),
         "stages": log.entries,
+        "planning_seconds": sum(entry["seconds"] for entry in log.entries if entry["stage"] in PLANNING),
         "feasible": trial is not None and trial.plan.motion.feasible,
         "wholebody": trial is not None and trial.trajectory is not None and trial.trajectory.feasible,
         "arrived": False,
@@ -100,6 +103,7 @@ def execution_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
         transitions = trial.plan.sequence.transitions
         record["transitions"] = len(transitions)
         record["palm_contacts"] = sum(not t.limb.is_foot and t.contact is not None for t in transitions)
+        record["pace"] = pace_of(trial.plan.sequence)
         if trial.execution is not None:
             record |= executed(trial.execution)
             if record["arrived"] and not record["replays"]:
@@ -136,6 +140,13 @@ def executed(execution: Execution) -> dict[str, Any]:
         "failed_checks": [check.name for check in execution.checks if check.result != "PASS"],
     }
     return figures | {"held": holds(figures)}
+
+
+def pace_of(sequence: ContactSequence) -> float | None:
+    """Straight distance in XY that the mean of the feet goes, over the time of all transitions, in m/s."""
+    duration = sum(each.timing.shift + each.timing.swing for each in sequence.transitions)
+    first, last = (stance.mean_feet.position[:2] for stance in (sequence.stances[0], sequence.stances[-1]))
+    return float(np.linalg.norm(last - first)) / duration if duration else None
 
 
 def holds(figures: dict[str, Any]) -> bool:

@@ -27,6 +27,8 @@ def executed(name: str, **changes) -> dict:
         "unplanned_contacts": 0,
         "palm_force_error": None,
         "com_rms_error": 0.002,
+        "pace": 0.3,
+        "planning_seconds": 20.0,
         "real_time_factor": 2.0,
         "tick_median": 3e-4,
         "tick_99": 9e-4,
@@ -80,6 +82,15 @@ def test_goals_of_an_execution_miss_what_is_missed():
     missed = execution.goals_of([execution.summarise("rubble_field", bad)])
     names = {goal.name.split(",")[0] for goal in missed if goal.result == goals.NOT_MET}
     assert names == {"rubble_field: holds", "slip of any one stance", "controller tick", "real-time factor"}
+
+
+def test_pace_and_planning_are_asked_of_worlds_that_leave_the_timing_to_the_planner():
+    rows = [execution.summarise(kind, [executed("a", pace=0.35)]) for kind in ("flat", "rubble_field")]
+    rows.append(execution.summarise("steep_slope_3m", [executed("a"), executed("b", planning_seconds=61.0)]))
+    names = ["flat: pace, median", "rubble_field: pace, median", "steep_slope_3m: planning, longest"]
+    found = {goal.name: goal.result for goal in execution.goals_of(rows, auto=True)}
+    assert [found[name] for name in names] == [goals.NOT_MET, goals.MET, goals.NOT_MET]
+    assert not {goal.name for goal in execution.goals_of(rows)} & set(names)
 
 
 def test_reasons_that_differ_in_numbers_only_are_counted_together():
