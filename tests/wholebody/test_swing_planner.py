@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 
 from tests.wholebody.conftest import FIRST, RISE, stairs, world_of
-from toolkit.geometry.pose import Pose, rotation_on_surface
+from toolkit.geometry.limb import Limb
+from toolkit.geometry.pose import Pose, rotation_on_surface, yaw_of
 from toolkit.wholebody.detour import corners, gaps
 from toolkit.wholebody.limb_paths import box_collide
-from toolkit.wholebody.swing_planner import FAST_ACROSS, plan_swing
-from toolkit.wholebody.swing_task import EASY, GAP, LIFT, MARGIN, SwingTask
+from toolkit.wholebody.swing_planner import plan_swing
+from toolkit.wholebody.swing_task import EASY, GAP, LATE, LIFT, MARGIN, STEEP, SwingTask
 
 HALF = np.array([0.11, 0.065])
 
@@ -106,7 +107,7 @@ def test_fast_swings_cross_over_the_full_time():
     slow = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), free(None))
     fast = plan_swing(task_of([0, 0.1, 0], [2.4, 0.1, 0]), free(None))
     assert slow.turn == EASY.across
-    assert fast.turn == FAST_ACROSS
+    assert fast.turn == EASY.fast_across
 
 
 def test_foot_goes_around_the_standing_foot():
@@ -156,3 +157,27 @@ def test_palm_retracts_and_approaches_along_the_normal():
 def test_swept_box_that_always_hits_is_reported():
     path = plan_swing(task_of([0, 0.1, 0], [0.3, 0.1, 0]), lambda c, r, h: np.ones(len(c), bool))
     assert not path.clear
+
+
+def test_toes_and_knee_turn_outward_before_the_legs_pass_each_other():
+    def turned(foot, yaw, duration=0.8):
+        start, end = Pose.from_yaw(np.array([-0.4, 0.2, 0.0]), -yaw), Pose.from_yaw(np.array([0.4, 0.2, 0.0]), yaw)
+        path = plan_swing(SwingTask(0.0, duration, start, end, HALF, True, foot.outward), free(None))
+        return yaw_of(path.rotations(np.array([0.5]))[0]) / yaw
+
+    assert turned(Limb.LEFT_FOOT, 0.25) == pytest.approx(1.0) and turned(Limb.RIGHT_FOOT, -0.25) == pytest.approx(1.0)
+    assert abs(turned(Limb.LEFT_FOOT, -0.25)) < 0.3 and abs(turned(Limb.RIGHT_FOOT, 0.25)) < 0.3
+    assert turned(Limb.LEFT_FOOT, 0.5, 0.3) < 0.95  # a fast one takes longer
+
+
+def test_a_fast_foot_before_an_edge_is_lifted_less_where_it_crosses_late():
+    riser = '<geom type="box" size="0.3 1 0.03" pos="0.43 0 0.03"/>'
+    start, end = (Pose.from_yaw(np.array(place), 0.0) for place in ([0.0, 0.1, 0.0], [0.9, 0.1, 0.0]))
+
+    def lifted(duration, steep):
+        task = SwingTask(0.0, duration, start, end, HALF, True, steep=steep)
+        path = plan_swing(task, box_collide(world_of(riser)))
+        return path.clear and path.positions(np.linspace(0, 1, 101))[:, 2].max()
+
+    assert lifted(0.3, LATE) < 0.2 < 0.3 < lifted(0.3, STEEP)
+    assert lifted(1.0, LATE) == lifted(1.0, STEEP) < 0.2  # a slow one crosses late anyhow

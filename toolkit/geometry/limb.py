@@ -36,6 +36,11 @@ class Limb(IntEnum):
         return self.name.lower()
 
     @property
+    def outward(self) -> float:
+        """1 on the left, -1 on the right: the sign of a way along y, and of a turn about z, that leads outward."""
+        return 1.0 if self.is_left else -1.0
+
+    @property
     def mirrored(self) -> Limb:
         """The same limb of the other side."""
         return _MIRROR[self]

@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.wholebody.detour import detour
 from toolkit.wholebody.swing import Move, SwingPath, Window
-from toolkit.wholebody.swing_task import EASY, SAMPLES, STEEP, SwingTask, SwingTiming
+from toolkit.wholebody.swing_task import EASY, SAMPLES, SwingTask, SwingTiming
 
 Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool, whether a box touches the world."""
@@ -25,10 +25,12 @@ EASY_RAISE = 0.04  # m; paths raised by more than that are first tried with the 
 MARGIN_SHARES = (1.0, 0.5, 0.25)  # parts of the margin, in the order in which they are tried
 MODERATE_RAISE = 0.12  # m; higher paths come after lower ones with less margin
 
-# Windows of the crossing and the landing of feet that swing fast. The crossing takes nearly the whole swing, to keep
-# the peak velocity low, but the foot stops moving along the surface before it touches it.
-FAST_ACROSS, FAST_LAND = Window(0.02, 0.95), Window(0.7, 1.0)
+FAST_LAND = Window(0.7, 1.0)  # of feet that swing fast: they stop moving along the surface before they touch it
 SLOW, FAST = 1.0, 2.5  # m/s; the easy windows hold up to a mean speed of SLOW, the fast ones from FAST on
+
+# A foot that turns its toes outward by more than LEAST_TURN (rad), and with them its knee, does so before the legs pass
+# each other: until OUTWARD, a fraction of the swing, unless that asks for more than TURN_RATE (rad/s) in the mean.
+OUTWARD, LEAST_TURN, TURN_RATE = 0.5, 0.1, 4.0
 
 # A foot that trails the standing one by more than PITCH_FROM (m) pitches its toes down by PITCH_GAIN (rad/m), and by
 # more where the ankle would come closer than ANKLE_MARGIN (rad) to an end of its range. MAX_PITCH (rad) is the most.
@@ -63,7 +65,7 @@ def _candidates(task: SwingTask) -> Iterator[tuple[float, float, SwingTiming]]:
     level = abs(task.end.position[2] - task.start.position[2]) if task.is_foot else 0.0
     low = [pair for pair in raises if max(pair) <= level + task.scale.length * EASY_RAISE]
     yield from ((*pair, EASY) for pair in low)
-    yield from ((*pair, STEEP) for pair in raises)
+    yield from ((*pair, task.steep) for pair in raises)
 
 
 def _raises(task: SwingTask) -> Iterator[tuple[float, float]]:
@@ -92,7 +94,7 @@ def _path(task: SwingTask, before: float, after: float, timing: SwingTiming, bum
     up = np.array([0.0, 0.0, 1.0]) if task.is_foot else _outward(task)
     travel = task.end.position - task.start.position - off - onto - (before - after) * up
     haste = _haste(task, float(np.linalg.norm(travel)))
-    across = _hastened(haste, timing.across, FAST_ACROSS)
+    across = _hastened(haste, timing.across, timing.fast_across)
     land = _hastened(haste, timing.land, FAST_LAND) if task.is_foot else timing.land
     moves = [
         Move(off, timing.leave),
@@ -103,7 +105,17 @@ def _path(task: SwingTask, before: float, after: float, timing: SwingTiming, bum
         Move(bump, across, returns=True),
     ]
     moves = tuple(move for move in moves if np.any(move.vector))
-    return _pitched(task, SwingPath(task.begin, task.duration, task.start, task.end, moves, across), _pitch(task))
+    path = SwingPath(task.begin, task.duration, task.start, task.end, moves, across)
+    return _pitched(task, replace(path, turn=_turning(task, path)), _pitch(task))
+
+
+def _turning(task: SwingTask, path: SwingPath) -> Window:
+    """When the patch turns: while it crosses, but outward early."""
+    across = path.turn
+    if not task.is_foot or task.outward * path.rotation_vector[2] < LEAST_TURN:
+        return across
+    needed = task.scale.time * float(np.linalg.norm(path.rotation_vector)) / (TURN_RATE * task.duration)
+    return Window(across.start, min(max(OUTWARD, across.start + needed), across.end))
 
 
 def _pitched(task: SwingTask, path: SwingPath, pitch: float) -> SwingPath:

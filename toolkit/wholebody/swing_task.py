@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,17 +22,29 @@ SAMPLES = 33  # least number of poses per swing that are checked
 
 @dataclass(frozen=True)
 class SwingTiming:
-    """When, as fractions of a swing, the patch leaves its surface, rises, crosses, descends and lands."""
+    """When, as fractions of a swing, the patch leaves its surface, rises, crosses, descends and lands.
+
+    A fast crossing takes nearly the whole swing, to keep the peak velocity low.
+    """
 
     leave: Window = Window(0.0, 0.45)
     rise: Window = Window(0.0, 0.5)
     across: Window = Window(0.05, 0.85)
+    fast_across: Window = Window(0.02, 0.95)
     descend: Window = Window(0.5, 0.95)
     land: Window = Window(0.55, 1.0)
 
 
 EASY = SwingTiming()
-STEEP = SwingTiming(Window(0.0, 0.3), Window(0.0, 0.4), Window(0.2, 0.8), Window(0.6, 1.0), Window(0.7, 1.0))
+STEEP = SwingTiming(
+    leave=Window(0.0, 0.3),
+    rise=Window(0.0, 0.4),
+    across=Window(0.2, 0.8),
+    descend=Window(0.6, 1.0),
+    land=Window(0.7, 1.0),
+)
+LATE = replace(STEEP, fast_across=Window(0.15, 0.95))
+"""In place of `STEEP` for swings that begin before an edge: the toes get over it with less lift, at a higher speed."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +91,14 @@ class SwingTask:
         start, end: world_from_contact at both ends.
         half_size: (2,) m; half extents of the patch.
         is_foot: Whether a foot swings: feet are raised along z, palms away from the wall.
+        outward: Sign of a turn about z that leads the toes of a foot, and with them its knee, outward (`Limb.outward`).
         free_start, free_end: Whether the palm comes from, or goes to, the arm's free posture, where no surface is.
         other: The standing sole as (pose, half size); None for palms.
         leg: Keeps the ankle of a foot in its range; None for palms and where no other foot stands.
         lift: m; guarded motion along the surface normal at both ends.
         scale: The robot's size.
         passing: Gap in m between the soles at which the legs pass each other.
+        steep: Timing of paths that have to rise more than a little.
         shin: (3,) m; horizontal way of the standing leg's shin from where it is over a level sole: it keeps the gap
             too, since a foot passes it there, and not the sole.
     """
@@ -95,6 +109,7 @@ class SwingTask:
     end: Pose
     half_size: np.ndarray
     is_foot: bool
+    outward: float = 0.0
     free_start: bool = False
     free_end: bool = False
     other: tuple[Pose, np.ndarray] | None = None
@@ -102,6 +117,7 @@ class SwingTask:
     lift: float = LIFT
     scale: Scale = USUAL
     passing: float = 0.0
+    steep: SwingTiming = STEEP
     shin: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property

@@ -63,7 +63,7 @@ class DrawnSteps:
     def beside(self, limb: Limb, stand: np.ndarray, yaw: float) -> tuple[Projected, np.ndarray]:
         """Places for a foot beside one that stands at (3,) m with heading `yaw` in rad, and their headings (n,) rad."""
         table, turn = self._table, rotation_about_z(yaw)[:2, :2]
-        wishes = self._wishes * [1.0, 1.0 if limb.is_left else -1.0] @ turn.T + stand[:2]
+        wishes = self._wishes * [1.0, limb.outward] @ turn.T + stand[:2]
         away = np.hypot(*(table.centre - stand)[:, :2].T) - table.radius
         near = np.flatnonzero(table.foot & (away < self._longest))
         nearest = near[np.argsort(away[near], kind="stable")][:_NEAREST].tolist()

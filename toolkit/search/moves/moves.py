@@ -119,7 +119,7 @@ class MoveGenerator:
         pose = np.column_stack(
             [steps[:, :2] @ rotation_about_z(stand_yaw)[:2, :2].T + stand[:2], steps[:, 2] + stand_yaw]
         )
-        outward = 1.0 if limb.is_left else -1.0
+        outward = limb.outward
         soles = self._projector.project_soles(
             limb, pose, stand[2] - self._climb, stand[2] + self._climb, outward=outward
         )
@@ -208,7 +208,7 @@ class MoveGenerator:
             shoulder,
             centre,
             yaw,
-            1.0 if limb.is_left else -1.0,
+            limb.outward,
             (arm.min_reach + margin, arm.max_reach - margin),
             self._scale * _PALM_SIDE,
             float(np.cos(_PALM_ANGLE)),

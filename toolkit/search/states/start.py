@@ -44,7 +44,7 @@ def place_feet(robot: RobotModel, world: World, projector: Projector) -> list[St
     for limb, foot in _home_feet(robot).items():
         at = (start @ Pose.from_yaw(np.array([foot[0], foot[1], 0.0]), foot[2])).position
         yaw = start.yaw + foot[2]
-        offsets = spread * [1.0, 1.0 if limb.is_left else -1.0]
+        offsets = spread * [1.0, limb.outward]
         c, s = np.cos(start.yaw), np.sin(start.yaw)
         xy = at[:2] + offsets @ np.array([[c, s], [-s, c]])
         pose = np.column_stack([xy, np.full(len(xy), yaw)])
