@@ -187,7 +187,7 @@ class ContactPlanner:
         moves = self.ground.moves(way)
         table, palms = moves.table, palms and self.config.palms and moves.has_palm_surfaces
         limbs = [limb for limb in PALMS if palms and limb in self.robot.arms]
-        candidates = CandidateGenerator(moves, limbs, timings, exclusions, tally.rejected, hurried=way.slides)
+        candidates = CandidateGenerator(moves, limbs, timings, exclusions, tally.rejected)
         scale = self.robot.scale
         reader, reach = StateReader(table, timings, scale), ReachCheck(moves, limbs, timings)
         mass = 0.0 if self._finish is None else self.robot.mass

@@ -73,7 +73,6 @@ class CandidateGenerator:
         timings: The timings to choose from.
         exclusions: Transitions that later stages rejected.
         rejected: (len(Reason),) int; counts rejected candidates by reason.
-        hurried: Whether palms may take any timing, not the calmest alone.
     """
 
     def __init__(
@@ -83,10 +82,9 @@ class CandidateGenerator:
         timings: tuple[Timing, ...],
         exclusions: Sequence[Exclusion],
         rejected: np.ndarray,
-        hurried: bool = False,
     ):
         self._moves, self._table, self._palms = moves, moves.table, palms
-        self._exclusions, self._rejected, self._hurried = exclusions, rejected, hurried
+        self._exclusions, self._rejected = exclusions, rejected
         self._ways = moves.robot.scale.speed * SWING_SPEED * np.array([timing.swing for timing in timings])
 
     def out_of(self, contacts: np.ndarray, last: int) -> Candidates | None:
@@ -136,17 +134,11 @@ class CandidateGenerator:
         return Candidates.of(self._table, contacts[None], limb, after, np.zeros(n, int))
 
     def timed(self, contacts: np.ndarray, candidates: Candidates) -> Candidates:
-        """Each candidate out of contact numbers (4,) once for every timing that its swing allows.
-
-        A palm takes the calmest timing, unless it is `hurried`: no plan of momentum knows how its arm swings, and in a
-        third of a second that is enough to throw a body that stands on one foot.
-        """
+        """Each candidate out of contact numbers (4,) once for every timing that its swing allows."""
         if len(self._ways) == 1:  # the screen of the swings has checked the speed
             return candidates
         table, old = self._table, contacts[candidates.limb]
         way = np.hypot(*(table.position[candidates.number] - table.position[old])[:, :2].T)
-        palm = candidates.limb > Limb.RIGHT_FOOT
-        allowed = np.where(palm, 0.0, way)[:, None] <= self._ways
-        allowed[palm, 1:] = self._hurried
-        rows, timing = np.nonzero(allowed)
+        way[(candidates.limb > Limb.RIGHT_FOOT) | (candidates.number < 0)] = 0.0
+        rows, timing = np.nonzero(way[:, None] <= self._ways)
         return replace(candidates.select(rows), timing=timing)
