@@ -144,9 +144,8 @@ def executed(execution: Execution) -> dict[str, Any]:
 
 def pace_of(sequence: ContactSequence) -> float | None:
     """Straight distance in XY that the mean of the feet goes, over the time of all transitions, in m/s."""
-    duration = sum(each.timing.shift + each.timing.swing for each in sequence.transitions)
     first, last = (stance.mean_feet.position[:2] for stance in (sequence.stances[0], sequence.stances[-1]))
-    return float(np.linalg.norm(last - first)) / duration if duration else None
+    return float(np.linalg.norm(last - first)) / sequence.duration if sequence.transitions else None
 
 
 def holds(figures: dict[str, Any]) -> bool:

@@ -24,7 +24,7 @@ from toolkit.wholebody.ik import WholeBodyIK, first_guess
 from toolkit.wholebody.ik_config import SUBSTEPS
 from toolkit.wholebody.lean import Lean, lean_ahead
 from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
-from toolkit.wholebody.swing_task import LATE, LIFT, STEEP, SwingTiming
+from toolkit.wholebody.swing_task import LATE, LIFT
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 RATE = 50.0  # Hz for a body of the usual size (`toolkit.robot.scale`); samples of the trajectory
@@ -53,13 +53,11 @@ class Manner:
         foot_lift: m; guarded motion of feet along the surface normal.
         links: How all links but those of arms and the last ones of feet are kept apart.
         turning: Factor on the weight of the planned angular momentum about the vertical.
-        steep: When a foot that has to rise more than a little makes its moves.
     """
 
     foot_lift: float = LIFT
     links: Damper = BODY
     turning: float = 1.0
-    steep: SwingTiming = STEEP
 
 
 WIDE = Manner(foot_lift=0.08, links=FAR)
@@ -85,23 +83,18 @@ def whole_body(plan: MotionPlan, scene: mujoco.MjModel, manner: Manner = Manner(
     begin = perf_counter()
     duration, rate = plan.schedule.duration, RATE / plan.robot.scale.time
     times = np.linspace(0.0, duration, max(int(round(duration * rate)), 2) + 1)
-    paths = _paths(plan, manner)
-    if plan.motion.feasible:
-        trajectory = _trajectory(plan, scene, paths, times, manner)
-    else:
+    given = plan.robot, plan.world, plan.schedule, plan.motion, manner.foot_lift
+    paths = limb_paths(*given)
+    if not plan.motion.feasible:
         failure = Failure(f"the centroidal motion is not feasible: {plan.motion.outcome}")
         trajectory = replace(_without_postures(plan.robot, paths, times), failure=failure)
-    if plan.motion.feasible and not trajectory.feasible:
-        late = _paths(plan, replace(manner, steep=LATE))
-        if late.windows != paths.windows:
+    else:
+        trajectory = _trajectory(plan, scene, paths, times, manner)
+        if not trajectory.feasible and (late := limb_paths(*given, LATE)).windows != paths.windows:
             other = _trajectory(plan, scene, late, times, manner)
             trajectory, paths = (other, late) if other.feasible else (trajectory, paths)
     trajectory = replace(trajectory, seconds=perf_counter() - begin)
     return WholeBodyPlan(plan.robot, plan.world, plan.sequence, plan.schedule, plan.motion, scene, paths, trajectory)
-
-
-def _paths(plan: MotionPlan, manner: Manner) -> LimbPaths:
-    return limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, manner.foot_lift, manner.steep)
 
 
 def solve_ik(

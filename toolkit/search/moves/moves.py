@@ -119,9 +119,8 @@ class MoveGenerator:
         pose = np.column_stack(
             [steps[:, :2] @ rotation_about_z(stand_yaw)[:2, :2].T + stand[:2], steps[:, 2] + stand_yaw]
         )
-        outward = limb.outward
         soles = self._projector.project_soles(
-            limb, pose, stand[2] - self._climb, stand[2] + self._climb, outward=outward
+            limb, pose, stand[2] - self._climb, stand[2] + self._climb, outward=limb.outward
         )
         codes = self.screen(limb, soles.surface, soles.position, soles.rotation, pose[:, 2], standing)
         passed = codes == 0
