@@ -58,6 +58,7 @@ class Planner:
             expansions=1,
             hasty=self.hasty,
             slides=False,
+            paced=False,
             calmer=tuple(Timing(swing=float(pace)) for pace in range(calmer + 1, self.paces)),
             screen=SimpleNamespace(),
         )

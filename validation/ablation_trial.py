@@ -109,7 +109,7 @@ def ablation_trial(settings: TrialSettings, case: Case, planner: str, effort: Ef
     """
     robot, world = robot_of(settings.robot, settings.robots), case.world()
     record: Record = {"kind": case.kind, "seed": case.seed, "planner": planner, "stage": "planning", "variants": {}}
-    truth = Truth(robot, world)
+    truth = Truth(robot, world, settings.planning.timing)
     searches: list[Searched] = []
     try:
         while len(searches) < effort.rounds and _left(effort, searches):

@@ -48,7 +48,7 @@ def budget_trial(settings: TrialSettings, case: Case, budgets: Sequence[int]) ->
     """A record: searches of one world with several budgets."""
     robot, world = robot_of(settings.robot, settings.robots), case.world()
     record: Record = {"kind": case.kind, "seed": case.seed, "planner": settings.planner, "stage": "planning"}
-    truth, by_budget, violations, states = Truth(robot, world), {}, 0, 0
+    truth, by_budget, violations, states = Truth(robot, world, settings.planning.timing), {}, 0, 0
     for budget in budgets:
         try:
             searched = search(with_expansions(settings, budget), world, settings.planner, [case.seed, 0], truth)

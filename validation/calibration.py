@@ -69,7 +69,7 @@ def calibration_trial(settings: TrialSettings, case: Case, planner: str, search_
     robot, world = robot_of(settings.robot, settings.robots), case.world()
     record: Record = {"kind": case.kind, "seed": case.seed, "planner": planner, "stage": "planning"}
     record["search"] = search_number
-    truth, judge = Truth(robot, world), Judge(robot, world)
+    truth, judge = Truth(robot, world, settings.planning.timing), Judge(robot, world)
     try:
         searched = search(settings, world, planner, [case.seed, search_number], truth)
         bounds = BoundCheck(searched.planner)

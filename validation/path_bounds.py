@@ -65,7 +65,8 @@ class BoundCheck:
         config, ground = planner.config, planner.ground
         way = ground.way(ground.start_stance())
         # The weights do not depend on the judge.
-        weights = strategy_of(config, KinematicEvaluator(planner.robot), way.length, slides=way.slides).cost
+        judge, slides = KinematicEvaluator(planner.robot), way.slides
+        weights = strategy_of(config, judge, way.length, slides=slides, paced=planner.paced).cost
         self._usual, self._scale = weights, planner.robot.scale
         self._weights = weights.scaled(self._scale)
         table, timings = ground.moves(way).table, planner.timings(slides=way.slides)

@@ -68,7 +68,7 @@ def regret_trial(settings: TrialSettings, case: Case, effort: Effort, known: Pat
     """The record of one world; `known` is a folder with the best plans of earlier runs."""
     robot, world = robot_of(settings.robot, settings.robots), case.world()
     record: Record = {"kind": case.kind, "seed": case.seed, "passed": False, "stage": "planning"}
-    truth, found = Truth(robot, world), list[tuple[str, Tested]]()
+    truth, found = Truth(robot, world, settings.planning.timing), list[tuple[str, Tested]]()
     try:
         own = search(settings, world, settings.planner, [case.seed, 0], truth)
         for planner in PLANNERS:

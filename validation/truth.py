@@ -23,6 +23,7 @@ from toolkit.search.costs.plan_cost import PlanCost, plan_cost
 from toolkit.search.ground import Ground
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.sequence_screen import SequenceScreen
+from toolkit.world.timing import Timings, given_timings
 from toolkit.world.world import World
 from validation.motion_figures import motion_figures
 
@@ -79,15 +80,16 @@ class Truth:
     Args:
         robot: The robot.
         world: The world.
+        timings: That all planners are asked for.
 
     Attributes:
-        cost: Weights of the true cost on this ground, the same for all planners.
+        cost: Weights of the true cost on this ground and at this timing, the same for all planners.
     """
 
-    def __init__(self, robot: RobotModel, world: World):
+    def __init__(self, robot: RobotModel, world: World, timings: Timings):
         config = PipelineConfig()
         self._tester = Tester(robot, world, config, Observer())
-        self.cost = config.cost.on_ground(slides=slides(robot, world))
+        self.cost = config.cost.where(slides=slides(robot, world), paced=not given_timings(timings, world.timing))
         self._known: dict[bytes, Outcome] = {}
 
     def __call__(self, sequence: ContactSequence, plan: MotionPlan | None = None) -> Outcome:

@@ -25,6 +25,15 @@ def test_what_is_asked_for_goes_before_the_world_and_the_world_before_the_own_ch
     assert timings_of((), None, 1.0) == timings_of("auto", own, 1.0) == own_choice(1.0)
 
 
+def test_the_pace_is_the_planners_where_nobody_names_a_timing(robot):
+    free, bound = (make_world(FLOOR, goal=(1.2, 0, 0), timing=timing) for timing in (None, "0.4 0.6"))
+    asked = PlannerConfig(timings=(Timing(0.4, 0.6),))
+    assert make_planner(robot, free, "kinematic").paced
+    assert make_planner(robot, bound, "kinematic", PlannerConfig(timings="auto")).paced
+    assert not make_planner(robot, bound, "kinematic").paced
+    assert not make_planner(robot, free, "kinematic", asked).paced
+
+
 def test_small_bodies_move_faster():
     small, large = own_choice(0.5), own_choice(1.0)
     for quick, slow in zip(small, large, strict=True):

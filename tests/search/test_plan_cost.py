@@ -94,12 +94,20 @@ def test_the_objective_with_other_weights_is_that_of_the_same_motion(plan):
 
 def test_steep_ground_costs_nothing_where_no_way_avoids_it():
     config = CostConfig()
-    assert config.on_ground(slides=False) == config
-    assert config.on_ground(slides=True) == replace(config, steep=0.0)
+    assert config.where(slides=False, paced=False) == config
+    assert config.where(slides=True, paced=False) == replace(config, steep=0.0)
+
+
+def test_a_second_costs_more_where_the_pace_is_the_planners_to_choose():
+    config = CostConfig()
+    assert config.where(slides=False, paced=True) == replace(config, time=config.pace)
+    assert config.pace > config.time
 
 
 def test_rivals_search_by_steps_and_not_by_seconds(robot, world):
     one, two = PlannerConfig(search=QUICK), PlannerConfig(search=QUICK, timings=(FAST, SLOW))
     for config in (one, two):
-        assert make_planner(robot, world, "kinematic", config).config.cost == replace(config.cost, time=0.0)
-    assert quasi_static_planner(robot, world, one).config.cost == replace(one.cost, time=0.0, steep=0.0, dynamics=0.0)
+        assert make_planner(robot, world, "kinematic", config).config.cost == replace(config.cost, time=0.0, pace=0.0)
+    assert quasi_static_planner(robot, world, one).config.cost == replace(
+        one.cost, time=0.0, pace=0.0, steep=0.0, dynamics=0.0
+    )

@@ -37,7 +37,7 @@ def quick(robot):
 
 
 def test_an_ordinary_search_judges_at_once_and_doubts_nothing(quick):
-    strategy = strategy_of(CONFIG, quick, 3.0, slides=False)
+    strategy = strategy_of(CONFIG, quick, 3.0, slides=False, paced=False)
     assert (strategy.at_once, strategy.waiting, strategy.hasty) == (quick, None, None)
     assert strategy.cost == CONFIG.cost
     assert strategy.patient == replace(CONFIG.search, initial_cost=3.0 * CONFIG.acceptable_cost, layer=0.13)
@@ -46,7 +46,7 @@ def test_an_ordinary_search_judges_at_once_and_doubts_nothing(quick):
 @pytest.mark.parametrize("slides", [False, True])
 def test_a_lazy_search_lets_everything_wait_and_may_look_at_more(robot, slides):
     judge = Slow(robot)
-    strategy = strategy_of(CONFIG, judge, 0.5, slides=slides)
+    strategy = strategy_of(CONFIG, judge, 0.5, slides=slides, paced=False)
     assert (strategy.at_once, strategy.waiting, strategy.hasty) == (None, judge, None)
     assert strategy.patient.max_expansions == 2000
     assert strategy.patient.initial_cost == CONFIG.acceptable_cost
@@ -57,7 +57,7 @@ def test_a_lazy_search_lets_everything_wait_and_may_look_at_more(robot, slides):
 @pytest.mark.parametrize(("limit", "patient", "hasty"), [(100, 1000, 30), (None, None, 300)])
 def test_a_sliding_search_begins_in_haste_and_asks_the_stand_in(quick, limit, patient, hasty):
     config = replace(CONFIG, search=replace(CONFIG.search, max_expansions=limit))
-    strategy = strategy_of(config, quick, 3.0, slides=True)
+    strategy = strategy_of(config, quick, 3.0, slides=True, paced=False)
     assert (strategy.at_once, strategy.waiting) == (quick, quick.stand_in)
     assert strategy.hasty is not None and strategy.hasty.first_only and not strategy.patient.first_only
     assert (strategy.patient.max_expansions, strategy.hasty.max_expansions) == (patient, hasty)
@@ -68,7 +68,10 @@ def test_a_sliding_search_begins_in_haste_and_asks_the_stand_in(quick, limit, pa
 
 def test_a_given_first_cost_is_kept(quick):
     config = replace(CONFIG, search=replace(CONFIG.search, initial_cost=7.0))
-    assert all(strategy_of(config, quick, 3.0, slides=slides).patient.initial_cost == 7.0 for slides in (False, True))
+    assert all(
+        strategy_of(config, quick, 3.0, slides=slides, paced=False).patient.initial_cost == 7.0
+        for slides in (False, True)
+    )
 
 
 def test_a_limb_that_moved_last_is_all_that_changes():

@@ -101,7 +101,7 @@ def searched():
     """A short search with the networks, its world and its settings."""
     settings = options.settings_of(options.parser("calibration", "", ["flat"], 1).parse_args(["--planner", OURS]))
     robot, world = load_robot(None), Case("any_gap", 5).world()
-    return robot, world, search(with_expansions(settings, 60), world, OURS, [5, 0], Truth(robot, world))
+    return robot, world, search(with_expansions(settings, 60), world, OURS, [5, 0], Truth(robot, world, ()))
 
 
 def test_judging_a_path_again_gives_what_the_search_predicted(searched):

@@ -324,8 +324,9 @@ class _Run:
 
     @property
     def _weights(self) -> CostConfig:
-        """Weights of the true cost on the ground of the last search."""
-        return self._config.cost.on_ground(slides=self._searches[-1].slides)
+        """Weights of the true cost on the ground and at the timing of the last search."""
+        search = self._searches[-1]
+        return self._config.cost.where(slides=search.slides, paced=search.paced)
 
     def _tried(self, found: list[Candidate]) -> bool:
         """Whether a candidate passes the stages after the optimiser; the truly cheapest is tried first.

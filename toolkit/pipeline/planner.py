@@ -66,7 +66,7 @@ def make_planner(
 
         return quasi_static_planner(robot, world, config)
     if kind == "kinematic":
-        config = replace(config, one_timing=True, cost=replace(config.cost, time=0.0))
+        config = replace(config, one_timing=True, cost=replace(config.cost, time=0.0, pace=0.0))
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
     optimiser = OptimiserEvaluator(robot)
     judge = _networks(robot, world, optimiser) if kind == "learned" else optimiser

@@ -36,7 +36,7 @@ from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import CONTACTS, is_pending, moved_last, unpack
 from toolkit.search.strategies import Strategy, strategy_of
-from toolkit.world.timing import Timing, timings_of
+from toolkit.world.timing import Timing, given_timings, timings_of
 from toolkit.world.world import World
 
 _STRIKES = 2  # failures of the whole sequence in like transitions after which the search avoids them
@@ -86,6 +86,11 @@ class ContactPlanner:
         timings = timings_of(config.timings, own, self.robot.pace, pace)
         return timings[:1] if config.one_timing else timings
 
+    @property
+    def paced(self) -> bool:
+        """Whether the timing is the planner's to choose."""
+        return not given_timings(self.config.timings, self.world.timing)
+
     def _paces_after(self, calmer: int, *, slides: bool) -> tuple[Timing, ...]:
         """The calmest timing of every pace to which the pace may still yield."""
         found = [self.timings(calmer, slides=slides)]
@@ -126,7 +131,7 @@ class ContactPlanner:
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
         tally, timings = Tally(), self.timings(calmer, slides=way.slides)
         suited, scale = self._suited(start, com, timings, tally), self.robot.scale.length
-        strategy = strategy_of(self.config, suited, way.length, slides=way.slides, scale=scale)
+        strategy = strategy_of(self.config, suited, way.length, slides=way.slides, paced=self.paced, scale=scale)
         blame = Blame(exclusions, _STRIKES, scale=scale)
         parts = self._parts(way, strategy, timings, tally, blame.exclusions, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
@@ -155,6 +160,7 @@ class ContactPlanner:
             reason="" if result.paths else self._reason(result, tally),
             warning=_UNTRAINED if tally.untrained else "",
             slides=way.slides,
+            paced=self.paced,
             calmer=paces,
             screen=parts.screen,
         )

@@ -132,7 +132,7 @@ def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig 
     palms = config.palms and bool(robot.arms) and _walls_in_reach(robot, world)
     config = replace(
         config,
-        cost=replace(config.cost, dynamics=0.0, time=0.0, steep=0.0),
+        cost=replace(config.cost, dynamics=0.0, time=0.0, pace=0.0, steep=0.0),
         rest_friction=None if palms else _FRICTION,
         one_timing=True,
     )

@@ -78,7 +78,8 @@ class SearchResult:
         reason: One line where there is no solution, else "".
         warning: One line where the judgements are less reliable, else "".
         hasty: Number of first solutions that only had to come soon; better ones follow.
-        slides: Whether no way leads over resting ground alone; see `CostConfig.on_ground`.
+        slides: Whether no way leads over resting ground alone; see `CostConfig.where`.
+        paced: Whether the planner chose the timing; see there.
         calmer: The calmest timing of every pace to come, the fastest pace first; empty where the pace is not the
             planner's to choose, or none is left.
         screen: The screens of the search, for sequences that are made from what it found; None where there are none.
@@ -94,6 +95,7 @@ class SearchResult:
     warning: str = ""
     hasty: int = 0
     slides: bool = False
+    paced: bool = False
     calmer: tuple[Timing, ...] = ()
     screen: SequenceScreen | None = field(default=None, repr=False, compare=False)
 

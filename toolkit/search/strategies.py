@@ -41,14 +41,20 @@ class Strategy:
 
 
 def strategy_of(
-    config: PlannerConfig, evaluator: TransitionEvaluator, length: float, *, slides: bool, scale: float = 1.0
+    config: PlannerConfig,
+    evaluator: TransitionEvaluator,
+    length: float,
+    *,
+    slides: bool,
+    paced: bool,
+    scale: float = 1.0,
 ) -> Strategy:
-    """The strategy that suits a judge, the length of the way in m and its ground.
+    """The strategy that suits a judge, the length of the way in m, its ground and its timing.
 
-    `slides` says whether no way leads over resting ground alone; `scale` is the factor on the robot's lengths.
+    `slides` and `paced` are those of `CostConfig.where`; `scale` is the factor on the robot's lengths.
     """
     length = max(length, scale * _SHORTEST)
-    config = replace(config, cost=config.cost.on_ground(slides=slides))
+    config = replace(config, cost=config.cost.where(slides=slides, paced=paced))
     if slides:
         evaluator = evaluator.sliding or evaluator
         # Steep ground need not be avoided. Ways across it are rare and lie deep in the graph. Finding them takes less

@@ -47,8 +47,13 @@ def own_choice(factor: float, calmer: int = 0) -> tuple[Timing, ...]:
     return tuple(Timing(*times).times(factor) for times in pace)
 
 
+def given_timings(asked: Timings, own: Timing | None) -> tuple[Timing, ...]:
+    """The timings that are `asked` for, else the world's `own`; empty where they are the planner's to choose."""
+    if asked == "auto":
+        return ()
+    return asked or (() if own is None else (own,))
+
+
 def timings_of(asked: Timings, own: Timing | None, factor: float, calmer: int = 0) -> tuple[Timing, ...]:
     """The timings of a search: those `asked` for, else the world's `own`, else the planner's `own_choice`."""
-    if isinstance(asked, tuple) and asked:
-        return asked
-    return (own,) if own is not None and asked != "auto" else own_choice(factor, calmer)
+    return given_timings(asked, own) or own_choice(factor, calmer)

@@ -66,7 +66,8 @@ def contact_graph(planner: ContactPlanner, evaluator: TransitionEvaluator) -> Co
     way = ground.way(start)
     timings, tally = planner.timings(slides=way.slides), Tally()
     scale = robot.scale
-    strategy = strategy_of(planner.config, evaluator, way.length, slides=way.slides, scale=scale.length)
+    slides, paced = way.slides, planner.paced
+    strategy = strategy_of(planner.config, evaluator, way.length, slides=slides, paced=paced, scale=scale.length)
     moves = ground.moves(way)
     limbs = [limb for limb in PALMS if planner.config.palms and moves.has_palm_surfaces and limb in robot.arms]
     reader, reach = StateReader(moves.table, timings, scale), ReachCheck(moves, limbs, timings)

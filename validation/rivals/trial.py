@@ -95,7 +95,7 @@ def rival_trial(settings: TrialSettings, case: Case, rival: str | Mixed, seconds
     name = rival if isinstance(rival, str) else rival.name
     record: Record = {"kind": case.kind, "seed": case.seed, "rival": name, "stage": "planning"}
     record |= {"found": False, "feasible": False, "passed": False}
-    truth = Truth(robot, world)
+    truth = Truth(robot, world, settings.planning.timing)
     try:
         planner = make_planner(settings, world)
         began, worked = time.perf_counter(), time.process_time()

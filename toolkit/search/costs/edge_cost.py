@@ -36,6 +36,8 @@ class CostConfig:
         step: Weight w_s of the paper.
         dynamics: Weight w_dyn of the paper.
         time: Cost per s. It always counts: the objective of the dynamics alone is least for the slowest walk.
+        pace: The same where the planner chooses the timing, so that a transition's seconds are no part of the task: the
+            price at which a robot walks briskly where it can.
         steep: Weight of (`reserve` over the part of its friction that resting leaves) - 1 of a foot's new contact. A
             contact that nearly slides is feasible but leaves the motion no room, so the search avoids it. Does not
             count where no way leads over resting ground.
@@ -46,13 +48,20 @@ class CostConfig:
     step: float = 3.0
     dynamics: float = 0.1
     time: float = 20.0
+    pace: float = 60.0
     steep: float = 200.0
     reserve: float = 0.5
     stagger: float = 5.0
 
-    def on_ground(self, *, slides: bool) -> CostConfig:
-        """The weights on ground over which no way leads on resting contacts alone (`slides`), or on other ground."""
-        return replace(self, steep=0.0) if slides else self
+    def where(self, *, slides: bool, paced: bool) -> CostConfig:
+        """The weights of one run.
+
+        Args:
+            slides: Whether no way leads over resting ground alone.
+            paced: Whether the planner chooses the timing.
+        """
+        steep, time = 0.0 if slides else self.steep, self.pace if paced else self.time
+        return replace(self, steep=steep, time=time)
 
     def scaled(self, scale: Scale) -> CostConfig:
         """The weights with which a body of another size chooses the same plan in a world to scale.
@@ -68,6 +77,7 @@ class CostConfig:
             step=scale.length * self.step,
             dynamics=per_second * self.dynamics,
             time=per_second * self.time,
+            pace=per_second * self.pace,
             steep=scale.length * self.steep,
         )
 

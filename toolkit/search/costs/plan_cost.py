@@ -64,7 +64,7 @@ def plan_cost(plan: MotionPlan, config: CostConfig) -> PlanCost:
 
     Args:
         plan: Contacts, times and motion; its contacts count where the optimiser has put them.
-        config: Weights, on the ground that the plan crosses (`CostConfig.on_ground`).
+        config: Weights of the run (`CostConfig.where`).
     """
     cost, candidates = _transitions(plan.sequence, plan.world.goal, config, plan.robot.scale)
     way, step, time, steep, stagger = (float(term.sum()) for term in cost.terms(candidates))
