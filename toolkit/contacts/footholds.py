@@ -123,7 +123,7 @@ def _sole_axis(normal: np.ndarray, yaw: float) -> np.ndarray:
 def _nearest(region: shapely.Geometry | np.ndarray, points: np.ndarray) -> np.ndarray:
     """The points (n, 2) of a region, or of n regions, nearest to points (n, 2)."""
     lines = shapely.shortest_line(shapely.points(points), region)
-    return shapely.get_coordinates(shapely.get_point(lines, 1))
+    return shapely.get_coordinates(lines).reshape(-1, 2, 2)[:, 1]
 
 
 def _eroded(surface: Surface, along: np.ndarray, half: np.ndarray) -> shapely.Geometry:

@@ -20,8 +20,8 @@ class CollectConfig:
         networks: Folder of networks that take part in the search; None for none.
         networks_digest: Digest of their files, so that a collection goes on with the same ones.
         paper_share: Share of worlds with the paper's timing (1 s + 1 s) and friction (0.5).
-        planned_share: Share of worlds with the timing at which planners are compared (0.6 s + 0.8 s). The other worlds
-            draw timings.
+        planned_share: Share of worlds with the timing at which planners are compared (0.6 s + 0.8 s).
+        own_share: Share of worlds in which searches choose the timing as planners do. The other worlds draw timings.
         shift, swing: Ranges of times in s, drawn uniformly in their logarithm, for a body whose CoM is 1 m high; the
             times of others scale as a pendulum of their height does.
         quick_shift, quick_swing: The same on steep slopes.
@@ -46,8 +46,9 @@ class CollectConfig:
     most_idle: int = 25
     networks: str | None = None
     networks_digest: str = ""
-    paper_share: float = 0.25
-    planned_share: float = 0.35
+    paper_share: float = 0.15
+    planned_share: float = 0.3
+    own_share: float = 0.35
     shift: tuple[float, float] = (0.04, 1.5)
     swing: tuple[float, float] = (0.25, 1.5)
     quick_shift: tuple[float, float] = (0.04, 0.2)

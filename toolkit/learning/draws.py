@@ -30,10 +30,12 @@ from toolkit.world.timing import Timing
 from toolkit.world.world import World
 
 _NOISE = 0.5  # greatest deviation of the logarithm of the noise on objectives
+_TIME, _PACE = 10.0, 50.0  # middle of the costs of a second, where timings are drawn or a planner's own choice
 _COSTLY = 4  # part of the expansions where the optimiser judges
 _ASIDE = 0.7  # share of the variants without palms that have some other steps
 _CUT = 0.2  # share of variants that are cut
 _WITH_PALMS = 0.6  # share of variants with palms, while labels of such transitions are lacking; half of it otherwise
+_RETIMED = 0.3  # share of variants with other timings than the search's, where these are a planner's own choice
 _CHEAP = 0.05  # factor on objectives of categories of which labels are lacking, in every other search
 
 
@@ -47,6 +49,7 @@ class Place:
         timings: Timings of transitions to choose from.
         steep: Whether no foot can rest somewhere on the way.
         networks: Networks that may judge; empty for none.
+        paced: Whether the timings are a planner's own choice.
     """
 
     robot: RobotModel
@@ -54,6 +57,7 @@ class Place:
     timings: tuple[Timing, ...]
     steep: bool
     networks: Mapping[Category, TransitionNetwork]
+    paced: bool = False
 
 
 def draw_sequences(
@@ -86,7 +90,8 @@ def _variant(
         sequence = stepping_aside(sequence, scout, rng)
     if rng.random() < _CUT:
         sequence = part_of(sequence, rng)
-    return timed(sequence, list(place.timings), rng) if len(place.timings) > 1 else sequence
+    retimed = len(place.timings) > 1 and rng.random() < (_RETIMED if place.paced else 1.0)
+    return timed(sequence, list(place.timings), rng) if retimed else sequence
 
 
 def _judge(place: Place, rng: np.random.Generator) -> TransitionEvaluator:
@@ -119,7 +124,7 @@ def _settings(place: Place, config: CollectConfig, rng: np.random.Generator) -> 
     cost = CostConfig(
         step=3.0 * _spread(rng, 4.0),
         dynamics=0.1 * _spread(rng, 4.0),
-        time=5.0 * _spread(rng, 3.0),
+        time=(_PACE if place.paced else _TIME) * _spread(rng, 3.0),
         steep=200.0 * rng.random(),
     )
     expansions = int(rng.integers(*config.expansions)) // (_COSTLY if place.steep and not place.networks else 1)

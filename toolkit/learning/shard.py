@@ -28,11 +28,12 @@ from toolkit.prediction.networks import load_networks
 from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from toolkit.world.scaling import Fit
-from toolkit.world.timing import Timing
+from toolkit.world.timing import Timing, own_choice
 
 WORLDS = 1000
 """Numbers of worlds that a shard may use: those of shard i begin with i times this."""
 _PAPER_FRICTION = 0.5
+_CALMER = 0.6, 0.25, 0.15  # shares of how often the planner's own pace has yielded
 
 
 @lru_cache(maxsize=2)
@@ -83,17 +84,21 @@ def _place(robot: RobotModel, quota: Quota, config: CollectConfig, rng: np.rando
     if kind == STEEP:
         timings = (_random_timing(config.quick_shift, config.quick_swing, pace, rng),)
         return Place(robot, steep_descent(rng, friction, fit.factor), timings, True, networks)
-    which = rng.random()
-    if which < config.paper_share:
+    shares = np.cumsum([config.paper_share, config.planned_share, config.own_share])
+    which, paced = int(np.searchsorted(shares, rng.random(), side="right")), False
+    if which == 0:
         timings, friction = (PAPER,), _PAPER_FRICTION
-    elif which < config.paper_share + config.planned_share:
+    elif which == 1:
         timings = (PLANNED,)
+    elif which == 2:
+        timings, paced = own_choice(pace, int(rng.choice(3, p=_CALMER))), True
     else:
         count = int(rng.integers(1, config.choices + 1))
         timings = tuple(_random_timing(config.shift, config.swing, pace, rng) for _ in range(count))
     most = min(config.tilt[1], fit.tilt)
     config = replace(config, tilt=(min(config.tilt[0], most), most))
-    return Place(robot, random_world(rng, config, kind, friction, fit.factor), timings, False, networks)
+    world = random_world(rng, config, kind, friction, fit.factor)
+    return Place(robot, world, timings, False, networks, paced=paced)
 
 
 def _random_timing(
