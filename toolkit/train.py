@@ -117,6 +117,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
         device=args.device,
         seed=args.seed,
         length=robot.scale.length,
+        pace=robot.pace,
     )
     with progress_bar(console) as progress:
         task = progress.add_task("epochs", total=2 * config.epochs * len(wanted))

@@ -35,6 +35,8 @@ def fresh(folder: Path, robot: RobotModel, *, count: int, seed: int, workers: in
         seed=seed,
         samples_per_category=2 * count,
         paper_share=0.5,  # the paper's timing in as many transitions as the tables need
+        planned_share=0.2,
+        own_share=0.15,
     )
     with executor(workers) as pool:
         collect(folder, robot, config, pool)

@@ -12,9 +12,10 @@ from toolkit.learning.quota import Quota
 from toolkit.learning.samples import PARTS, Samples
 from toolkit.learning.shard import WORLDS, collect_shard
 from toolkit.learning.terrain import tiles_and_walls
-from toolkit.prediction.features import CONTACT, feature_size
+from toolkit.prediction.features import CONTACT, TIMING, feature_size
 from toolkit.robot.loader import load_robot
 from toolkit.world.loader import load_world
+from toolkit.world.timing import own_timings
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +64,13 @@ def test_a_shard_is_a_function_of_its_arguments(shard, config):
             np.testing.assert_array_equal(getattr(again[category], part), getattr(group, part))
         for different in others:
             assert not np.array_equal(different[category].features, group.features)
+
+
+def test_searches_choose_timings_as_planners_do(config):
+    alone = replace(config, paper_share=0.0, planned_share=0.0, own_share=1.0, most_worlds=1)
+    times = collect_shard(alone, 2)[Category.MOVE_FOOT].features[:, TIMING].astype(float)
+    own = np.array([(each.shift, each.swing) for each in own_timings(load_robot(config.robot).pace)])
+    assert len(times) and (np.abs(times[:, None] - own).max(2).min(1) < 1e-6).all()
 
 
 def some(count, known):

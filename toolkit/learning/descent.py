@@ -29,6 +29,7 @@ class FitConfig:
         device: The device that torch computes on.
         seed: Seed of the initial weights and of the shuffling.
         length: Factor on the lengths of the robot (`toolkit.robot.scale`).
+        pace: Factor on the times of its planner's own timings (`RobotModel.pace`).
     """
 
     epochs: int = 120
@@ -39,6 +40,7 @@ class FitConfig:
     device: str = "cpu"
     seed: int = 0
     length: float = 1.0
+    pace: float = 1.0
 
 
 @dataclass(frozen=True)

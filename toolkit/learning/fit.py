@@ -16,7 +16,7 @@ from toolkit.contacts.category import Category
 from toolkit.errors import DatasetError, InputError, NetworkError
 from toolkit.learning.descent import Curve, FitConfig, descend
 from toolkit.learning.layers import Scaling, perceptron
-from toolkit.learning.samples import Samples, Split, join
+from toolkit.learning.samples import PAPER, PLANNED, Samples, Split, join
 from toolkit.learning.tasks import Classification, Regression
 from toolkit.prediction.features import AHEAD, COM, TARGETS, TIMING, ahead
 from toolkit.prediction.network import (
@@ -32,6 +32,7 @@ from toolkit.prediction.network import (
     with_goal,
 )
 from toolkit.robot.scale import Scale
+from toolkit.world.timing import own_timings
 
 BLURRED = 2  # copies of each sample whose CoM state is disturbed
 # m and m/s for a body of the usual size (`toolkit.robot.scale`); usual errors of predicted states
@@ -135,6 +136,7 @@ def train_networks(
         tensor(samples.features[kept, TIMING]),
         tensor((with_goal(features, goal) - mean) / std),
         tensor((targets - out_mean) / scaling.out_std),
+        {PAPER, PLANNED, *own_timings(config.pace)},
     )
     held_out = _held_out(samples.select(kept))
     curves["regressor"] = descend(

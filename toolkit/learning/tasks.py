@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import torch
 from torch import nn
 
-from toolkit.learning.samples import PAPER, PLANNED
 from toolkit.prediction.features import TARGETS
+from toolkit.world.timing import Timing
 
 WIDTH = 0.02  # standard deviations of an output; below this the smooth L1 loss is quadratic
 OBJECTIVE_WEIGHT = 3.0  # weight of the objective's loss; the six other outputs have the weight 1
-USUAL_WEIGHT = 3.0  # samples with other timings than the paper's and the planners' take part in one of so many epochs
+USUAL_WEIGHT = 3.0  # samples with other timings than the usual ones take part in one of so many epochs
 
 
 class Classification:
@@ -36,14 +38,15 @@ class Regression:
         timing: (n, 2) shift and swing of each sample in s.
         inputs: (n, d) z-scored features.
         targets: (n, 7) scaled outputs.
+        usual: Timings that matter most.
     """
 
-    def __init__(self, timing: torch.Tensor, inputs: torch.Tensor, targets: torch.Tensor):
+    def __init__(self, timing: torch.Tensor, inputs: torch.Tensor, targets: torch.Tensor, usual: Iterable[Timing]):
         self._inputs, self._targets = inputs, targets
         self._weights = torch.ones(TARGETS, device=targets.device)
         self._weights[0] = OBJECTIVE_WEIGHT
-        usual = timing.new_tensor([(item.shift, item.swing) for item in (PAPER, PLANNED)])
-        others = ((timing[:, None] - usual).abs() > 1e-5).any(2).all(1)
+        times = timing.new_tensor([(item.shift, item.swing) for item in usual])
+        others = ((timing[:, None] - times).abs() > 1e-5).any(2).all(1)
         self.share = torch.where(others, 1.0 / USUAL_WEIGHT, 1.0).double()
         if others.all():
             self.share[:] = 1.0

@@ -47,6 +47,11 @@ def own_choice(factor: float, calmer: int = 0) -> tuple[Timing, ...]:
     return tuple(Timing(*times).times(factor) for times in pace)
 
 
+def own_timings(factor: float) -> set[Timing]:
+    """All timings that `own_choice` offers at any pace."""
+    return {timing for calmer in range(len(_PACES)) for timing in own_choice(factor, calmer)}
+
+
 def given_timings(asked: Timings, own: Timing | None) -> tuple[Timing, ...]:
     """The timings that are `asked` for, else the world's `own`; empty where they are the planner's to choose."""
     if asked == "auto":
