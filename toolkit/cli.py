@@ -107,7 +107,7 @@ def add_planning_options(target: argparse.ArgumentParser) -> None:
         metavar="SHIFT,SWING",
         type=timing,
         help="seconds of shifting the CoM and of moving the limb, e.g. 0.4,0.6 or the paper's 1,1; auto: the planner "
-        "chooses for each transition, and a second costs as much as 60 m of way, or else 20 m (default: the world's, "
+        "chooses for each transition; a second costs as much as 20 m of way, with auto as 60 m (default: the world's, "
         "or auto where it names none)",
     )
     target.add_argument(
