@@ -8,11 +8,9 @@ import numpy as np
 
 from toolkit.centroidal.intervals import intervals
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.search.costs.edge_cost import EdgeCost
 from toolkit.search.costs.plan_cost import known_cost
 from toolkit.search.planner import ContactPlanner
-from toolkit.search.strategies import strategy_of
 from validation.searched import Tested
 
 ROUNDING = 1e-2  # of the cost to go; states are rounded to 1 mm and 0.1 degree, the contacts of a sequence are not
@@ -64,9 +62,7 @@ class BoundCheck:
     def __init__(self, planner: ContactPlanner):
         config, ground = planner.config, planner.ground
         way = ground.way(ground.start_stance())
-        # The weights do not depend on the judge.
-        judge, slides = KinematicEvaluator(planner.robot), way.slides
-        weights = strategy_of(config, judge, way.length, slides=slides, paced=planner.paced).cost
+        weights = config.cost.where(slides=way.slides, paced=planner.paced)
         self._usual, self._scale = weights, planner.robot.scale
         self._weights = weights.scaled(self._scale)
         table, timings = ground.moves(way).table, planner.timings(slides=way.slides)
