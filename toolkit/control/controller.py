@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from toolkit.centroidal.problem import Margins
+from toolkit.control import arm_clearance, link_clearance
+from toolkit.control.arm_clearance import ArmClearance
 from toolkit.control.corrector import PENDULUM_RATE, Cones, Corrector, MotionTarget
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.joint_box import JointBox
 from toolkit.control.limb_target import LimbTargets, rotation_sine
-from toolkit.control.link_clearance import MAX_PAIRS, LinkClearance
+from toolkit.control.link_clearance import LinkClearance
 from toolkit.control.qp import FORCE_UNIT, ContactQP
 from toolkit.control.sampled_plan import Reference
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.robot.scale import Scale
+
+_MAX_PAIRS = link_clearance.MAX_PAIRS + arm_clearance.MAX_PAIRS
 
 
 class TaskGains(NamedTuple):
@@ -107,6 +112,7 @@ class Controller:
     def __init__(
         self,
         robot: RobotModel,
+        scene: mujoco.MjModel,
         reference: Reference,
         margins: Margins,
         period: float,
@@ -116,6 +122,7 @@ class Controller:
 
         Args:
             robot: The robot as the controller knows it.
+            scene: The robot in the world as the controller knows it, which arms keep clear of.
             reference: The plan at the control ticks.
             margins: The plan's margins; the controller's lie between them and none.
             period: Time between control ticks in s.
@@ -140,7 +147,8 @@ class Controller:
         self._moment_weight = MOMENT * FORCE_UNIT**2 / scale.length**2
         self.tracker = ContactTracker(reference, self.limbs, weight, limit, scale)
         self.targets = LimbTargets(reference, self.tracker)
-        self._box, self._clearance = JointBox(robot), LinkClearance(robot, self.dynamics)
+        self._box = JointBox(robot)
+        self._links, self._in_world = LinkClearance(robot, self.dynamics), ArmClearance(robot, scene)
         self._torque_limit = TORQUE_FRACTION * robot.torque_limit
         self._limits = {
             urgent: Cones(
@@ -183,8 +191,8 @@ class Controller:
             self._com += self._corrector.com_shift
         self.targets.update(index, self.dynamics)
         limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
-        self._clearance.update(qvel)
-        pairs = MAX_PAIRS if self._clearance.count else 0  # all others are spared these rows
+        self._keep_clear(qpos, qvel)
+        pairs = _MAX_PAIRS if len(self._least) else 0  # all others are spared these rows
         qp = self._qps.get((limbs, pairs))
         if qp is None:
             qp = self._qps[limbs, pairs] = ContactQP(limbs, self.dynamics.nv, self._force_unit, pairs)
@@ -201,6 +209,15 @@ class Controller:
         limit = self._robot.torque_limit
         return np.clip(torque, -limit, limit)
 
+    def _keep_clear(self, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Find the links that come near each other, and the arms that come near the world."""
+        tracker, authority = self.tracker, self.targets.authority
+        reaching = [palm for palm in self._arms if tracker.in_contact[palm] or authority[palm] > 0.0]
+        self._links.update(qvel)
+        self._in_world.update(qpos, qvel, reaching)
+        parts = [(each.rows[: each.count], each.lower[: each.count]) for each in (self._links, self._in_world)]
+        self._near, self._least = (np.concatenate(each) for each in zip(*parts, strict=True))
+
     def _constrain(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in dynamics, cones and boxes."""
         tracker = self.tracker
@@ -211,9 +228,8 @@ class Controller:
             qp.set_normal_force(limb, tracker.min_force[limb], tracker.max_force[limb])
         self._box.update(qpos[7:], qvel[6:])
         qp.set_acceleration(self._box.lower, self._box.upper)
-        if self._clearance.count:
-            count = self._clearance.count
-            qp.set_clearance(self._clearance.rows[:count], self._clearance.lower[:count])
+        if len(self._least):
+            qp.set_clearance(self._near, self._least)
 
     def _pursue(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in the objective."""

@@ -76,7 +76,7 @@ class LinkClearance:
             mujoco.mj_jac(self._model, data, part, None, data.contact.pos[contact], int(body))
         row = data.contact.frame[contact, :3] @ (second - first)
         room = float(data.contact.dist[contact]) - safe
-        return row, -self._rate * (self._rate * room + 2.0 * float(row @ qvel))
+        return row, least_acceleration(room, float(row @ qvel), self._rate)
 
     def _set_home(self, home: np.ndarray) -> None:
         """Least distances of pairs of links that are near each other in the home posture."""
@@ -87,3 +87,11 @@ class LinkClearance:
         first, second = model.geom_bodyid[data.contact.geom].T
         for a, b in ((first, second), (second, first)):
             np.minimum.at(self._home, (a, b), data.contact.dist)
+
+
+def least_acceleration(room: float, speed: float, rate: float) -> float:
+    """Least acceleration in m/s^2 of a distance with so much `room` in m, which grows at a speed in m/s.
+
+    The rate in 1/s is r of `LinkClearance`.
+    """
+    return -rate * (rate * room + 2.0 * speed)

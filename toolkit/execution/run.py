@@ -73,7 +73,7 @@ def execute(
     margins, replanner = plan.motion.solved.margins, None
     if config.replanning and margins.friction <= MAX_FRICTION:
         replanner = Replanner(reference, plan)
-    controller = Controller(robot, reference, margins, period, replanner)
+    controller = Controller(robot, plan.scene, reference, margins, period, replanner)
     standard = Standard.of(plan, config, reference.swings, ticks)
     recorder = Recorder(standard, ticks, scene, index)
     told = StateFilter(config.disturbance, period, rng)
