@@ -4,10 +4,11 @@ import pytest
 from tests.wholebody.conftest import FIRST, RISE, stairs, world_of
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, rotation_on_surface, yaw_of
+from toolkit.wholebody import swing_planner, swing_task
 from toolkit.wholebody.detour import corners, gaps
 from toolkit.wholebody.limb_paths import box_collide
 from toolkit.wholebody.swing_planner import plan_swing
-from toolkit.wholebody.swing_task import EASY, GAP, LATE, LIFT, MARGIN, STEEP, SwingTask
+from toolkit.wholebody.swing_task import EASY, GAP, LIFT, MARGIN, STEEP, SwingTask
 
 HALF = np.array([0.11, 0.065])
 
@@ -170,14 +171,31 @@ def test_toes_and_knee_turn_outward_before_the_legs_pass_each_other():
     assert turned(Limb.LEFT_FOOT, 0.5, 0.3) < 0.95  # a fast one takes longer
 
 
-def test_a_fast_foot_before_an_edge_is_lifted_less_where_it_crosses_late():
-    riser = '<geom type="box" size="0.3 1 0.03" pos="0.43 0 0.03"/>'
-    start, end = (Pose.from_yaw(np.array(place), 0.0) for place in ([0.0, 0.1, 0.0], [0.9, 0.1, 0.0]))
+@pytest.mark.parametrize(
+    ("box", "rise", "reach", "beyond"),
+    [
+        ('size="0.3 1 0.03" pos="1.43 0 0.03"', 0.0, 0.9, "LATE"),  # a riser before the toes
+        ('size="0.5 1 0.1" pos="0.85 0 0.1"', -0.2, 0.5, "EARLY"),  # an edge behind the heel
+    ],
+)
+def test_a_fast_foot_at_an_edge_crosses_when_it_needs_the_least_acceleration(monkeypatch, box, rise, reach, beyond):
+    start, end = (Pose.from_yaw(np.array(place), 0.0) for place in ([1.0, 0.1, -rise], [1.0 + reach, 0.1, 0.0]))
+    world = world_of(f'<geom type="box" {box}/>')
 
-    def lifted(duration, steep):
-        task = SwingTask(0.0, duration, start, end, HALF, True, steep=steep)
-        path = plan_swing(task, box_collide(world_of(riser)))
-        return path.clear and path.positions(np.linspace(0, 1, 101))[:, 2].max()
+    def path(duration):
+        return plan_swing(SwingTask(0.0, duration, start, end, HALF, True), box_collide(world))
 
-    assert lifted(0.3, LATE) < 0.2 < 0.3 < lifted(0.3, STEEP)
-    assert lifted(1.0, LATE) == lifted(1.0, STEEP) < 0.2  # a slow one crosses late anyhow
+    chosen, slow = path(0.3), path(1.0)
+    for timing in ("LATE", "EARLY"):
+        monkeypatch.setattr(swing_planner, timing, STEEP)
+    assert chosen.clear and chosen.peak_acceleration < 0.9 * path(0.3).peak_acceleration
+    assert path(1.0).peak_acceleration == slow.peak_acceleration  # there the time suffices
+    monkeypatch.setattr(swing_planner, beyond, getattr(swing_task, beyond))
+    assert path(0.3).peak_acceleration == chosen.peak_acceleration
+
+
+def test_the_peak_acceleration_is_that_of_the_samples():
+    start, end = (Pose.from_yaw(np.array(place), 0.0) for place in ([0.0, 0.1, 0.0], [0.5, 0.1, 0.1]))
+    path = plan_swing(SwingTask(0.0, 0.4, start, end, HALF, True), free(None))
+    largest = max(np.linalg.norm(path.sample(time).acceleration[:3]) for time in np.linspace(0.0, 0.4, 401))
+    assert path.peak_acceleration == pytest.approx(largest, rel=0.1)

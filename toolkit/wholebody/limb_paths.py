@@ -17,7 +17,7 @@ from toolkit.geometry.pose import Pose, mean_pose
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.swing import LimbSample, SwingPath, Window
 from toolkit.wholebody.swing_planner import Collide, plan_swing
-from toolkit.wholebody.swing_task import LIFT, SAMPLES, STEEP, SwingingLeg, SwingTask, SwingTiming
+from toolkit.wholebody.swing_task import LIFT, SAMPLES, SwingingLeg, SwingTask
 from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
 
@@ -93,12 +93,6 @@ class LimbPaths:
         return LEADING * (1.0 - near) if segment.free_end else LEADING + (1.0 - LEADING) * near
 
     @property
-    def windows(self) -> tuple[Window, ...]:
-        """When the limbs make their moves, one after another."""
-        swings = [segment.path for segments in self.segments for segment in segments if segment.path is not None]
-        return tuple(move.window for path in swings for move in path.moves)
-
-    @property
     def blocked(self) -> tuple[tuple[Limb, int], ...]:
         """Limb and transition of each path for which no clear way was found."""
         return tuple(
@@ -115,13 +109,11 @@ def limb_paths(
     schedule: ContactSchedule,
     motion: CentroidalMotion,
     foot_lift: float = LIFT,
-    steep: SwingTiming = STEEP,
 ) -> LimbPaths:
     """Paths of the limbs of a schedule, clear of the world's geometry where that is possible.
 
     Free palms hang relative to the CoM of the planned motion. Feet leave and reach their contacts straight along the
-    normal over `foot_lift` m, which is scaled with the body; where they have to rise more than a little, they do it in
-    `steep` timing. `LimbPaths.blocked` names the paths that are not clear.
+    normal over `foot_lift` m, which is scaled with the body. `LimbPaths.blocked` names the paths that are not clear.
     """
     collide = box_collide(world)
     segments: list[tuple[Segment, ...]] = []
@@ -132,7 +124,7 @@ def limb_paths(
             if contact is not None:
                 row.append(Segment(phase.start, phase.end, phase.transition, pose=contact.pose))
             elif phase.swing == limb:
-                row.append(_swing(robot, schedule, index, limb, motion, collide, foot_lift, steep))
+                row.append(_swing(robot, schedule, index, limb, motion, collide, foot_lift))
             else:
                 row.append(Segment(phase.start, phase.end, phase.transition))
         segments.append(tuple(row))
@@ -163,7 +155,6 @@ def _swing(
     motion: CentroidalMotion,
     collide: Collide,
     foot_lift: float,
-    steep: SwingTiming,
 ) -> Segment:
     """The segment of the limb that swings in phase `index`."""
     phases = schedule.phases
@@ -192,7 +183,7 @@ def _swing(
     size, scale = robot.half_sizes[limb], robot.scale
     lift = scale.length * (foot_lift if limb.is_foot else LIFT)
     ends = start, end, size, limb.is_foot, limb.outward, free_start, free_end
-    task = SwingTask(phase.start, phase.duration, *ends, other, leg, lift, scale, robot.passing_gap, steep, shin)
+    task = SwingTask(phase.start, phase.duration, *ends, other, leg, lift, scale, robot.passing_gap, shin)
     return Segment(phase.start, phase.end, phase.transition, None, plan_swing(task, collide), free_start, free_end)
 
 

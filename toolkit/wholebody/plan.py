@@ -24,7 +24,7 @@ from toolkit.wholebody.ik import WholeBodyIK, first_guess
 from toolkit.wholebody.ik_config import SUBSTEPS
 from toolkit.wholebody.lean import Lean, lean_ahead
 from toolkit.wholebody.limb_paths import LimbPaths, limb_paths
-from toolkit.wholebody.swing_task import LATE, LIFT
+from toolkit.wholebody.swing_task import LIFT
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 RATE = 50.0  # Hz for a body of the usual size (`toolkit.robot.scale`); samples of the trajectory
@@ -70,8 +70,6 @@ LEVEL = Manner(turning=5.0)
 def whole_body(plan: MotionPlan, scene: mujoco.MjModel, manner: Manner = Manner()) -> WholeBodyPlan:
     """Find swing paths and a whole-body trajectory for a motion plan.
 
-    Where the trajectory fails, another one is tried in which fast feet rise first and cross late.
-
     Args:
         plan: Contacts and motion, with a final rest.
         scene: The plan's robot and world in one model (`toolkit.world.scene.compose_scene`).
@@ -83,16 +81,12 @@ def whole_body(plan: MotionPlan, scene: mujoco.MjModel, manner: Manner = Manner(
     begin = perf_counter()
     duration, rate = plan.schedule.duration, RATE / plan.robot.scale.time
     times = np.linspace(0.0, duration, max(int(round(duration * rate)), 2) + 1)
-    given = plan.robot, plan.world, plan.schedule, plan.motion, manner.foot_lift
-    paths = limb_paths(*given)
+    paths = limb_paths(plan.robot, plan.world, plan.schedule, plan.motion, manner.foot_lift)
     if not plan.motion.feasible:
         failure = Failure(f"the centroidal motion is not feasible: {plan.motion.outcome}")
         trajectory = replace(_without_postures(plan.robot, paths, times), failure=failure)
     else:
         trajectory = _trajectory(plan, scene, paths, times, manner)
-        if not trajectory.feasible and (late := limb_paths(*given, LATE)).windows != paths.windows:
-            other = _trajectory(plan, scene, late, times, manner)
-            trajectory, paths = (other, late) if other.feasible else (trajectory, paths)
     trajectory = replace(trajectory, seconds=perf_counter() - begin)
     return WholeBodyPlan(plan.robot, plan.world, plan.sequence, plan.schedule, plan.motion, scene, paths, trajectory)
 

@@ -129,6 +129,13 @@ class SwingPath:
             points = points + scale[:, None] * move.vector
         return points
 
+    @property
+    def peak_acceleration(self) -> float:
+        """m/s^2; largest one of the patch's centre, by differences."""
+        u = np.linspace(0.0, 1.0, 65)
+        second = np.diff(self.positions(u), 2, axis=0) / (u[1] * self.duration) ** 2
+        return float(np.linalg.norm(second, axis=1).max())
+
     def rotations(self, u: np.ndarray) -> np.ndarray:
         """(k, 3, 3) world_from_contact rotations at (k,) fractions of the swing."""
         turned = rotation_exponential(self.turn.value(u)[:, None] * self.rotation_vector) @ self.start.rotation

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.wholebody.detour import detour
 from toolkit.wholebody.swing import Move, SwingPath, Window
-from toolkit.wholebody.swing_task import EASY, SAMPLES, SwingTask, SwingTiming
+from toolkit.wholebody.swing_task import EARLY, EASY, LATE, SAMPLES, STEEP, SwingTask, SwingTiming
 
 Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool, whether a box touches the world."""
@@ -40,32 +40,54 @@ PITCH_GAIN, PITCH_FROM, MAX_PITCH, ANKLE_MARGIN = 1.5, 0.2, 0.9, 0.15
 def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     """The least raised path that is clear; where none is, the highest one with `clear` False.
 
-    Candidates are tried from the straightest to the highest. Moderate heights are tried first with the whole margin,
-    then with half and a quarter of it. Great heights follow in the same way. No margin at all is the last resort.
+    Fast swings that have to rise are also tried with late and with early crossings: the one whose peak acceleration is
+    least is taken.
     """
     bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector))
     sides = _free_sides(task, collide)
-    candidates = list(_candidates(task))
-    moderate_raise = task.scale.length * MODERATE_RAISE
+    path, timing = _least_raised(task, collide, [*_easy(task), *_steep(task, STEEP)], bump, sides)
+    way = float(np.linalg.norm(task.end.position - task.start.position))
+    if not task.is_foot or _haste(task, way) == 0.0 or timing is EASY:
+        return path
+    others = (_least_raised(task, collide, [*_steep(task, timing)], bump, sides)[0] for timing in (LATE, EARLY))
+    return min([path, *others], key=lambda each: (not each.clear, each.peak_acceleration))
+
+
+def _least_raised(
+    task: SwingTask,
+    collide: Collide,
+    candidates: Sequence[tuple[float, float, SwingTiming]],
+    bump: np.ndarray,
+    sides: tuple[float, float],
+) -> tuple[SwingPath, SwingTiming]:
+    """The first of some candidates, with a sideways bump, that is clear; the last one with `clear` False if none is.
+
+    Moderate heights are tried first with the whole margin, then with half and a quarter of it. Great heights follow in
+    the same way. No margin at all is the last resort.
+    """
     needed = 0.0 if not task.is_foot else abs(task.end.position[2] - task.start.position[2])
-    moderate = [item for item in candidates if max(item[:2]) <= needed + moderate_raise]
-    great = [item for item in candidates if max(item[:2]) > needed + moderate_raise]
+    most = needed + task.scale.length * MODERATE_RAISE
+    moderate = [item for item in candidates if max(item[:2]) <= most]
+    great = [item for item in candidates if max(item[:2]) > most]
     for shares, groups in ((MARGIN_SHARES, (moderate, great)), ((0.0,), (moderate, great))):
         for group, share in product(groups, shares):
             for before, after, timing in group:
                 path = _within_ankle_range(task, _path(task, before, after, timing, bump))
                 if not collide(*_swept_boxes(task, path, share * task.margin, sides)).any():
-                    return path
-    return replace(_path(task, *candidates[-1], bump), clear=False)
+                    return path, timing
+    return replace(_path(task, *candidates[-1], bump), clear=False), candidates[-1][2]
 
 
-def _candidates(task: SwingTask) -> Iterator[tuple[float, float, SwingTiming]]:
-    """Extra height (m) before and after the crossing, with the timing, from the easiest to the highest."""
-    raises = list(_raises(task))
+def _easy(task: SwingTask) -> Iterator[tuple[float, float, SwingTiming]]:
+    """Small extra heights (m) before and after the crossing, from the least to the most, with the easy timing."""
     level = abs(task.end.position[2] - task.start.position[2]) if task.is_foot else 0.0
-    low = [pair for pair in raises if max(pair) <= level + task.scale.length * EASY_RAISE]
-    yield from ((*pair, EASY) for pair in low)
-    yield from ((*pair, task.steep) for pair in raises)
+    most = level + task.scale.length * EASY_RAISE
+    yield from ((*pair, EASY) for pair in _raises(task) if max(pair) <= most)
+
+
+def _steep(task: SwingTask, timing: SwingTiming) -> Iterator[tuple[float, float, SwingTiming]]:
+    """Extra heights (m) before and after the crossing, from the least to the most, with a timing."""
+    yield from ((*pair, timing) for pair in _raises(task))
 
 
 def _raises(task: SwingTask) -> Iterator[tuple[float, float]]:

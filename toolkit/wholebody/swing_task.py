@@ -44,7 +44,9 @@ STEEP = SwingTiming(
     land=Window(0.7, 1.0),
 )
 LATE = replace(STEEP, fast_across=Window(0.15, 0.95))
-"""In place of `STEEP` for swings that begin before an edge: the toes get over it with less lift, at a higher speed."""
+"""For swings that begin before an edge: the toes get over it with less lift, at a higher speed."""
+EARLY = replace(STEEP, fast_across=Window(0.02, 0.75))
+"""For swings that end below an edge: the heel is over it before it comes down."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,6 @@ class SwingTask:
         lift: m; guarded motion along the surface normal at both ends.
         scale: The robot's size.
         passing: Gap in m between the soles at which the legs pass each other.
-        steep: Timing of paths that have to rise more than a little.
         shin: (3,) m; horizontal way of the standing leg's shin from where it is over a level sole: it keeps the gap
             too, since a foot passes it there, and not the sole.
     """
@@ -117,7 +118,6 @@ class SwingTask:
     lift: float = LIFT
     scale: Scale = USUAL
     passing: float = 0.0
-    steep: SwingTiming = STEEP
     shin: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property
