@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 
 from toolkit.centroidal.problem import Margins
-from toolkit.control import arm_clearance, link_clearance
-from toolkit.control.arm_clearance import ArmClearance
+from toolkit.control import link_clearance, world_clearance
 from toolkit.control.corrector import PENDULUM_RATE, Cones, Corrector, MotionTarget
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.joint_box import JointBox
@@ -18,11 +17,12 @@ from toolkit.control.link_clearance import LinkClearance
 from toolkit.control.qp import FORCE_UNIT, ContactQP
 from toolkit.control.sampled_plan import Reference
 from toolkit.control.touchdown import ContactTracker, LimbState
+from toolkit.control.world_clearance import WorldClearance
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.robot.scale import Scale
 
-_MAX_PAIRS = link_clearance.MAX_PAIRS + arm_clearance.MAX_PAIRS
+_MAX_PAIRS = link_clearance.MAX_PAIRS + world_clearance.MAX_PAIRS
 
 
 class TaskGains(NamedTuple):
@@ -122,7 +122,7 @@ class Controller:
 
         Args:
             robot: The robot as the controller knows it.
-            scene: The robot in the world as the controller knows it, which arms keep clear of.
+            scene: The robot in the world as the controller knows it, which all links but the feet keep clear of.
             reference: The plan at the control ticks.
             margins: The plan's margins; the controller's lie between them and none.
             period: Time between control ticks in s.
@@ -148,7 +148,7 @@ class Controller:
         self.tracker = ContactTracker(reference, self.limbs, weight, limit, scale)
         self.targets = LimbTargets(reference, self.tracker)
         self._box = JointBox(robot)
-        self._links, self._in_world = LinkClearance(robot, self.dynamics), ArmClearance(robot, scene)
+        self._links, self._in_world = LinkClearance(robot, self.dynamics), WorldClearance(robot, scene)
         self._torque_limit = TORQUE_FRACTION * robot.torque_limit
         self._limits = {
             urgent: Cones(
@@ -210,7 +210,7 @@ class Controller:
         return np.clip(torque, -limit, limit)
 
     def _keep_clear(self, qpos: np.ndarray, qvel: np.ndarray) -> None:
-        """Find the links that come near each other, and the arms that come near the world."""
+        """Find the links that come near each other, and those that come near the world."""
         tracker, authority = self.tracker, self.targets.authority
         reaching = [palm for palm in self._arms if tracker.in_contact[palm] or authority[palm] > 0.0]
         self._links.update(qvel)

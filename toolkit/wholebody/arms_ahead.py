@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 
 from toolkit.geometry.limb import Limb
-from toolkit.robot.arm_distance import ArmDistances
 from toolkit.robot.model import RobotModel
+from toolkit.robot.world_distance import WorldDistances
 from toolkit.wholebody.avoidance import Damper, Dampers
 
 AHEAD = Damper(safe_world=0.03, safe_self=0.03, room=0.0, time=0.3, weight=1e3, firm=0.012)
@@ -31,7 +31,7 @@ class ArmsAhead:
         """Follow the base of a motion (T, 7 + n) in a scene, at a uniform grid of times (T,) in s."""
         self._damper, self._looks = AHEAD.scaled(robot.scale), robot.scale.time * np.array(_LOOKS)
         self._times, self._base = times, qpos[:, :7]
-        self._distances = ArmDistances(robot, scene, self._damper.safe_world)
+        self._distances = WorldDistances(robot, scene, self._damper.safe_world, robot.in_arms(scene) >= 0)
         self.touch = any((self._distances.near(each, ()).distance < 0.0).any() for each in qpos)
 
     def dampers(self, time: float, angles: np.ndarray, tick: float, reaching: set[Limb]) -> Dampers:

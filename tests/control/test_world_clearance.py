@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from tests.wholebody.conftest import world_of
-from toolkit.control.arm_clearance import SAFE, ArmClearance
 from toolkit.control.link_clearance import RATE
+from toolkit.control.world_clearance import SAFE_ARM, WorldClearance
 from toolkit.geometry.limb import Limb
 from toolkit.world.scene import compose_scene
 
@@ -33,7 +33,7 @@ def beside_wall(robot):
         pytest.skip("no left arm")
     y = outermost(robot) + 0.1 * robot.scale.length + 0.05
     scene = compose_scene(robot, world_of(f'<geom name="wall" type="box" size="3 0.05 1.5" pos="0 {y} 1.5"/>'))
-    return scene, ArmClearance(robot, scene)
+    return scene, WorldClearance(robot, scene)
 
 
 def outward(robot):
@@ -82,8 +82,8 @@ def test_the_arm_is_free_far_from_the_wall(robot, beside_wall):
 def test_an_arm_pushed_at_a_wall_comes_near_and_does_not_touch(robot, beside_wall):
     scene, clearance = beside_wall
     found = pushed(robot, scene, clearance, 400)
-    assert min(found) > 0.7 * robot.scale.length * SAFE
-    assert min(found) < 1.3 * robot.scale.length * SAFE
+    assert min(found) > 0.7 * robot.scale.length * SAFE_ARM
+    assert min(found) < 1.3 * robot.scale.length * SAFE_ARM
     free = robot.home.copy()
     mujoco.mj_integratePos(robot.mujoco_model, free, outward(robot), 1.0)
     assert nearest(robot, scene, free) < 0.0  # which nothing but the clearance prevents
@@ -111,6 +111,6 @@ def test_bounds_follow_distance_and_speed(robot, beside_wall):
     clearance.update(qpos, towards, ())
     assert clearance.lower[0] - lower == pytest.approx(-2.0 * rate * (row @ towards), rel=1e-6)
     before = nearest(robot, scene, qpos)
-    assert lower == pytest.approx(-(rate**2) * (before - robot.scale.length * SAFE), rel=1e-3)
+    assert lower == pytest.approx(-(rate**2) * (before - robot.scale.length * SAFE_ARM), rel=1e-3)
     mujoco.mj_integratePos(robot.mujoco_model, qpos, towards, 1e-4)
     assert nearest(robot, scene, qpos) - before == pytest.approx(1e-4 * (row @ towards), rel=0.05)

@@ -1,4 +1,4 @@
-"""ArmDistances: how near the arms are to the world, in the composed scene."""
+"""WorldDistances: how near links are to the world, in the composed scene."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 
 
-class ArmPairs(NamedTuple):
-    """Pairs of a geom of the world and one of an arm that are near each other.
+class WorldPairs(NamedTuple):
+    """Pairs of a geom of the world and one of a link that are near each other.
 
     Attributes:
-        geoms: (k, 2) int; of the world and of the arm.
+        geoms: (k, 2) int; of the world and of the link.
         distance: (k,) m.
-        normal: (k, 3) from the world to the arm.
+        normal: (k, 3) from the world to the link.
         point: (k, 3) m; between the two.
     """
 
@@ -29,32 +29,37 @@ class ArmPairs(NamedTuple):
     point: np.ndarray
 
 
-_NONE = ArmPairs(np.zeros((0, 2), int), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+_NONE = WorldPairs(np.zeros((0, 2), int), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
 
 
-class ArmDistances:
-    """Distances between the arms and the static world in a copy of a scene, within a notice."""
+class WorldDistances:
+    """Distances between some links and the static world in a copy of a scene, within a notice.
 
-    def __init__(self, robot: RobotModel, scene: mujoco.MjModel, notice: float):
-        """Prepare for a robot's scene and the largest distance that counts, in m."""
-        self.notice = notice
+    Attributes:
+        notice: m.
+        side: (ngeom,) int; palm of the side to whose arm a geom belongs, -1 for none.
+    """
+
+    def __init__(self, robot: RobotModel, scene: mujoco.MjModel, notice: float, links: np.ndarray):
+        """Prepare for a robot's scene, the largest distance that counts in m, and the links (nbody,) bool that do."""
+        self.notice, self.side = notice, robot.in_arms(scene)[scene.geom_bodyid]
         self._model = model = copy.copy(scene)
         self._data = mujoco.MjData(model)
         self._static = model.body_weldid[model.geom_bodyid] == 0
-        self._side = robot.in_arms(model)[model.geom_bodyid]
-        neither = ~self._static & (self._side < 0)
+        of_link = links[model.geom_bodyid] & ~self._static
+        neither = ~self._static & ~of_link
         model.geom_contype[neither] = model.geom_conaffinity[neither] = 0
         model.geom_gap[:] = 0.0
-        model.geom_margin[:] = np.where(self._side < 0, 0.0, notice)
+        model.geom_margin[:] = np.where(of_link, notice, 0.0)
         model.body_margin[:] = 0.0
         np.maximum.at(model.body_margin, model.geom_bodyid, model.geom_margin)
         self._box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
         boxes = self._box & ((model.geom_contype | model.geom_conaffinity) != 0)
-        grid = np.meshgrid(np.flatnonzero(boxes & self._static), np.flatnonzero(boxes & (self._side >= 0)))
+        grid = np.meshgrid(np.flatnonzero(boxes & self._static), np.flatnonzero(boxes & of_link))
         self._boxes = np.stack(grid, axis=-1).reshape(-1, 2)
         self._box_reach = model.geom_rbound[self._boxes].sum(axis=1) + notice
 
-    def near(self, qpos: np.ndarray, reaching: Collection[Limb]) -> ArmPairs:
+    def near(self, qpos: np.ndarray, reaching: Collection[Limb]) -> WorldPairs:
         """The pairs within the notice at a state (7 + n,), without arms whose palms are `reaching`.
 
         Several points of one pair may be among them. Between boxes, where MuJoCo's collisions leave out most that are
@@ -66,21 +71,21 @@ class ArmDistances:
         mujoco.mj_collision(model, data)
         found = self._near_boxes()
         if data.ncon:
-            found = ArmPairs(*(np.concatenate(each) for each in zip(self._in_contact(), found, strict=True)))
+            found = WorldPairs(*(np.concatenate(each) for each in zip(self._in_contact(), found, strict=True)))
         if reaching and len(found.geoms):
-            kept = ~np.isin(self._side[found.geoms[:, 1]], list(reaching))
-            found = ArmPairs(*(each[kept] for each in found))
+            kept = ~np.isin(self.side[found.geoms[:, 1]], list(reaching))
+            found = WorldPairs(*(each[kept] for each in found))
         if len(found.geoms):
             mujoco.mj_comPos(model, data)  # for the Jacobians
         return found
 
     def rate(self, geom: int, normal: np.ndarray, point: np.ndarray) -> np.ndarray:
-        """(nv,) derivative, by MuJoCo's qvel, of the distance of an arm's geom at a point (3,) along a normal (3,)."""
+        """(nv,) derivative, by MuJoCo's qvel, of the distance of a link's geom at a point (3,) along a normal (3,)."""
         jacobian = np.empty((3, self._model.nv))
         mujoco.mj_jac(self._model, self._data, jacobian, None, point, int(self._model.geom_bodyid[geom]))
         return normal @ jacobian
 
-    def _in_contact(self) -> ArmPairs:
+    def _in_contact(self) -> WorldPairs:
         """The points that MuJoCo's collisions found, but between boxes."""
         contact, geoms = self._data.contact, self._data.contact.geom
         of_world = self._static[geoms]
@@ -89,9 +94,9 @@ class ArmDistances:
         second = of_world[rows, 1]  # the normal leads from the first geom to the second
         pairs = np.where(second[:, None], geoms[rows][:, ::-1], geoms[rows])
         normal = np.where(second, -1.0, 1.0)[:, None] * contact.frame[rows, :3]
-        return ArmPairs(pairs, contact.dist[rows], normal, contact.pos[rows])
+        return WorldPairs(pairs, contact.dist[rows], normal, contact.pos[rows])
 
-    def _near_boxes(self) -> ArmPairs:
+    def _near_boxes(self) -> WorldPairs:
         """The pairs of boxes."""
         model, data = self._model, self._data
         apart = np.linalg.norm(np.subtract(*data.geom_xpos[self._boxes.T]), axis=1)
@@ -100,9 +105,18 @@ class ArmDistances:
             return _NONE
         pairs = self._boxes[near]
         distance, ends = np.empty(len(pairs)), np.empty((len(pairs), 6))
-        for row, (world, arm) in enumerate(pairs.tolist()):
-            distance[row] = mujoco.mj_geomDistance(model, data, world, arm, self.notice, ends[row])
+        for row, (world, link) in enumerate(pairs.tolist()):
+            distance[row] = mujoco.mj_geomDistance(model, data, world, link, self.notice, ends[row])
         found = (distance < self.notice) & (np.abs(distance) > 1e-9)
         pairs, distance, ends = pairs[found], distance[found], ends[found]
         normal = (ends[:, 3:] - ends[:, :3]) / distance[:, None]
-        return ArmPairs(pairs, distance, normal, 0.5 * (ends[:, :3] + ends[:, 3:]))
+        return WorldPairs(pairs, distance, normal, 0.5 * (ends[:, :3] + ends[:, 3:]))
+
+
+def above_ankles(robot: RobotModel, model: mujoco.MjModel) -> np.ndarray:
+    """(nbody,) bool; links of the robot from the knees upward, arms included, in a model that holds the robot."""
+    base, above = int(model.body(robot.base).id), np.zeros(model.nbody, bool)
+    ankles = {int(model.jnt_bodyid[model.joint(robot.joint_names[robot.joints_to(foot)[4]]).id]) for foot in FEET}
+    for body in range(base, model.nbody):
+        above[body] = body == base or (above[model.body_parentid[body]] and body not in ankles)
+    return above

@@ -1,4 +1,4 @@
-"""ArmClearance: accelerations that keep the arms off the world."""
+"""WorldClearance: accelerations that keep links off the world."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ import numpy as np
 
 from toolkit.control.link_clearance import MAX_ACCELERATION, RATE, least_acceleration
 from toolkit.geometry.limb import Limb
-from toolkit.robot.arm_distance import ArmDistances
 from toolkit.robot.model import RobotModel
+from toolkit.robot.world_distance import WorldDistances, above_ankles
 
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
-SAFE = 0.01  # m; distance that arms keep
+SAFE_ARM, SAFE = 0.01, 0.003  # m; distances that links of arms keep, and other links, which have less room
 ROOM = 0.05  # m; distance beyond it at which the world is noticed
-MAX_PAIRS = 4  # most pairs of a link and a part of the world at a time, those that approach their limit fastest
+HASTE = 2.0  # factor on the rate of links other than arms, which pass edges closely as planned
+MAX_PAIRS = 6  # most pairs of a link and a part of the world at a time, those that approach their limit fastest
 
 
-class ArmClearance:
-    """Bounds on the accelerations at which arms approach the world as the controller knows it.
+class WorldClearance:
+    """Bounds on the accelerations at which links above the ankles approach the world as the controller knows it.
 
-    Plans keep arms clear by a few centimetres, and by as much trunk and arms stray from them where the body moves fast.
+    Plans keep links clear by a few centimetres, and by as much arms and legs stray from them where the body moves fast.
     The bounds are those of `LinkClearance`.
 
     Attributes:
@@ -32,9 +33,11 @@ class ArmClearance:
 
     def __init__(self, robot: RobotModel, scene: mujoco.MjModel):
         """Prepare for a robot and its scene."""
-        scale = robot.scale
-        self._safe, self._rate = scale.length * SAFE, RATE / scale.time
-        self._distances = ArmDistances(robot, scene, scale.length * (SAFE + ROOM))
+        scale, links = robot.scale, above_ankles(robot, scene)
+        self._distances = WorldDistances(robot, scene, scale.length * (SAFE_ARM + ROOM), links)
+        of_arm = self._distances.side >= 0
+        self._safe = scale.length * np.where(of_arm, SAFE_ARM, SAFE)
+        self._rate = RATE / scale.time * np.where(of_arm, 1.0, HASTE)
         self.count, self.rows, self.lower = 0, np.zeros((MAX_PAIRS, scene.nv)), np.zeros(MAX_PAIRS)
 
     def update(self, qpos: np.ndarray, qvel: np.ndarray, reaching: Collection[Limb]) -> None:
@@ -47,9 +50,10 @@ class ArmClearance:
         _, first = np.unique(found.geoms[order], axis=0, return_index=True)  # the nearest points of each pair
         bounds = []
         for row in order[np.sort(first)].tolist():
-            rate = self._distances.rate(int(found.geoms[row, 1]), found.normal[row], found.point[row])
-            room = float(found.distance[row]) - self._safe
-            bounds.append((rate, least_acceleration(room, float(rate @ qvel), self._rate)))
+            geom = int(found.geoms[row, 1])
+            rate = self._distances.rate(geom, found.normal[row], found.point[row])
+            room = float(found.distance[row] - self._safe[geom])
+            bounds.append((rate, least_acceleration(room, float(rate @ qvel), float(self._rate[geom]))))
         bounds.sort(key=lambda pair: -pair[1])
         self.count = min(len(bounds), MAX_PAIRS)
         for row, (rate, lower) in enumerate(bounds[: self.count]):
