@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
 from tests.wholebody.conftest import world_of
-from toolkit.geometry.limb import FEET
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.wholebody.effort import SHARE, Effort
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.motion_dynamics import inverse_dynamics
@@ -31,23 +32,33 @@ def test_torques_are_those_of_the_inverse_dynamics(robot, flat_walk):
     before = step[0].copy()
     found = effort.torques(times[1], qpos[1], before, step[1], flat_walk.motion)
     # velocities are means of both ticks there and those of the tick before here: they only enter Coriolis forces
-    np.testing.assert_allclose(found, expected[effort.joints], rtol=0.05, atol=0.5)
+    joints = effort.joints[None]
+    np.testing.assert_allclose(found[joints], expected[joints], rtol=0.05, atol=0.5)
 
 
-def test_rows_hold_torques_at_their_limits(robot, flat_walk):
-    """A displacement at the bound of a row needs exactly the limit."""
+@pytest.mark.parametrize("swinging", [None, Limb.LEFT_FOOT, Limb.RIGHT_FOOT])
+@pytest.mark.parametrize("standing", [None, Limb.LEFT_FOOT])
+def test_rows_hold_torques_at_their_limits(robot, flat_walk, swinging, standing):
+    """A displacement at the bound of a row needs exactly the limit, while the standing foot carries the base."""
+    if swinging is not None and swinging == standing:
+        pytest.skip("a foot does not do both")
     effort, rng = Effort(robot, TICK), np.random.default_rng(1)
-    nv = 6 + len(robot.joint_names)
+    nv, joints = 6 + len(robot.joint_names), effort.joints[swinging]
     step = np.zeros(nv)
-    step[6 + effort.joints] = rng.choice([-1.0, 1.0], len(effort.joints)) * 0.02
+    step[6 + joints] = rng.choice([-1.0, 1.0], len(joints)) * 0.02
     torque = effort.torques(0.0, robot.home, np.zeros(nv), step, flat_walk.motion)
-    assert effort.exceeded(torque)
-    rows, bound = effort.rows(torque, step)
+    assert effort.exceeded(torque, swinging)
+    rows, bound = effort.rows(torque, step, swinging, standing)
     assert (rows @ step[6:] > bound).any()
     changed = step.copy()
     changed[6:] += np.linalg.lstsq(rows, bound - rows @ step[6:])[0]
+    if standing is not None:
+        jacobian = np.zeros((6, nv))
+        mujoco.mj_jacSite(effort.model, effort.data, jacobian[:3], jacobian[3:], effort.sites[standing])
+        changed[:6] -= np.linalg.solve(jacobian[:, :6], jacobian[:, 6:] @ (changed - step)[6:])
+        np.testing.assert_allclose(jacobian @ changed, jacobian @ step, atol=1e-9)
     after = effort.torques(0.0, robot.home, np.zeros(nv), changed, flat_walk.motion)
-    near = np.abs(torque) > 0.7 * effort.limit
+    near = joints[np.abs(torque[joints]) > 0.7 * effort.limit[joints]]
     np.testing.assert_allclose(np.abs(after[near]), effort.limit[near], rtol=1e-6)
 
 

@@ -1,13 +1,13 @@
-"""Torques of the joints above the legs during inverse kinematics, and bounds that keep them within the motors' limits.
+"""Torques of joints that carry no standing foot during inverse kinematics, and bounds that keep them within the limits.
 
-The motion of trunk, head and arms alone decides these torques, but for a palm's force: with d and d' the displacements
-of the last tick and of this one,
+The motion of trunk, head, arms and a swinging leg alone decides these torques, but for a palm's force: with d and d'
+the displacements of the last tick and of this one,
 
     tau = M (d' - d) / dt^2 + h - J^T w
 
 in the rows of these joints. Where a tick asks a motor for more than its share of its limit, the same tick is solved
 again under bounds `tau <= limit`, linear in the displacements of the joints. What then gives way is the momentum that
-trunk and arms were to have.
+trunk and arms were to have, and the path of the foot in the midst of its swing.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from toolkit.centroidal.problem import CentroidalMotion
-from toolkit.geometry.limb import FEET, PALMS
+from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.motion_dynamics import contact_wrenches
 
@@ -34,15 +34,20 @@ class Effort:
         self.model = copy.copy(robot.mujoco_model)
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self.data, self.tick = mujoco.MjData(self.model), tick
-        self.joints = np.flatnonzero(~robot.carrying(FEET))
-        self.limit = SHARE * robot.torque_limit[self.joints]
-        self.palms = [(limb, self.model.site(item.site).id) for limb, item in robot.limbs.items() if not limb.is_foot]
+        self.limit, above = SHARE * robot.torque_limit, ~robot.carrying(FEET)
+        self.joints: dict[Limb | None, np.ndarray] = {None: np.flatnonzero(above)}
+        for foot in FEET:
+            leg = np.zeros(len(above), bool)
+            leg[robot.joints_to(foot)] = True
+            self.joints[foot] = np.flatnonzero(above | leg)
+        self.sites = {limb: int(self.model.site(item.site).id) for limb, item in robot.limbs.items()}
+        self.palms = [(limb, site) for limb, site in self.sites.items() if not limb.is_foot]
         self.jacobian = np.zeros((6, self.model.nv))
 
     def torques(
         self, time: float, qpos: np.ndarray, before: np.ndarray, after: np.ndarray, motion: CentroidalMotion
     ) -> np.ndarray:
-        """(k,) N m; torques of the joints above the legs in a state.
+        """(n,) N m; torques of all joints in a state, as if no foot were on the ground.
 
         Args:
             time: s.
@@ -61,22 +66,31 @@ class Effort:
                 if wrench[limb].any():
                     mujoco.mj_jacSite(self.model, data, self.jacobian[:3], self.jacobian[3:], site)
                     torque -= self.jacobian.T @ wrench[limb]
-        return torque[6 + self.joints]
+        return torque[6:]
 
-    def exceeded(self, torque: np.ndarray) -> bool:
-        """Whether torques (k,) are beyond the limits."""
-        return bool((np.abs(torque) > self.limit).any())
+    def exceeded(self, torque: np.ndarray, swinging: Limb | None) -> bool:
+        """Whether torques (n,) of joints that a swinging foot leaves to the motion are beyond the limits."""
+        joints = self.joints[swinging]
+        return bool((np.abs(torque[joints]) > self.limit[joints]).any())
 
-    def rows(self, torque: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def rows(
+        self, torque: np.ndarray, after: np.ndarray, swinging: Limb | None, standing: Limb | None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """A (m, n) and b (m,) rad of bounds `A dq <= b` over the joint displacements of a tick.
 
-        They are linear about the displacements `after` (6 + n,) that need the torques (k,) in N m; both belong to the
-        last call of `torques`. A row is scaled to the displacement of its own joint.
+        They are linear about the displacements `after` (6 + n,) that need the torques (n,) in N m; both belong to the
+        last call of `torques`. A standing foot stays where it is, so that its leg carries the base; without one the
+        base moves as in `after`. A row is scaled to the displacement of its own joint.
         """
         mass = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, self.data, mass)
-        near = np.flatnonzero(np.abs(torque) > NEAR * self.limit)
-        dofs, sign = 6 + self.joints[near], np.sign(torque[near])
+        joints = self.joints[swinging]
+        near = joints[np.abs(torque[joints]) > NEAR * self.limit[joints]]
+        dofs, sign = 6 + near, np.sign(torque[near])
         scale = self.tick**2 / mass[dofs, dofs]
-        rate = sign[:, None] * mass[dofs, 6:] / mass[dofs, dofs][:, None]
+        rate = mass[dofs, 6:]
+        if standing is not None:
+            mujoco.mj_jacSite(self.model, self.data, self.jacobian[:3], self.jacobian[3:], self.sites[standing])
+            rate -= mass[dofs, :6] @ np.linalg.solve(self.jacobian[:, :6], self.jacobian[:, 6:])
+        rate *= (sign / mass[dofs, dofs])[:, None]
         return rate, (self.limit[near] - np.abs(torque[near])) * scale + rate @ after[6:]

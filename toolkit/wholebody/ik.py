@@ -175,9 +175,11 @@ class WholeBodyIK:
         wanted = rotation_vector(upright.T @ self.base.R_world_frame)
         turn = wanted + weights.KEPT_TURN * (self.drift[3:6] - wanted)
         self.steady.R_world_frame = self.wrapper.get_T_world_frame(self.robot.base)[:3, :3] @ rotation_exponential(turn)
-        self._set_dampers(before, angles, time, paths)
+        swinging = next((foot for foot in FEET if paths.segment(foot, time).path is not None), None)
+        standing = next((foot for foot in FEET if foot != swinging and paths.segment(foot, time).path is None), None)
+        self._set_dampers(before, angles, time, paths, standing)
         self._solve(time)
-        self._spare_motors(time, before, motion)
+        self._spare_motors(time, before, motion, swinging, standing)
         self.drift, self.last_step = self._motion(before), self.joints - angles
         return self.order.qpos_from_q(self.wrapper.state.q)
 
@@ -251,7 +253,9 @@ class WholeBodyIK:
         u = (time - segment.begin) / (segment.end - segment.begin)
         return LEAVING.step(u)[0] - LANDING.step(u)[0]
 
-    def _set_dampers(self, qpos: np.ndarray, angles: np.ndarray, time: float, paths: LimbPaths) -> None:
+    def _set_dampers(
+        self, qpos: np.ndarray, angles: np.ndarray, time: float, paths: LimbPaths, standing: Limb | None
+    ) -> None:
         """Keep all links clear of the world and of each other."""
         if self.dampers is not None:
             self.solver.remove_constraint(self.dampers)  # pyright: ignore[reportArgumentType]
@@ -259,7 +263,6 @@ class WholeBodyIK:
         if self.avoidance is None:
             return
         reaching = {palm for palm in self.palms if paths.authority(palm, time) > 0.0}
-        standing = next((foot for foot in FEET if paths.segment(foot, time).path is None), None)
         found = self.avoidance.dampers(qpos, self.drift, self.tick, reaching, standing)
         if self.ahead is not None:
             found = found.joined(self.ahead.dampers(time, angles, self.tick, reaching))
@@ -270,15 +273,17 @@ class WholeBodyIK:
             self.dampers = self.solver.add_joint_space_half_spaces_constraint(matrix, bound)
             self.dampers.configure("dampers", "soft", 1.0)
 
-    def _spare_motors(self, time: float, before: np.ndarray, motion: CentroidalMotion) -> None:
-        """Solve a tick from a state (7 + n,) again while motors of trunk and arms would have to give too much."""
+    def _spare_motors(
+        self, time: float, before: np.ndarray, motion: CentroidalMotion, swinging: Limb | None, standing: Limb | None
+    ) -> None:
+        """Solve a tick from a state (7 + n,) again while motors that carry no foot would have to give too much."""
         for _ in range(weights.EASING):
             step = self._motion(before)
             torque = self.effort.torques(time, before, self.drift, step, motion)
-            if not self.effort.exceeded(torque):
+            if not self.effort.exceeded(torque, swinging):
                 break
             self._drop_limits()
-            rows, bound = self.effort.rows(torque, step)
+            rows, bound = self.effort.rows(torque, step, swinging, standing)
             matrix = np.zeros((len(rows), len(before)))
             matrix[:, self.order.q_index] = rows
             self.limits = self.solver.add_joint_space_half_spaces_constraint(matrix, bound + rows @ before[7:])
