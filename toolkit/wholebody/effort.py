@@ -27,7 +27,13 @@ NEAR = 0.7  # of that share: joints beyond it are bounded too, lest they take ov
 
 
 class Effort:
-    """The robot's own dynamics, tick after tick."""
+    """The robot's own dynamics, tick after tick.
+
+    Attributes:
+        limit: (n,) N m; of each joint, the share that may be used.
+        joints: By the foot that swings, None while both stand, the joints whose torques the motion alone decides.
+        sites: Of the limbs' patches, in the model.
+    """
 
     def __init__(self, robot: RobotModel, tick: float):
         """Prepare for ticks of some s."""
