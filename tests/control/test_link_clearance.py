@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from toolkit.control import link_clearance
+from toolkit.control.clearance import RATE
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.link_clearance import LinkClearance
 from toolkit.control.qp import ContactQP
@@ -76,7 +76,7 @@ def test_rows_are_the_rates_of_distances(robot, made):
     qvel = 1e-4 * towards
     dynamics.update(qpos, qvel)
     clearance.update(qvel)
-    rate = link_clearance.RATE / robot.scale.time
+    rate = RATE / robot.scale.time
     assert -clearance.lower[0] - room == pytest.approx(2.0 * rate * (row @ qvel), rel=1e-6)
     mujoco.mj_integratePos(robot.mujoco_model, qpos, towards, 1e-4)
     dynamics.update(qpos, np.zeros(dynamics.nv))

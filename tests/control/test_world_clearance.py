@@ -1,13 +1,14 @@
-"""Arms that are pushed at a wall come near it and do not touch; palms that reach for it may."""
+"""Links that are pushed at a wall come near it and do not touch; palms that reach for it may, and feet."""
 
 import mujoco
 import numpy as np
 import pytest
 
 from tests.wholebody.conftest import world_of
-from toolkit.control.link_clearance import RATE
+from toolkit.control.clearance import RATE
 from toolkit.control.world_clearance import SAFE_ARM, WorldClearance
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import FEET, Limb
+from toolkit.robot.world_distance import above_ankles
 from toolkit.world.scene import compose_scene
 
 STEP = 0.002  # s
@@ -114,3 +115,13 @@ def test_bounds_follow_distance_and_speed(robot, beside_wall):
     assert lower == pytest.approx(-(rate**2) * (before - robot.scale.length * SAFE_ARM), rel=1e-3)
     mujoco.mj_integratePos(robot.mujoco_model, qpos, towards, 1e-4)
     assert nearest(robot, scene, qpos) - before == pytest.approx(1e-4 * (row @ towards), rel=0.05)
+
+
+def test_all_links_but_ankles_and_feet_keep_off_the_world(robot):
+    model = robot.mujoco_model
+    above = above_ankles(robot, model)
+    assert above[model.body(robot.base).id] and above[robot.in_arms(model) >= 0].all()
+    for foot in FEET:
+        bodies = [int(model.jnt_bodyid[model.joint(robot.joint_names[joint]).id]) for joint in robot.joints_to(foot)]
+        assert above[bodies[:4]].all() and not above[bodies[4:]].any()
+        assert not above[model.body(robot.limbs[foot].body).id]

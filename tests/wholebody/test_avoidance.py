@@ -7,6 +7,7 @@ import pytest
 from tests.wholebody.conftest import planned_walk, world_of
 from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose
+from toolkit.robot.near_pairs import near_boxes
 from toolkit.wholebody.avoidance import ARM, BODY, Avoidance
 from toolkit.wholebody.check import check
 from toolkit.wholebody.collision import first_collision
@@ -190,7 +191,7 @@ def test_boxes_are_seen_edge_to_edge(robot, hand):
     avoidance = Avoidance(robot, compose_scene(robot, world))
     avoidance._place(robot.home)
     model, data, post = avoidance.model, avoidance.data, avoidance.model.geom("world/post").id
-    pairs = avoidance._near_boxes(np.zeros(model.ngeom, bool))
+    pairs = near_boxes(model, data, avoidance.box_pairs, avoidance.box_reach, avoidance.box_notice)
     seen = {sum(geoms) - post: row for row, geoms in enumerate(pairs.geoms.tolist()) if post in geoms}
     boxes = [g for g in np.flatnonzero(avoidance.arm) if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX]
     if not boxes:

@@ -191,13 +191,15 @@ class Controller:
             self._com += self._corrector.com_shift
         self.targets.update(index, self.dynamics)
         limbs = tuple(limb for limb in self.limbs if self.tracker.in_contact[limb])
-        self._keep_clear(qpos, qvel)
-        pairs = _MAX_PAIRS if len(self._least) else 0  # all others are spared these rows
+        near, least = self._near(qpos, qvel)
+        pairs = _MAX_PAIRS if len(least) else 0  # all others are spared these rows
         qp = self._qps.get((limbs, pairs))
         if qp is None:
             qp = self._qps[limbs, pairs] = ContactQP(limbs, self.dynamics.nv, self._force_unit, pairs)
         self._sense_urgency()
         self._constrain(qp, index, qpos, qvel)
+        if pairs:
+            qp.set_clearance(near, least)
         self._pursue(qp, index, qpos, qvel)
         x = qp.solve()
         if x is None:
@@ -209,14 +211,15 @@ class Controller:
         limit = self._robot.torque_limit
         return np.clip(torque, -limit, limit)
 
-    def _keep_clear(self, qpos: np.ndarray, qvel: np.ndarray) -> None:
-        """Find the links that come near each other, and those that come near the world."""
+    def _near(self, qpos: np.ndarray, qvel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows (k, nv) and least accelerations (k,) of links that come near each other or near the world."""
         tracker, authority = self.tracker, self.targets.authority
         reaching = [palm for palm in self._arms if tracker.in_contact[palm] or authority[palm] > 0.0]
         self._links.update(qvel)
         self._in_world.update(qpos, qvel, reaching)
         parts = [(each.rows[: each.count], each.lower[: each.count]) for each in (self._links, self._in_world)]
-        self._near, self._least = (np.concatenate(each) for each in zip(*parts, strict=True))
+        rows, lower = zip(*parts, strict=True)
+        return np.concatenate(rows), np.concatenate(lower)
 
     def _constrain(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in dynamics, cones and boxes."""
@@ -228,8 +231,6 @@ class Controller:
             qp.set_normal_force(limb, tracker.min_force[limb], tracker.max_force[limb])
         self._box.update(qpos[7:], qvel[6:])
         qp.set_acceleration(self._box.lower, self._box.upper)
-        if len(self._least):
-            qp.set_clearance(self._near, self._least)
 
     def _pursue(self, qp: ContactQP, index: int, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Fill in the objective."""

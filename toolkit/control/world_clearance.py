@@ -7,7 +7,7 @@ from collections.abc import Collection
 import mujoco
 import numpy as np
 
-from toolkit.control.link_clearance import MAX_ACCELERATION, RATE, least_acceleration
+from toolkit.control.clearance import RATE, Clearance, least_acceleration, nearest
 from toolkit.geometry.limb import Limb
 from toolkit.robot.model import RobotModel
 from toolkit.robot.world_distance import WorldDistances, above_ankles
@@ -19,26 +19,21 @@ HASTE = 2.0  # factor on the rate of links other than arms, which pass edges clo
 MAX_PAIRS = 6  # most pairs of a link and a part of the world at a time, those that approach their limit fastest
 
 
-class WorldClearance:
+class WorldClearance(Clearance):
     """Bounds on the accelerations at which links above the ankles approach the world as the controller knows it.
 
     Plans keep links clear by a few centimetres, and by as much arms and legs stray from them where the body moves fast.
-    The bounds are those of `LinkClearance`.
-
-    Attributes:
-        count: Number of pairs that are near.
-        rows: (MAX_PAIRS, nv) Jacobians J of their distances; the first `count` rows count.
-        lower: (MAX_PAIRS,) m/s^2; least accelerations.
     """
 
     def __init__(self, robot: RobotModel, scene: mujoco.MjModel):
         """Prepare for a robot and its scene."""
+        super().__init__(MAX_PAIRS, scene.nv)
         scale, links = robot.scale, above_ankles(robot, scene)
         self._distances = WorldDistances(robot, scene, scale.length * (SAFE_ARM + ROOM), links)
         of_arm = self._distances.side >= 0
         self._safe = scale.length * np.where(of_arm, SAFE_ARM, SAFE)
         self._rate = RATE / scale.time * np.where(of_arm, 1.0, HASTE)
-        self.count, self.rows, self.lower = 0, np.zeros((MAX_PAIRS, scene.nv)), np.zeros(MAX_PAIRS)
+        self._first = [scene.ngeom, 1]  # makes one number of a pair
 
     def update(self, qpos: np.ndarray, qvel: np.ndarray, reaching: Collection[Limb]) -> None:
         """Evaluate at a state (7 + n,), (6 + n,); arms whose palms are `reaching` may touch the world."""
@@ -46,15 +41,10 @@ class WorldClearance:
         self.count = 0
         if not len(found.geoms):
             return
-        order = np.argsort(found.distance, kind="stable")
-        _, first = np.unique(found.geoms[order], axis=0, return_index=True)  # the nearest points of each pair
         bounds = []
-        for row in order[np.sort(first)].tolist():
+        for row in nearest(found.geoms @ self._first, found.distance):
             geom = int(found.geoms[row, 1])
             rate = self._distances.rate(geom, found.normal[row], found.point[row])
             room = float(found.distance[row] - self._safe[geom])
             bounds.append((rate, least_acceleration(room, float(rate @ qvel), float(self._rate[geom]))))
-        bounds.sort(key=lambda pair: -pair[1])
-        self.count = min(len(bounds), MAX_PAIRS)
-        for row, (rate, lower) in enumerate(bounds[: self.count]):
-            self.rows[row], self.lower[row] = rate, min(lower, MAX_ACCELERATION)
+        self._take(bounds)

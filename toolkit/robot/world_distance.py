@@ -4,32 +4,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
-
-
-class WorldPairs(NamedTuple):
-    """Pairs of a geom of the world and one of a link that are near each other.
-
-    Attributes:
-        geoms: (k, 2) int; of the world and of the link.
-        distance: (k,) m.
-        normal: (k, 3) from the world to the link.
-        point: (k, 3) m; between the two.
-    """
-
-    geoms: np.ndarray
-    distance: np.ndarray
-    normal: np.ndarray
-    point: np.ndarray
-
-
-_NONE = WorldPairs(np.zeros((0, 2), int), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+from toolkit.robot.near_pairs import NearPairs, near_boxes, reach_of, set_notice
 
 
 class WorldDistances:
@@ -49,32 +30,28 @@ class WorldDistances:
         of_link = links[model.geom_bodyid] & ~self._static
         neither = ~self._static & ~of_link
         model.geom_contype[neither] = model.geom_conaffinity[neither] = 0
-        model.geom_gap[:] = 0.0
-        model.geom_margin[:] = np.where(of_link, notice, 0.0)
-        model.body_margin[:] = 0.0
-        np.maximum.at(model.body_margin, model.geom_bodyid, model.geom_margin)
+        set_notice(model, np.where(of_link, notice, 0.0))
         self._box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
         boxes = self._box & ((model.geom_contype | model.geom_conaffinity) != 0)
         grid = np.meshgrid(np.flatnonzero(boxes & self._static), np.flatnonzero(boxes & of_link))
         self._boxes = np.stack(grid, axis=-1).reshape(-1, 2)
-        self._box_reach = model.geom_rbound[self._boxes].sum(axis=1) + notice
+        self._box_notice = np.full(len(self._boxes), notice)
+        self._box_reach = reach_of(model, self._boxes, self._box_notice)
 
-    def near(self, qpos: np.ndarray, reaching: Collection[Limb]) -> WorldPairs:
+    def near(self, qpos: np.ndarray, reaching: Collection[Limb]) -> NearPairs:
         """The pairs within the notice at a state (7 + n,), without arms whose palms are `reaching`.
 
-        Several points of one pair may be among them. Between boxes, where MuJoCo's collisions leave out most that are
-        apart, there is one.
+        The geom of the world is the first of a pair, of which several points may be among them.
         """
         model, data = self._model, self._data
         data.qpos[:] = qpos
         mujoco.mj_kinematics(model, data)
         mujoco.mj_collision(model, data)
-        found = self._near_boxes()
+        found = near_boxes(model, data, self._boxes, self._box_reach, self._box_notice)
         if data.ncon:
-            found = WorldPairs(*(np.concatenate(each) for each in zip(self._in_contact(), found, strict=True)))
+            found = self._in_contact().joined(found)
         if reaching and len(found.geoms):
-            kept = ~np.isin(self.side[found.geoms[:, 1]], list(reaching))
-            found = WorldPairs(*(each[kept] for each in found))
+            found = found.of(~np.isin(self.side[found.geoms[:, 1]], list(reaching)))
         if len(found.geoms):
             mujoco.mj_comPos(model, data)  # for the Jacobians
         return found
@@ -85,7 +62,7 @@ class WorldDistances:
         mujoco.mj_jac(self._model, self._data, jacobian, None, point, int(self._model.geom_bodyid[geom]))
         return normal @ jacobian
 
-    def _in_contact(self) -> WorldPairs:
+    def _in_contact(self) -> NearPairs:
         """The points that MuJoCo's collisions found, but between boxes."""
         contact, geoms = self._data.contact, self._data.contact.geom
         of_world = self._static[geoms]
@@ -94,23 +71,7 @@ class WorldDistances:
         second = of_world[rows, 1]  # the normal leads from the first geom to the second
         pairs = np.where(second[:, None], geoms[rows][:, ::-1], geoms[rows])
         normal = np.where(second, -1.0, 1.0)[:, None] * contact.frame[rows, :3]
-        return WorldPairs(pairs, contact.dist[rows], normal, contact.pos[rows])
-
-    def _near_boxes(self) -> WorldPairs:
-        """The pairs of boxes."""
-        model, data = self._model, self._data
-        apart = np.linalg.norm(np.subtract(*data.geom_xpos[self._boxes.T]), axis=1)
-        near = apart < self._box_reach
-        if not near.any():
-            return _NONE
-        pairs = self._boxes[near]
-        distance, ends = np.empty(len(pairs)), np.empty((len(pairs), 6))
-        for row, (world, link) in enumerate(pairs.tolist()):
-            distance[row] = mujoco.mj_geomDistance(model, data, world, link, self.notice, ends[row])
-        found = (distance < self.notice) & (np.abs(distance) > 1e-9)
-        pairs, distance, ends = pairs[found], distance[found], ends[found]
-        normal = (ends[:, 3:] - ends[:, :3]) / distance[:, None]
-        return WorldPairs(pairs, distance, normal, 0.5 * (ends[:, :3] + ends[:, 3:]))
+        return NearPairs(pairs, contact.dist[rows], normal, contact.pos[rows])
 
 
 def above_ankles(robot: RobotModel, model: mujoco.MjModel) -> np.ndarray:

@@ -23,6 +23,7 @@ import numpy as np
 
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
+from toolkit.robot.near_pairs import NearPairs, near_boxes, reach_of, set_notice
 from toolkit.robot.scale import Scale
 
 MAX_ROWS = 24  # most dampers at a time, of the pairs nearest to their bound: each costs solver time, and few are active
@@ -99,26 +100,6 @@ _BELOW = 0.8  # least vertical part of the normal to what is below a link, as th
 _SAFE_SHARE = 0.5  # of a pair's distance at home, where it is safe at no more than that
 
 
-class _Pairs(NamedTuple):
-    """Pairs of geoms near each other.
-
-    Attributes:
-        geoms: (k, 2) int; the first and the second of each.
-        distance: (k,) m.
-        normal: (k, 3) from the first to the second.
-        point: (k, 3) m; between the two.
-    """
-
-    geoms: np.ndarray
-    distance: np.ndarray
-    normal: np.ndarray
-    point: np.ndarray
-
-    def of(self, chosen: np.ndarray) -> _Pairs:
-        """The chosen ones."""
-        return _Pairs(*(each[chosen] for each in self))
-
-
 class Dampers(NamedTuple):
     """Dampers `matrix dq <= bound` over the joint displacements of one tick.
 
@@ -152,13 +133,11 @@ class Avoidance:
         self.body = {limb: int(model.body(item.body).id) for limb, item in robot.limbs.items()}
         self.of = {limb: model.geom_bodyid == body for limb, body in self.body.items()}
         self.base = int(model.body(robot.base).id)
-        model.geom_gap[:] = 0.0
-        model.geom_margin[:] = np.where(self.static, 0.0, np.where(self.arm, self.arms.notice, self.others.notice))
-        model.body_margin[:] = 0.0
-        np.maximum.at(model.body_margin, model.geom_bodyid, model.geom_margin)  # where collisions are looked for at all
+        set_notice(model, np.where(self.static, 0.0, np.where(self.arm, self.arms.notice, self.others.notice)))
         self.box = model.geom_type == mujoco.mjtGeom.mjGEOM_BOX
         self.box_pairs = _box_pairs(model, self.static)
         self.box_notice = self._notice(self.box_pairs)
+        self.box_reach = reach_of(model, self.box_pairs, self.box_notice)
         self.at_home = np.full((model.nbody, model.nbody), np.inf)
         self._place(robot.home)
         self._set_distances()
@@ -209,7 +188,7 @@ class Avoidance:
         """(k,) bool; which pairs (k, 2) of geoms have one of the world."""
         return np.any(self.static[geoms], axis=1)
 
-    def _home_distance(self, pairs: _Pairs) -> np.ndarray:
+    def _home_distance(self, pairs: NearPairs) -> np.ndarray:
         """(k,) m; distances of pairs' links at home, or of links from the ground below; -inf where links touch."""
         bodies, static = self.model.geom_bodyid[pairs.geoms], self.static[pairs.geoms]
         at_home = self.at_home[bodies[:, 0], bodies[:, 1]]
@@ -217,7 +196,7 @@ class Avoidance:
         from_world = np.where(np.abs(pairs.normal[:, 2]) < _BELOW, np.inf, above)
         return np.where(static.any(1), from_world, np.where(at_home > 0.0, at_home, -np.inf))
 
-    def _rates(self, pairs: _Pairs, roots: np.ndarray, drift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _rates(self, pairs: NearPairs, roots: np.ndarray, drift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(k, n) derivatives of distances by the joints beyond roots (k,), and (k,) m that the roots' motion adds."""
         model, data = self.model, self.data
         bodies = np.column_stack([model.geom_bodyid[pairs.geoms], roots])
@@ -236,7 +215,7 @@ class Avoidance:
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_collision(self.model, self.data)
 
-    def _near(self, reaching: set[Limb]) -> _Pairs:
+    def _near(self, reaching: set[Limb]) -> NearPairs:
         """Pairs of geoms within their notice, without those whose distance is left to the paths of limbs."""
         contact, free = self.data.contact, self.static.copy()
         for limb in reaching.union(FEET):
@@ -247,8 +226,10 @@ class Avoidance:
         rows = rows[np.argsort(distance[rows])]
         _, first = np.unique(geoms[rows] @ [self.model.ngeom, 1], return_index=True)  # the nearest points of each pair
         rows = rows[np.sort(first)]
-        found = _Pairs(geoms[rows], distance[rows], contact.frame[rows, :3], contact.pos[rows])
-        return _Pairs(*(np.concatenate(each) for each in zip(found, self._near_boxes(free), strict=True)))
+        found = NearPairs(geoms[rows], distance[rows], contact.frame[rows, :3], contact.pos[rows])
+        kept = ~self._left(self.box_pairs, free)
+        boxes = self.box_pairs[kept], self.box_reach[kept], self.box_notice[kept]
+        return found.joined(near_boxes(self.model, self.data, *boxes))
 
     def _notice(self, geoms: np.ndarray) -> np.ndarray:
         """(k,) m; distances at which pairs (k, 2) of geoms are noticed."""
@@ -257,21 +238,6 @@ class Avoidance:
     def _left(self, geoms: np.ndarray, free: np.ndarray) -> np.ndarray:
         """(k,) bool; which pairs (k, 2) of geoms are of the world and a link that is free to touch it."""
         return self._of_world(geoms) & free[geoms].all(1)
-
-    def _near_boxes(self, free: np.ndarray) -> _Pairs:
-        """The same for pairs of boxes; MuJoCo's collision function finds those apart only if two faces are opposite."""
-        model, data, notice = self.model, self.data, self.box_notice
-        first, second = self.box_pairs.T
-        apart = np.linalg.norm(data.geom_xpos[first] - data.geom_xpos[second], axis=1)
-        near = apart < notice + model.geom_rbound[first] + model.geom_rbound[second]
-        rows = np.flatnonzero(near & ~self._left(self.box_pairs, free))
-        geoms, distance, ends = self.box_pairs[rows], np.empty(len(rows)), np.empty((len(rows), 6))
-        for row, (a, b) in enumerate(geoms.tolist()):
-            distance[row] = mujoco.mj_geomDistance(model, data, a, b, float(notice[rows[row]]), ends[row])
-        found = (distance < notice[rows]) & (np.abs(distance) > 1e-9)
-        geoms, distance, ends = geoms[found], distance[found], ends[found]
-        normal = (ends[:, 3:] - ends[:, :3]) / distance[:, None]
-        return _Pairs(geoms, distance, normal, 0.5 * (ends[:, :3] + ends[:, 3:]))
 
     def _set_distances(self) -> None:
         """Least distances between bodies of the robot that are near each other in the posture as it is placed."""

@@ -40,12 +40,10 @@ class Effort:
         self.model = copy.copy(robot.mujoco_model)
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self.data, self.tick = mujoco.MjData(self.model), tick
-        self.limit, above = SHARE * robot.torque_limit, ~robot.carrying(FEET)
-        self.joints: dict[Limb | None, np.ndarray] = {None: np.flatnonzero(above)}
-        for foot in FEET:
-            leg = np.zeros(len(above), bool)
-            leg[robot.joints_to(foot)] = True
-            self.joints[foot] = np.flatnonzero(above | leg)
+        self.limit = SHARE * robot.torque_limit
+        above = np.flatnonzero(~robot.carrying(FEET))
+        self.joints: dict[Limb | None, np.ndarray] = {None: above}
+        self.joints |= {foot: np.union1d(above, robot.joints_to(foot)) for foot in FEET}
         self.sites = {limb: int(self.model.site(item.site).id) for limb, item in robot.limbs.items()}
         self.palms = [(limb, site) for limb, site in self.sites.items() if not limb.is_foot]
         self.jacobian = np.zeros((6, self.model.nv))

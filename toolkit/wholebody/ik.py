@@ -176,7 +176,7 @@ class WholeBodyIK:
         turn = wanted + weights.KEPT_TURN * (self.drift[3:6] - wanted)
         self.steady.R_world_frame = self.wrapper.get_T_world_frame(self.robot.base)[:3, :3] @ rotation_exponential(turn)
         swinging = next((foot for foot in FEET if paths.segment(foot, time).path is not None), None)
-        standing = next((foot for foot in FEET if foot != swinging and paths.segment(foot, time).path is None), None)
+        standing = next((foot for foot in FEET if paths.segment(foot, time).path is None), None)
         self._set_dampers(before, angles, time, paths, standing)
         self._solve(time)
         self._spare_motors(time, before, motion, swinging, standing)

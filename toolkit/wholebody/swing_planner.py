@@ -45,11 +45,11 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     """
     bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector))
     sides = _free_sides(task, collide)
-    path, timing = _least_raised(task, collide, [*_easy(task), *_steep(task, STEEP)], bump, sides)
-    way = float(np.linalg.norm(task.end.position - task.start.position))
-    if not task.is_foot or _haste(task, way) == 0.0 or timing is EASY:
+    easy = _raised(task, EASY, task.rise + task.scale.length * EASY_RAISE)
+    path, timing = _least_raised(task, collide, easy + _raised(task, STEEP), bump, sides)
+    if not task.is_foot or _haste(task, task.way) == 0.0 or timing is EASY:
         return path
-    others = (_least_raised(task, collide, [*_steep(task, timing)], bump, sides)[0] for timing in (LATE, EARLY))
+    others = (_least_raised(task, collide, _raised(task, timing), bump, sides)[0] for timing in (LATE, EARLY))
     return min([path, *others], key=lambda each: (not each.clear, each.peak_acceleration))
 
 
@@ -65,8 +65,7 @@ def _least_raised(
     Moderate heights are tried first with the whole margin, then with half and a quarter of it. Great heights follow in
     the same way. No margin at all is the last resort.
     """
-    needed = 0.0 if not task.is_foot else abs(task.end.position[2] - task.start.position[2])
-    most = needed + task.scale.length * MODERATE_RAISE
+    most = task.rise + task.scale.length * MODERATE_RAISE
     moderate = [item for item in candidates if max(item[:2]) <= most]
     great = [item for item in candidates if max(item[:2]) > most]
     for shares, groups in ((MARGIN_SHARES, (moderate, great)), ((0.0,), (moderate, great))):
@@ -78,16 +77,9 @@ def _least_raised(
     return replace(_path(task, *candidates[-1], bump), clear=False), candidates[-1][2]
 
 
-def _easy(task: SwingTask) -> Iterator[tuple[float, float, SwingTiming]]:
-    """Small extra heights (m) before and after the crossing, from the least to the most, with the easy timing."""
-    level = abs(task.end.position[2] - task.start.position[2]) if task.is_foot else 0.0
-    most = level + task.scale.length * EASY_RAISE
-    yield from ((*pair, EASY) for pair in _raises(task) if max(pair) <= most)
-
-
-def _steep(task: SwingTask, timing: SwingTiming) -> Iterator[tuple[float, float, SwingTiming]]:
-    """Extra heights (m) before and after the crossing, from the least to the most, with a timing."""
-    yield from ((*pair, timing) for pair in _raises(task))
+def _raised(task: SwingTask, timing: SwingTiming, most: float = np.inf) -> list[tuple[float, float, SwingTiming]]:
+    """Extra heights (m) before and after the crossing, from the least to `most`, with a timing."""
+    return [(*pair, timing) for pair in _raises(task) if max(pair) <= most]
 
 
 def _raises(task: SwingTask) -> Iterator[tuple[float, float]]:
@@ -167,8 +159,8 @@ def _pitch(task: SwingTask) -> float:
     trail = (task.other[0].position - task.start.position) @ task.start.rotation[:, 0]
     ahead = (task.end.position - task.start.position) @ task.start.rotation[:, 0]
     # In fast swings the ankle has only time for the pitch that its range demands.
-    way, scale = float(np.linalg.norm(task.end.position - task.start.position)), task.scale.length
-    gain = PITCH_GAIN / scale * (1.0 - _haste(task, way))
+    scale = task.scale.length
+    gain = PITCH_GAIN / scale * (1.0 - _haste(task, task.way))
     return float(np.clip(gain * (min(trail, ahead) - scale * PITCH_FROM), 0.0, MAX_PITCH))
 
 

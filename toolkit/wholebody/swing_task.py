@@ -121,6 +121,16 @@ class SwingTask:
     shin: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property
+    def way(self) -> float:
+        """m; straight from the start to the end."""
+        return float(np.linalg.norm(self.end.position - self.start.position))
+
+    @property
+    def rise(self) -> float:
+        """m; by which a foot has to rise or to come down, 0 of palms."""
+        return abs(float(self.end.position[2] - self.start.position[2])) if self.is_foot else 0.0
+
+    @property
     def margin(self) -> float:
         """m; kept free around the swept patch, where the start and the end leave that much."""
         return self.scale.length * MARGIN
