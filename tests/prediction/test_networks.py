@@ -63,6 +63,17 @@ def test_more_time_and_friction_than_trained_are_judged_as_the_most_of_the_train
         np.testing.assert_array_equal(getattr(most, field), getattr(more, field))
 
 
+def test_a_limb_that_lifts_off_at_once_costs_more_than_is_predicted(networks):
+    networks[CATEGORY].lower[TIMING_AND_FRICTION] = 0.0
+    stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(0))
+    both = [replace(transition, timing=Timing(*times)) for times in ((0.05, 0.3), (0.35, 0.6))]
+    plain, judge = NetworkEvaluator(networks, GOAL, hasty=1.0), NetworkEvaluator(networks, GOAL)
+    predicted, judged = (item.evaluate(stance, com, velocity, both) for item in (plain, judge))
+    assert predicted.feasible.all() and (predicted.objective > 0.0).all()
+    np.testing.assert_allclose(judged.objective, predicted.objective * [judge.hasty, 1.0])
+    np.testing.assert_array_equal(judged.com_velocity, predicted.com_velocity)
+
+
 def test_a_judge_says_of_itself_what_a_search_has_to_know(networks):
     stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(1))
     plain, stand_in = Seven(), Seven()

@@ -79,5 +79,7 @@ def make_planner(
 def _networks(robot: RobotModel, world: World, stand_in: OptimiserEvaluator) -> NetworkEvaluator:
     """The robot's networks, with those for sliding ground where it has them."""
     folder = robot.folder / "networks" / SLIDING
-    sliding = NetworkEvaluator(load_networks(robot, folder), world.goal, stand_in) if folder.is_dir() else None
+    sliding = None
+    if folder.is_dir():  # their states are those of single transitions, whatever follows
+        sliding = NetworkEvaluator(load_networks(robot, folder), world.goal, stand_in, hasty=1.0)
     return NetworkEvaluator(load_networks(robot), world.goal, stand_in, sliding)

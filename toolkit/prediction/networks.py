@@ -28,6 +28,9 @@ There, what comes next cannot save a transition, and the mean over whole motions
 networks know what a transition does alone.
 """
 
+_HASTY = 0.25  # of the swing; a limb whose shift is shorter lifts off at once
+_HASTY_COST = 1.6  # J of such transitions over their predicted objective, in sequences that mix them with calm ones
+
 
 def load_networks(robot: RobotModel, folder: Path | None = None) -> dict[Category, TransitionNetwork]:
     """The networks of every category that the robot can perform.
@@ -60,17 +63,23 @@ class NetworkEvaluator(TransitionEvaluator):
 
     Those with more are judged as with the most of the training.
 
+    What a transition costs whose limb lifts off at once depends on the pace of what follows, which the networks are not
+    told. A search that may choose between such transitions and calm ones would prefer them where they are understated.
+    So their objectives are multiplied by what they come to along the sequences of such searches (`hasty`).
+
     Attributes:
         networks: Networks by category.
         goal: Where the sequences lead.
         stand_in: Judges what is quicker or more slippery than the training; None: the networks judge this as well.
         sliding: See `TransitionEvaluator`.
+        hasty: Factor on the predicted objective of transitions whose limb lifts off at once.
     """
 
     networks: dict[Category, TransitionNetwork]
     goal: Goal
     stand_in: TransitionEvaluator | None = None
     sliding: TransitionEvaluator | None = None
+    hasty: float = _HASTY_COST
 
     def evaluate(
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
@@ -114,7 +123,8 @@ class NetworkEvaluator(TransitionEvaluator):
                 way = ahead(frame.point(self.goal.position), self.goal.radius)
                 outputs = network.predict(features[accepted], way).astype(float)
                 kept = rows[accepted]
-                objective[kept] = outputs[:, 0]
+                lifts_at_once = all_rows.shift[kept] < _HASTY * all_rows.swing[kept]
+                objective[kept] = np.where(lifts_at_once, self.hasty, 1.0) * outputs[:, 0]
                 end_com[kept] = frame.point_back(outputs[:, 1:4])
                 end_velocity[kept] = frame.vector_back(outputs[:, 4:7])
         return TransitionBatch(feasible, objective, end_com, end_velocity, untrained=untrained)
