@@ -29,7 +29,7 @@ networks know what a transition does alone.
 """
 
 _HASTY = 0.25  # of the swing; a limb whose shift is shorter lifts off at once
-_HASTY_COST = 1.6  # J of such transitions over their predicted objective, in sequences that mix them with calm ones
+_HASTY_COST = 1.6  # J of such transitions over the prediction, in sequences that mix them with calm ones
 
 
 def load_networks(robot: RobotModel, folder: Path | None = None) -> dict[Category, TransitionNetwork]:
