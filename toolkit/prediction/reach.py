@@ -15,17 +15,30 @@ from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 
 SLACK = 0.01
-"""m for a body of the usual size (`toolkit.robot.scale`); about the error of networks in the CoM. A CoM that violates a
-bound by more is out of reach."""
+"""m for a body of the usual size (`toolkit.robot.scale`); about the error of networks in the CoM."""
 _INSIDE = 1e-6  # m by which a moved CoM is within reach
 _ROUNDS = 20
 
 
-def within_reach(robot: RobotModel, stance: Stance, com: np.ndarray, config: ProblemConfig | None = None) -> np.ndarray:
-    """CoMs (n, 3) m, world, moved by little so that every limb reaches its contact and none is too low.
+def within_reach(
+    robot: RobotModel,
+    stance: Stance,
+    com: np.ndarray,
+    config: ProblemConfig | None = None,
+    *,
+    slack: float = SLACK,
+) -> np.ndarray:
+    """CoMs moved by little so that every limb reaches its contact and none is too low.
 
-    Rows that violate nothing, violate a bound by more than `SLACK` or find no such place stay unchanged. The settings
-    `config` of the problems say how low a CoM may be.
+    Args:
+        robot: The robot.
+        stance: The contacts.
+        com: (n, 3) m, world.
+        config: Settings of the problems, which say how low a CoM may be; the default ones where None.
+        slack: m for a body of the usual size; a CoM that violates a bound by more is out of reach.
+
+    Returns:
+        (n, 3) m, world. Rows that violate nothing, are out of reach or find no such place stay unchanged.
     """
     com = np.asarray(com, float)
     feet = stance.mean_feet
@@ -49,7 +62,7 @@ def within_reach(robot: RobotModel, stance: Stance, com: np.ndarray, config: Pro
         return np.maximum(distances.max(1), least - points[:, 2])
 
     before = violation(com)
-    rows = np.flatnonzero((before > 0.0) & (before <= robot.scale.length * SLACK))
+    rows = np.flatnonzero((before > 0.0) & (before <= robot.scale.length * slack))
     if not len(rows):
         return com
     moved = com[rows]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import cycle, islice
 
 import numpy as np
@@ -15,6 +16,7 @@ from toolkit.errors import PlanningError
 from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.mjcf import warnings_refused
 from toolkit.prediction.evaluator import TransitionEvaluator
+from toolkit.prediction.reach import within_reach
 from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import AnaStarResult
 from toolkit.search.anytime.graph import Progress
@@ -76,14 +78,15 @@ class ContactPlanner:
     def timings(self, calmer: int = 0, *, slides: bool = False) -> tuple[Timing, ...]:
         """The timings of a transition to choose from when the pace has yielded so often.
 
-        Where the ground `slides`, standing for longer does not help, so the pace never yields. Judges that know no
-        dynamics begin with the second pace, but not for soles that roll, on which a robot stands the worse the longer
-        it stands on one. Heavy rotors make a world's own timing longer, as they do the planner's.
+        Where the ground `slides`, standing for longer does not help, so the pace never yields, and is a run's where it
+        is the planner's to choose. Judges that know no dynamics begin with the second pace, but not for soles that
+        roll, on which a robot stands the worse the longer it stands on one. Heavy rotors make a world's own timing
+        longer, as they do the planner's.
         """
         config = self.config
         pace = 0 if slides else calmer + (config.one_timing and self.robot.stands_on_one_foot)
         own = self.world.timing and self.world.timing.times(self.robot.rotor_factor)
-        timings = timings_of(config.timings, own, self.robot.pace, pace)
+        timings = timings_of(config.timings, own, self.robot.pace, pace, slides=slides)
         return timings[:1] if config.one_timing else timings
 
     @property
@@ -202,8 +205,9 @@ class ContactPlanner:
         if strategy.hasty is not None:
             haste = Haste(table, self.robot.com_height, way.forced, cost.per_metre, scale.length)
         delay = Delay(Drift(self.robot, table, timings), haste, cost.per_metre, scale.length)
+        mended = partial(within_reach, self.robot, slack=strategy.slack) if strategy.slack else None
         at_once, waiting = (
-            None if judge is None else Judging(judge, reader, reach, tally, deadline)
+            None if judge is None else Judging(judge, reader, reach, tally, deadline, mended)
             for judge in (strategy.at_once, strategy.waiting)
         )
         screen = SequenceScreen(moves, limbs)

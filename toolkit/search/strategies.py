@@ -12,6 +12,7 @@ from toolkit.search.planner_config import PlannerConfig
 
 _SHORTEST = 1.0  # m for a body of the usual size (`toolkit.robot.scale`); shorter ways are taken to be as long
 _ATTEMPTS = 20  # at a first sequence over ground on which no foot rests
+_SLACK = 0.03  # m; legs are stretched in a run, and predicted CoMs are a little out of reach more often than not
 _LAYER = 0.13  # units; random expansions are as likely at every distance from the goal
 
 
@@ -30,6 +31,8 @@ class Strategy:
             that begin with one of the feet; states that run ahead of their feet then wait (`costs.delay.Haste`). None:
             there are no such searches.
         attempts: Number of those searches.
+        slack: m for a body of the usual size (`toolkit.robot.scale`); predicted CoMs that are out of reach by up to so
+            much are judged from where they are within it. 0: they stay as they are.
     """
 
     cost: CostConfig
@@ -38,6 +41,7 @@ class Strategy:
     patient: AnaStarConfig
     hasty: AnaStarConfig | None = None
     attempts: int = 0
+    slack: float = 0.0
 
 
 def strategy_of(
@@ -106,7 +110,7 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
         persistence=1,
         first_only=True,
     )
-    return Strategy(config.cost, evaluator, evaluator.stand_in, patient, hasty, _ATTEMPTS)
+    return Strategy(config.cost, evaluator, evaluator.stand_in, patient, hasty, _ATTEMPTS, _SLACK)
 
 
 def _acceptable(config: PlannerConfig, length: float) -> float:

@@ -26,7 +26,7 @@ from toolkit.search.states.contact_table import ContactTable
 # All weights are in the h of 1 m of way, those that are not per m in that of a body of the usual size
 # (`toolkit.robot.scale`). Those of haste:
 _CAPTURE = 1.0  # per m that the capture point lies ahead of the foremost foot
-_EARLY = 0.7  # per m of v^2 / 2 a; with 1 or more nothing would be gained by going on
+_EARLY = 0.8  # per m of v^2 / 2 a; with 1 or more nothing would be gained by going on
 _TURN = 0.5  # per rad between the feet's headings
 # Those of transitions that are not judged yet:
 _MISS = 4.0  # per m by which a transition would have to bend the motion
