@@ -82,6 +82,14 @@ def test_a_com_far_out_of_reach_stays(robot):
         np.testing.assert_array_equal(within_reach(robot, sample.stance, com[None])[0], com)
 
 
+def test_how_far_out_of_reach_a_com_may_be_is_asked_for(robot):
+    sample = next(each for each in states(robot) if just_out(robot, each, 2.0 * SLACK) is not None)
+    com = just_out(robot, sample, 2.0 * SLACK)
+    near, nearer = (within_reach(robot, sample.stance, com[None], slack=slack)[0] for slack in (SLACK, 3.0 * SLACK))
+    np.testing.assert_array_equal(near, com)
+    assert (nearer != com).any() and excess(robot, sample.stance, nearer) <= 0
+
+
 def test_a_com_too_low_by_rounding_is_raised(robot):
     sample = next(states(robot))
     floor = min(contact.pose.position[2] for contact in sample.stance.contacts[:2])

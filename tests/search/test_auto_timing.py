@@ -56,9 +56,11 @@ def test_the_pace_yields_but_for_ground_that_slides(robot):
     planner = make_planner(robot, make_world(FLOOR, goal=(1.2, 0, 0), timing=None), "optimiser")
     swings = [min(timing.swing for timing in planner.timings(calmer)) for calmer in range(5)]
     assert swings[0] < swings[1] < swings[2] < swings[3] == swings[4]
-    assert planner.timings(2, slides=True) == planner.timings()
+    run = planner.timings(slides=True)
+    assert planner.timings(2, slides=True) == run == own_choice(robot.pace, slides=True)
+    assert min(timing.swing for timing in run) < swings[0]
     own = make_planner(robot, make_world(FLOOR, goal=(1.2, 0, 0), timing="0.4 0.6"), "optimiser")
-    assert own.timings(2) == (Timing(0.4, 0.6),)
+    assert own.timings(2) == own.timings(slides=True) == (Timing(0.4, 0.6),)
 
 
 def test_judges_that_know_no_dynamics_walk_at_one_calm_pace(robot):

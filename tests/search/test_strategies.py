@@ -9,6 +9,7 @@ from tests.search.worlds import FLOOR, make_world
 from toolkit.contacts.projection import Projected
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.kinematic import KinematicEvaluator
+from toolkit.prediction.reach import SLACK
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig, EdgeCost
 from toolkit.search.costs.heuristic import EuclideanDistance
@@ -39,7 +40,7 @@ def quick(robot):
 def test_an_ordinary_search_judges_at_once_and_doubts_nothing(quick):
     strategy = strategy_of(CONFIG, quick, 3.0, slides=False, paced=False)
     assert (strategy.at_once, strategy.waiting, strategy.hasty) == (quick, None, None)
-    assert strategy.cost == CONFIG.cost
+    assert (strategy.cost, strategy.slack) == (CONFIG.cost, 0.0)
     assert strategy.patient == replace(CONFIG.search, initial_cost=3.0 * CONFIG.acceptable_cost, layer=0.13)
 
 
@@ -61,7 +62,7 @@ def test_a_sliding_search_begins_in_haste_and_asks_the_stand_in(quick, limit, pa
     assert (strategy.at_once, strategy.waiting) == (quick, quick.stand_in)
     assert strategy.hasty is not None and strategy.hasty.first_only and not strategy.patient.first_only
     assert (strategy.patient.max_expansions, strategy.hasty.max_expansions) == (patient, hasty)
-    assert strategy.patient.settled == limit
+    assert strategy.patient.settled == limit and strategy.slack > SLACK
     assert strategy.patient.initial_cost == np.inf  # the cost so far would lead back
     assert strategy.cost.steep == 0.0
 
