@@ -63,6 +63,10 @@ def test_a_sliding_search_begins_in_haste_and_asks_the_stand_in(quick, limit, pa
     assert strategy.hasty is not None and strategy.hasty.first_only and not strategy.patient.first_only
     assert (strategy.patient.max_expansions, strategy.hasty.max_expansions) == (patient, hasty)
     assert strategy.patient.settled == limit and strategy.slack > SLACK
+    assert strategy.calm is not None and strategy.calm.first_only and strategy.restarts > 0
+    assert strategy.calm == replace(
+        strategy.patient, max_expansions=(limit or 1000) * 2, settled=None, persistence=1, first_only=True
+    )
     assert strategy.patient.initial_cost == np.inf  # the cost so far would lead back
     assert strategy.cost.steep == 0.0
 

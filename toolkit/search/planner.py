@@ -147,6 +147,8 @@ class ContactPlanner:
             hasty = replace(strategy.hasty, unit=unit)
             for last in islice(cycle(FEET[::-1]), strategy.attempts):
                 searches.insert(-1, (ContactProblem(parts, moved_last(state, last)), hasty))
+        if strategy.calm is not None:
+            searches[-1:-1] = [(searches[-1][0], replace(strategy.calm, unit=unit))] * strategy.restarts
         judge = None
         if self._finish is not None:
             at_rest = self._at_rest if way.slides else None

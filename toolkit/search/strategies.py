@@ -11,7 +11,8 @@ from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.planner_config import PlannerConfig
 
 _SHORTEST = 1.0  # m for a body of the usual size (`toolkit.robot.scale`); shorter ways are taken to be as long
-_ATTEMPTS = 6  # at a first sequence over ground on which no foot rests; more of them find less than the patient search
+_ATTEMPTS = 6  # at a first sequence over ground on which no foot rests; more of them find less than patient searches
+_RESTARTS = 3  # of a patient search for a first sequence there, which finds one soon or hardly at all
 _SLACK = 0.03  # m; legs are stretched in a run, and predicted CoMs are a little out of reach more often than not
 _LAYER = 0.13  # units; random expansions are as likely at every distance from the goal
 
@@ -31,6 +32,9 @@ class Strategy:
             that begin with one of the feet; states that run ahead of their feet then wait (`costs.delay.Haste`). None:
             there are no such searches.
         attempts: Number of those searches.
+        calm: Settings of a search of the whole graph that follows them, until one of its runs finds a sequence; None:
+            there is no such search.
+        restarts: Number of those runs, each with other draws.
         slack: m for a body of the usual size (`toolkit.robot.scale`); predicted CoMs that are out of reach by up to so
             much are judged from where they are within it. 0: they stay as they are.
     """
@@ -41,6 +45,8 @@ class Strategy:
     patient: AnaStarConfig
     hasty: AnaStarConfig | None = None
     attempts: int = 0
+    calm: AnaStarConfig | None = None
+    restarts: int = 0
     slack: float = 0.0
 
 
@@ -101,16 +107,21 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
         max_expansions=None if limit is None else 10 * limit,
         settled=limit,
     )
-    hasty = replace(
+    calm = replace(
         patient,
+        max_expansions=2000 if limit is None else 2 * limit,
+        settled=None,
+        persistence=1,
+        first_only=True,
+    )
+    hasty = replace(
+        calm,
         layer=0.13,
         epsilon=0.3,
         crowding=0.013,
         max_expansions=300 if limit is None else 3 * limit // 10,
-        persistence=1,
-        first_only=True,
     )
-    return Strategy(config.cost, evaluator, evaluator.stand_in, patient, hasty, _ATTEMPTS, _SLACK)
+    return Strategy(config.cost, evaluator, evaluator.stand_in, patient, hasty, _ATTEMPTS, calm, _RESTARTS, _SLACK)
 
 
 def _acceptable(config: PlannerConfig, length: float) -> float:
