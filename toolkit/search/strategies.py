@@ -12,6 +12,7 @@ from toolkit.search.planner_config import PlannerConfig
 
 _SHORTEST = 1.0  # m for a body of the usual size (`toolkit.robot.scale`); shorter ways are taken to be as long
 _ATTEMPTS = 6  # at a first sequence over ground on which no foot rests; more of them find less than patient searches
+_USUAL = 1000  # expansions, of which early searches have a part or a multiple each
 _RESTARTS = 3  # of a patient search for a first sequence there, which finds one soon or hardly at all
 _SLACK = 0.03  # m; legs are stretched in a run, and predicted CoMs are a little out of reach more often than not
 _LAYER = 0.13  # units; random expansions are as likely at every distance from the goal
@@ -95,10 +96,11 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
     """Find a first sequence soon over ground on which no foot rests, then start again with patience.
 
     The cost so far does not count before there is a solution, since it would only lead back: it is high for all states
-    that get far. Expansions are ten times as many, as most of them only show that the robot arrives too fast; the
-    hasty searches have 3 % of them each. The usual number of them without a cheaper sequence ends the search.
+    that get far. Expansions are ten times as many, as most of them only show that the robot arrives too fast. The
+    usual number of them without a cheaper sequence ends the search.
     """
     limit = config.search.max_expansions
+    usual = _USUAL if limit is None else min(limit, _USUAL)  # a first sequence does not come sooner for a higher limit
     patient = replace(
         config.search,
         layer=0.2,
@@ -107,20 +109,8 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
         max_expansions=None if limit is None else 10 * limit,
         settled=limit,
     )
-    calm = replace(
-        patient,
-        max_expansions=2000 if limit is None else 2 * limit,
-        settled=None,
-        persistence=1,
-        first_only=True,
-    )
-    hasty = replace(
-        calm,
-        layer=0.13,
-        epsilon=0.3,
-        crowding=0.013,
-        max_expansions=300 if limit is None else 3 * limit // 10,
-    )
+    calm = replace(patient, max_expansions=2 * usual, settled=None, persistence=1, first_only=True)
+    hasty = replace(calm, layer=0.13, epsilon=0.3, crowding=0.013, max_expansions=3 * usual // 10)
     return Strategy(config.cost, evaluator, evaluator.stand_in, patient, hasty, _ATTEMPTS, calm, _RESTARTS, _SLACK)
 
 
