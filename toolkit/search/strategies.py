@@ -97,7 +97,8 @@ def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
 
     The cost so far does not count before there is a solution, since it would only lead back: it is high for all states
     that get far. Expansions are ten times as many, as most of them only show that the robot arrives too fast. The
-    usual number of them without a cheaper sequence ends the search.
+    usual number of them without a cheaper sequence ends the search. Early searches, hasty ones and then patient ones,
+    are short, since how long one takes to a first sequence varies a lot.
     """
     limit = config.search.max_expansions
     usual = _USUAL if limit is None else min(limit, _USUAL)  # a first sequence does not come sooner for a higher limit

@@ -1,8 +1,8 @@
-"""Searches in turn: hasty ones for a first sequence, then a patient one that begins again at the start.
+"""Searches in turn: early ones for a first sequence, then a patient one that begins again at the start.
 
-How long a random search takes to its first sequence varies a lot: most find one at once or hardly at all. So a hasty
+How long a random search takes to its first sequence varies a lot: most find one at once or hardly at all. So an early
 search that has not found one soon gives way to another one, with other draws. The sequence that is found first is
-seldom one that holds. The hasty search would go on around its own first sequence, so the patient one does not build on
+seldom one that holds. The early search would go on around its own first sequence, so the patient one does not build on
 it.
 
 References:
