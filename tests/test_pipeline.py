@@ -38,7 +38,6 @@ def solution(name, *limbs, start=(), seconds=0.0):
 class Planner:
     """Finds what it is given: with palms, and for the feet alone."""
 
-    hasty = 0
     paces = 1
     calm: list | None = None  # what the searches after the first find; None for the same again
 
@@ -56,7 +55,6 @@ class Planner:
             seconds=1.0,
             heuristic_seconds=0.0,
             expansions=1,
-            hasty=self.hasty,
             slides=False,
             paced=False,
             calmer=tuple(Timing(swing=float(pace)) for pace in range(calmer + 1, self.paces)),
@@ -269,15 +267,6 @@ def test_a_pace_that_may_not_yield_is_kept(monkeypatch):
     planner = Planner([solution("hurried", FOOT), solution("other", FOOT)], [])
     run = Run(planner, {"other"}, monkeypatch, {"hurried": 1.0, "other": 2.0}, hurrying={"hurried"})
     assert run.tested == ["hurried", "other"] and planner.calls == [True] and run.result.passed
-
-
-def test_what_was_only_to_come_soon_is_tested_like_the_rest(monkeypatch):
-    planner = Planner([solution("soon", FOOT, seconds=0.1), solution("new", FOOT, seconds=0.5)], [])
-    planner.hasty = 1
-    run = Run(planner, {"soon"}, monkeypatch)
-    assert run.optimised == ["new", "soon"] and run.result.passed
-    assert [item.source for item in run.result.candidates] == [Source.SEARCH, Source.HASTY]
-    assert run.result.first_feasible is run.result.candidates[1]
 
 
 def test_the_first_feasible_sequence_counts_and_not_the_first_one(monkeypatch):

@@ -78,7 +78,6 @@ def test_a_judge_says_of_itself_what_a_search_has_to_know(networks):
     stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(1))
     plain, stand_in = Seven(), Seven()
     assert (plain.costly, plain.rejection, plain.stand_in) == (False, "dynamics", None)
-    assert plain.halt(stance, com, velocity, [transition], 0.6) is None
     assert plain.evaluate(stance, com, velocity, [transition]).untrained == 0
     assert NetworkEvaluator(networks, GOAL, stand_in).stand_in is stand_in
     with pytest.raises(TypeError, match="abstract"):

@@ -29,14 +29,6 @@ def test_transitions_are_judged_in_order(robot, stance):
     np.testing.assert_allclose(batch.com_velocity[2], motion.linear_momentum[-1] / robot.mass, atol=1e-12)
 
 
-def test_rest_at_the_end_can_be_asked_for(robot, stance):
-    com, velocity = initial_com(robot, stance), np.array([0.2, 0.0, 0.0])
-    transitions = [ContactTransition(Limb.LEFT_FOOT, sole(robot, Limb.LEFT_FOOT, 0.2))]
-    batch = OptimiserEvaluator(robot, final_at_rest=True).evaluate(stance, com, velocity, transitions)
-    assert batch.feasible.all()
-    np.testing.assert_allclose(batch.com_velocity, 0.0, atol=1e-6)  # the residual check's tolerance
-
-
 def test_no_transitions_are_no_work(robot, stance):
     batch = OptimiserEvaluator(robot).evaluate(stance, initial_com(robot, stance), np.zeros(3), [])
     assert batch.feasible.shape == (0,) and batch.com.shape == (0, 3)

@@ -1,6 +1,7 @@
 import gc
 import math
 import weakref
+from dataclasses import replace
 
 import networkx as nx
 import numpy as np
@@ -320,3 +321,26 @@ def test_ways_that_the_judge_makes_cheaper_are_judged_although_they_seem_too_dea
     best, asked = judged_ways(truth, costs)
     assert len(asked) > 1  # though all others seem dearer than the first one truly is
     assert best < 1.04 * truth.min()
+
+
+def test_the_first_solution_ends_a_search_that_wants_no_more():
+    for seed in range(10):
+        graph = Graph(np.random.default_rng(seed), goals=4)
+        result = AnaStar(graph, np.random.default_rng(seed), AnaStarConfig(epsilon=0.5, first_only=True)).run()
+        assert len(result.paths) == (graph.least < math.inf)
+        assert result.stopped_by in (("solution", "exhausted") if result.paths else ("exhausted",))
+
+
+def test_a_search_ends_when_it_has_settled_but_not_before_there_is_a_sequence():
+    settled, patient = 0, AnaStarConfig(epsilon=0.3)
+    for seed in range(30):
+        rng = np.random.default_rng
+        long = AnaStar(Graph(rng(seed), goals=4), rng(seed), patient).run()
+        short = AnaStar(Graph(rng(seed), goals=4), rng(seed), replace(patient, settled=3)).run()
+        if short.stopped_by != "settled":
+            assert short.stopped_by == "exhausted" and short.expansions == long.expansions
+            continue
+        settled += 1
+        assert short.expansions == short.paths[-1].expansions + 3
+        assert [path.states for path in short.paths] == [path.states for path in long.paths[: len(short.paths)]]
+    assert settled > 10

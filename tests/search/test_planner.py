@@ -279,16 +279,6 @@ def test_a_plan_goes_round_ground_that_nearly_slides(robot):
     assert steep[usual] == 0 < steep[0.0]
 
 
-def test_the_first_sequence_over_slippery_ground_begins_with_the_left_foot_and_later_ones_with_either(robot):
-    upper, lower = (box([x, 0, z], [0.5, 0.6, 0.02], friction=0.5) for x, z in ((-0.18, -0.02), (1.88, -0.597)))
-    slope = box([0.82, 0, -0.2887], [0.577, 0.6, 0.02], (0, 30, 0), friction=0.5)
-    world = make_world(upper, slope, lower, goal=(2.0, 0, -0.577))
-    result = plan(robot, world, kinematic=KinematicConfig(friction=2.0))
-    first, *later = [solution.sequence.transitions[0].limb for solution in result.solutions]
-    assert result.hasty == 1 and first == Limb.LEFT_FOOT and Limb.RIGHT_FOOT in later
-    assert all(np.isfinite(solution.bound) for solution in result.solutions)
-
-
 @pytest.mark.parametrize("width", [0.25, 0.3, 0.35, 0.45, 0.6])
 def test_gaps_of_every_width_are_crossed(robot, width):
     gap = [box([0, 0, -0.05], [0.5, 0.6, 0.05]), box([1.0 + width, 0, -0.05], [0.5, 0.6, 0.05])]

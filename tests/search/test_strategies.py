@@ -9,14 +9,12 @@ from tests.search.worlds import FLOOR, make_world
 from toolkit.contacts.projection import Projected
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.kinematic import KinematicEvaluator
-from toolkit.prediction.reach import SLACK
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig, EdgeCost
 from toolkit.search.costs.heuristic import EuclideanDistance
 from toolkit.search.moves.candidates import Candidates, mean_feet
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.states.contact_table import ContactTable
-from toolkit.search.states.state import LAST, moved_last, pack, unpack
 from toolkit.search.strategies import strategy_of
 from toolkit.world.timing import Timing
 
@@ -37,53 +35,40 @@ def quick(robot):
     return judge
 
 
-def test_an_ordinary_search_judges_at_once_and_doubts_nothing(quick):
+def test_an_ordinary_search_judges_at_once(quick):
     strategy = strategy_of(CONFIG, quick, 3.0, slides=False, paced=False)
-    assert (strategy.at_once, strategy.waiting, strategy.hasty) == (quick, None, None)
-    assert (strategy.cost, strategy.slack) == (CONFIG.cost, 0.0)
-    assert strategy.patient == replace(CONFIG.search, initial_cost=3.0 * CONFIG.acceptable_cost, layer=0.13)
+    assert (strategy.judge, strategy.lazy, strategy.haste) == (quick, False, False)
+    assert strategy.cost == CONFIG.cost
+    assert strategy.search == replace(CONFIG.search, initial_cost=3.0 * CONFIG.acceptable_cost, layer=0.13)
 
 
 @pytest.mark.parametrize("slides", [False, True])
 def test_a_lazy_search_lets_everything_wait_and_may_look_at_more(robot, slides):
     judge = Slow(robot)
     strategy = strategy_of(CONFIG, judge, 0.5, slides=slides, paced=False)
-    assert (strategy.at_once, strategy.waiting, strategy.hasty) == (None, judge, None)
-    assert strategy.patient.max_expansions == 2000
-    assert strategy.patient.initial_cost == CONFIG.acceptable_cost
-    assert strategy.patient.patience == CONFIG.search.patience * (10 if slides else 1)
+    assert (strategy.judge, strategy.lazy, strategy.haste) == (judge, True, False)
+    assert strategy.search.max_expansions == 2000
+    assert strategy.search.initial_cost == CONFIG.acceptable_cost
+    assert strategy.search.patience == CONFIG.search.patience * (10 if slides else 1)
     assert strategy.cost.steep == (0.0 if slides else CONFIG.cost.steep)
 
 
-@pytest.mark.parametrize(("limit", "patient", "hasty"), [(100, 1000, 30), (None, None, 300)])
-def test_a_sliding_search_begins_in_haste_and_asks_the_stand_in(quick, limit, patient, hasty):
+@pytest.mark.parametrize(("limit", "most"), [(100, 1000), (None, None)])
+def test_a_sliding_search_waits_for_the_feet_and_ends_when_it_has_settled(quick, limit, most):
     config = replace(CONFIG, search=replace(CONFIG.search, max_expansions=limit))
     strategy = strategy_of(config, quick, 3.0, slides=True, paced=False)
-    assert (strategy.at_once, strategy.waiting) == (quick, quick.stand_in)
-    assert strategy.hasty is not None and strategy.hasty.first_only and not strategy.patient.first_only
-    assert (strategy.patient.max_expansions, strategy.hasty.max_expansions) == (patient, hasty)
-    assert strategy.patient.settled == limit and strategy.slack > SLACK
-    assert strategy.calm is not None and strategy.calm.first_only and strategy.restarts > 0
-    assert strategy.calm == replace(
-        strategy.patient, max_expansions=(limit or 1000) * 2, settled=None, persistence=1, first_only=True
-    )
-    assert strategy.patient.initial_cost == np.inf  # the cost so far would lead back
+    assert (strategy.judge, strategy.lazy, strategy.haste) == (quick, False, True)
+    assert (strategy.search.max_expansions, strategy.search.settled) == (most, limit)
+    assert strategy.search.initial_cost == np.inf  # the cost so far would lead back
     assert strategy.cost.steep == 0.0
 
 
 def test_a_given_first_cost_is_kept(quick):
     config = replace(CONFIG, search=replace(CONFIG.search, initial_cost=7.0))
     assert all(
-        strategy_of(config, quick, 3.0, slides=slides, paced=False).patient.initial_cost == 7.0
+        strategy_of(config, quick, 3.0, slides=slides, paced=False).search.initial_cost == 7.0
         for slides in (False, True)
     )
-
-
-def test_a_limb_that_moved_last_is_all_that_changes():
-    state = pack(np.array([[3, 5, -1, 8]]), np.array([-1]), np.ones((1, 3)), np.zeros((1, 3)))[0]
-    before, after = unpack([state])[0], unpack([moved_last(state, Limb.RIGHT_FOOT)])[0]
-    assert (before[LAST], after[LAST]) == (-1, Limb.RIGHT_FOOT)
-    np.testing.assert_array_equal(np.delete(before, LAST), np.delete(after, LAST))
 
 
 @pytest.fixture

@@ -17,7 +17,6 @@ class Source(StrEnum):
     """What found a sequence."""
 
     SEARCH = "search"
-    HASTY = "hasty search"
     LOCAL = "local search"
     TIMED = "a calmer timing"
 

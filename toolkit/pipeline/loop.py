@@ -203,7 +203,7 @@ class _Run:
     @property
     def _optimisations(self) -> int:
         """Number of sequences of searches that were optimised."""
-        return sum(candidate.source in (Source.SEARCH, Source.HASTY) for candidate in self._candidates)
+        return sum(candidate.source == Source.SEARCH for candidate in self._candidates)
 
     def _concluded(self) -> PipelineResult:
         """The result with the best trial; of trials that came equally far, the first."""
@@ -244,18 +244,18 @@ class _Run:
     def _optimised(self, search: SearchResult) -> list[Candidate]:
         """New candidates of the last search, the newest (predicted cheapest) first."""
         most = (self._config.optimisations - self._optimisations + 1) // 2  # the other half is for searches to come
-        order: list[tuple[Solution, Source]] = []
-        for index, solution in reversed(list(enumerate(search.solutions))):
+        order: list[Solution] = []
+        for solution in reversed(search.solutions):
             if len(order) < most and self._new(solution.sequence):
-                order.append((solution, Source.HASTY if index < search.hasty else Source.SEARCH))
+                order.append(solution)
         if not order:
             return []
         began, found = time.perf_counter(), []
         self._observer.started("dynamics")
-        for solution, source in order:
+        for solution in order:
             if self._hopeless:
                 break
-            found.append(self._candidate(solution, source))
+            found.append(self._candidate(solution))
             self._observer.progress("dynamics", len(found) / len(order), f"{len(found)} of {len(order)} sequences")
         self._observer.finished("dynamics", any(c.feasible for c in found), time.perf_counter() - began, _told(found))
         return found
@@ -306,12 +306,12 @@ class _Run:
         self._known.add(sequence.identity)
         return len(self._known) > known
 
-    def _candidate(self, solution: Solution, source: Source) -> Candidate:
+    def _candidate(self, solution: Solution) -> Candidate:
         """A sequence of the last search, optimised."""
         plan, failure = self._tester.optimise(solution.sequence, solution.plan)
         if failure is not None:
             self._note(solution.sequence, failure)
-        return self._entered(source, solution, plan, plan_cost(plan, self._weights), failure)
+        return self._entered(Source.SEARCH, solution, plan, plan_cost(plan, self._weights), failure)
 
     def _entered(
         self, source: Source, solution: Solution, plan: MotionPlan, cost: PlanCost, failure: Failure | None

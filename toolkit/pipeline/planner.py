@@ -14,7 +14,7 @@ from toolkit.errors import PlanningError
 from toolkit.mjcf import warnings_refused
 from toolkit.pipeline.config import PipelineConfig
 from toolkit.prediction.kinematic import KinematicEvaluator
-from toolkit.prediction.networks import SLIDING, NetworkEvaluator, load_networks
+from toolkit.prediction.networks import NetworkEvaluator, load_networks
 from toolkit.prediction.optimiser import OptimiserEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import Progress
@@ -69,17 +69,7 @@ def make_planner(
         config = replace(config, one_timing=True, cost=replace(config.cost, time=0.0, pace=0.0))
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
     optimiser = OptimiserEvaluator(robot)
-    judge = _networks(robot, world, optimiser) if kind == "learned" else optimiser
-    at_rest = OptimiserEvaluator(robot, final_at_rest=True)
+    judge = NetworkEvaluator(load_networks(robot), world.goal, optimiser) if kind == "learned" else optimiser
     motions, room = PipelineConfig().motions(robot.scale), BodyRoom(robot, world)  # as a run plans them by default
     finish = partial(plan_motion, robot, world, config=motions, surroundings=room)
-    return ContactPlanner(robot, world, judge, config, finish, at_rest)
-
-
-def _networks(robot: RobotModel, world: World, stand_in: OptimiserEvaluator) -> NetworkEvaluator:
-    """The robot's networks, with those for sliding ground where it has them."""
-    folder = robot.folder / "networks" / SLIDING
-    sliding = None
-    if folder.is_dir():  # their states are those of single transitions, whatever follows
-        sliding = NetworkEvaluator(load_networks(robot, folder), world.goal, stand_in, hasty=1.0)
-    return NetworkEvaluator(load_networks(robot), world.goal, stand_in, sliding)
+    return ContactPlanner(robot, world, judge, config, finish)

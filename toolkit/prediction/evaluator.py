@@ -37,40 +37,15 @@ class TransitionEvaluator(ABC):
     Attributes:
         costly: Whether a search should ask about one transition at a time, since each takes some milliseconds.
         rejection: What it means that a transition is infeasible, for messages.
-        stand_in: The judge of what this one was not trained for. It also judges on ground that holds no resting foot,
-            where feasibility must be exact. None where there is no such judge.
-        sliding: The judge to take on ground that holds no resting foot; None for this one.
+        stand_in: The judge of what this one was not trained for; None where there is no such judge.
     """
 
     costly: bool = False
     rejection: str = "dynamics"
     stand_in: TransitionEvaluator | None = None
-    sliding: TransitionEvaluator | None = None
 
     @abstractmethod
     def evaluate(
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
     ) -> TransitionBatch:
         """Judge transitions from a stance with CoM (3,) m and CoM velocity (3,) m/s in the world frame."""
-
-    def halt(
-        self,
-        stance: Stance,
-        com: np.ndarray,
-        com_velocity: np.ndarray,
-        transitions: Sequence[ContactTransition],
-        rest: float,
-    ) -> float | None:
-        """Objective of coming to rest by several transitions in a row.
-
-        Args:
-            stance: The stance before the first transition.
-            com: (3,) m, world; the CoM before the first transition.
-            com_velocity: (3,) m/s, world; its velocity.
-            transitions: The transitions in their order.
-            rest: Time in s on the last stance, at whose end the CoM is at rest.
-
-        Returns:
-            The objective; None where that is infeasible, or the judge only judges single transitions.
-        """
-        return None

@@ -17,16 +17,10 @@ from toolkit.errors import NetworkError
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.prediction.features import ahead, encode
+from toolkit.prediction.friction import allowed, rests
 from toolkit.prediction.network import TransitionNetwork, load_network, network_path
 from toolkit.robot.model import RobotModel
 from toolkit.world.world import Goal
-
-SLIDING = "sliding"
-"""Folder, within that of the networks, of those for ground that holds no resting foot.
-
-There, what comes next cannot save a transition, and the mean over whole motions tells too little of the speed. These
-networks know what a transition does alone.
-"""
 
 _HASTY = 0.25  # of the swing; a limb whose shift is shorter lifts off at once
 _HASTY_COST = 1.6  # J of such transitions over the prediction, in sequences that mix them with calm ones
@@ -65,20 +59,20 @@ class NetworkEvaluator(TransitionEvaluator):
 
     What a transition costs whose limb lifts off at once depends on the pace of what follows, which the networks are not
     told. A search that may choose between such transitions and calm ones would prefer them where they are understated.
-    So their objectives are multiplied by what they come to along the sequences of such searches (`hasty`).
+    So their objectives are multiplied by what they come to along the sequences of such searches (`hasty`). Where no
+    contact can rest, all that follows is as quick, and nothing is understated. There, CoM states are moved to what
+    friction allows (`toolkit.prediction.friction`).
 
     Attributes:
         networks: Networks by category.
         goal: Where the sequences lead.
         stand_in: Judges what is quicker or more slippery than the training; None: the networks judge this as well.
-        sliding: See `TransitionEvaluator`.
         hasty: Factor on the predicted objective of transitions whose limb lifts off at once.
     """
 
     networks: dict[Category, TransitionNetwork]
     goal: Goal
     stand_in: TransitionEvaluator | None = None
-    sliding: TransitionEvaluator | None = None
     hasty: float = _HASTY_COST
 
     def evaluate(
@@ -92,7 +86,7 @@ class NetworkEvaluator(TransitionEvaluator):
         all_rows, n = TransitionRows.of(transitions), len(transitions)
         feasible, objective = np.zeros(n, bool), np.zeros(n)
         end_com, end_velocity = np.zeros((n, 3)), np.zeros((n, 3))
-        untrained = 0
+        untrained, resting = 0, rests(stance)
         numbers = category_rows(stance, all_rows)
         group = len(Limb) * numbers + all_rows.limb
         for code in dict.fromkeys(group.tolist()):
@@ -123,8 +117,11 @@ class NetworkEvaluator(TransitionEvaluator):
                 way = ahead(frame.point(self.goal.position), self.goal.radius)
                 outputs = network.predict(features[accepted], way).astype(float)
                 kept = rows[accepted]
-                lifts_at_once = all_rows.shift[kept] < _HASTY * all_rows.swing[kept]
+                lifts_at_once = (all_rows.shift[kept] < _HASTY * all_rows.swing[kept]) & resting
                 objective[kept] = np.where(lifts_at_once, self.hasty, 1.0) * outputs[:, 0]
                 end_com[kept] = frame.point_back(outputs[:, 1:4])
                 end_velocity[kept] = frame.vector_back(outputs[:, 4:7])
+                if not resting:
+                    seconds, ends = (all_rows.shift + all_rows.swing)[kept], (end_com[kept], end_velocity[kept])
+                    end_com[kept], end_velocity[kept] = allowed(stance, com, com_velocity, seconds, *ends)
         return TransitionBatch(feasible, objective, end_com, end_velocity, untrained=untrained)

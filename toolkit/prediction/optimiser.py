@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from toolkit.centroidal.sequence import SequenceConfig, optimise, optimise_transition
-from toolkit.contacts.schedule import ContactSchedule
-from toolkit.contacts.sequence import ContactSequence, ContactTransition
+from toolkit.centroidal.sequence import SequenceConfig, optimise_transition
+from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.prediction.reach import within_reach
@@ -20,14 +19,13 @@ class OptimiserEvaluator(TransitionEvaluator):
 
     Args:
         robot: The robot.
-        final_at_rest: Whether the CoM must be at rest after the transition, as at the goal.
         config: Settings of the optimiser; the default ones where None.
     """
 
     costly = True
 
-    def __init__(self, robot: RobotModel, *, final_at_rest: bool = False, config: SequenceConfig | None = None):
-        self._robot, self._final_at_rest, self._config = robot, final_at_rest, config or SequenceConfig()
+    def __init__(self, robot: RobotModel, *, config: SequenceConfig | None = None):
+        self._robot, self._config = robot, config or SequenceConfig()
 
     def evaluate(
         self, stance: Stance, com: np.ndarray, com_velocity: np.ndarray, transitions: Sequence[ContactTransition]
@@ -42,23 +40,8 @@ class OptimiserEvaluator(TransitionEvaluator):
         final_com, velocity = np.tile(np.asarray(com, float), (n, 1)), np.zeros((n, 3))
         com = within_reach(self._robot, stance, np.asarray(com, float)[None])[0]
         for index, transition in enumerate(transitions):
-            given = self._robot, stance, com, com_velocity, transition
-            motion = optimise_transition(*given, config=self._config, final_at_rest=self._final_at_rest)
+            motion = optimise_transition(self._robot, stance, com, com_velocity, transition, config=self._config)
             if motion.feasible:
                 feasible[index], objective[index] = True, motion.objective
                 final_com[index], velocity[index] = motion.com[-1], motion.linear_momentum[-1] / self._robot.mass
         return TransitionBatch(feasible, objective, final_com, velocity)
-
-    def halt(
-        self,
-        stance: Stance,
-        com: np.ndarray,
-        com_velocity: np.ndarray,
-        transitions: Sequence[ContactTransition],
-        rest: float,
-    ) -> float | None:
-        """Objective of coming to rest; see `TransitionEvaluator`."""
-        com = within_reach(self._robot, stance, np.asarray(com, float)[None])[0]
-        schedule = ContactSchedule.of(ContactSequence(stance, tuple(transitions)), final_rest=rest)
-        motion = optimise(self._robot, schedule, com, com_velocity, config=self._config)
-        return motion.objective if motion.feasible else None

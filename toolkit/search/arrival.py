@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.search.anytime.graph import Edge, Fault
 from toolkit.search.costs.edge_cost import EdgeCost
 from toolkit.search.judging import Tally
@@ -18,9 +17,6 @@ from toolkit.search.moves.exclusion import Blame
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import is_pending
-
-_WINDOWS = (1, 3, 6)  # transitions that are optimised together, in the order in which they are tried
-_REST = 0.6  # s for a body of the usual size (`toolkit.robot.scale`), on the final stance that are optimised with them
 
 Finish = Callable[[ContactSequence], MotionPlan]
 """The motion of a whole sequence from rest to rest, with its verdict."""
@@ -43,8 +39,6 @@ class Arrival:
 
     Args:
         finish: Optimises whole sequences.
-        screen: Says quickly whether the last few transitions come to rest, where a robot may arrive too fast; None
-            where it need not be asked.
         reader: Reads states.
         cost: Costs of the search.
         tally: Counts rejections.
@@ -54,13 +48,12 @@ class Arrival:
     def __init__(
         self,
         finish: Finish,
-        screen: TransitionEvaluator | None,
         reader: StateReader,
         cost: EdgeCost,
         tally: Tally,
         blame: Blame,
     ):
-        self._finish, self._screen, self._reader, self._cost, self._tally = finish, screen, reader, cost, tally
+        self._finish, self._reader, self._cost, self._tally = finish, reader, cost, tally
         self._blame = blame
 
     def __call__(
@@ -73,9 +66,6 @@ class Arrival:
         transitions = [self._reader.transition(*step) for step in zip(ends, [*judged, edge.payload], strict=True)]
         sequence = ContactSequence(self._reader.origin(passed[0])[0], tuple(transitions))
         at = self._blame.first_in(sequence)
-        if at is None and not self._comes_to_rest(passed, transitions):
-            self._tally.rejected[Reason.DYNAMICS] += 1
-            return None
         plan = self._finish(sequence) if at is None else None
         if plan is None or not plan.motion.feasible:
             self._tally.rejected[Reason.DYNAMICS] += 1
@@ -86,16 +76,3 @@ class Arrival:
         predicted = sum(payload[0] for payload in judged) + edge.payload[0]
         missing = self._cost.dynamics * (plan.motion.objective - predicted)
         return edge._replace(cost=edge.cost + missing, payload=(*edge.payload, Arrived(missing, plan)))
-
-    def _comes_to_rest(self, passed: list[bytes], transitions: list) -> bool:
-        """Whether the last transition, or the last few of them together, end at rest."""
-        if self._screen is None:
-            return True
-        if self._screen.evaluate(*self._reader.origin(passed[-1]), transitions[-1:]).feasible[0]:
-            return True
-        windows = [count for count in _WINDOWS if count <= len(transitions)]
-        starts, rest = [self._reader.origin(passed[-count]) for count in windows], self._reader.scale.time * _REST
-        return any(
-            self._screen.halt(*start, transitions[-count:], rest) is not None
-            for count, start in zip(windows, starts, strict=True)
-        )

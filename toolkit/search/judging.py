@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from toolkit.contacts.stance import Stance
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.search.moves.candidates import Candidates
 from toolkit.search.moves.reach_check import ReachCheck
@@ -39,7 +37,6 @@ class Judging:
         reach: Checks what legs and arms reach.
         tally: Counts the rejections.
         deadline: Time in s on the clock of `time.perf_counter`; no query that would end later is begun.
-        mended: Moves the CoMs (n, 3) m of states of a stance to where the judge shall take them to be; None: they stay.
     """
 
     def __init__(
@@ -49,10 +46,9 @@ class Judging:
         reach: ReachCheck,
         tally: Tally,
         deadline: float,
-        mended: Callable[[Stance, np.ndarray], np.ndarray] | None = None,
     ):
         self._evaluator, self._reader, self._reach = evaluator, reader, reach
-        self._tally, self._deadline, self._mended = tally, deadline, mended
+        self._tally, self._deadline = tally, deadline
         self._pace = 0.0  # s per transition of the last query
 
     def __call__(self, row: np.ndarray, candidates: Candidates) -> tuple[TransitionBatch, np.ndarray] | None:
@@ -67,8 +63,6 @@ class Judging:
         began = time.perf_counter()
         if began + self._pace * len(transitions) > self._deadline:
             return None
-        if self._mended is not None:
-            com = self._mended(stance, com[None])[0]
         batch = self._evaluator.evaluate(stance, com, velocity, transitions)
         self._pace = (time.perf_counter() - began) / len(transitions)
         codes = np.where(batch.feasible, 0, Reason.DYNAMICS)

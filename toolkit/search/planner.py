@@ -5,22 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
-from itertools import cycle, islice
 
 import numpy as np
 
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.errors import PlanningError
-from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.geometry.limb import PALMS, Limb
 from toolkit.mjcf import warnings_refused
 from toolkit.prediction.evaluator import TransitionEvaluator
-from toolkit.prediction.reach import within_reach
 from toolkit.robot.model import RobotModel
-from toolkit.search.anytime.ana_star import AnaStarResult
+from toolkit.search.anytime.ana_star import AnaStar, AnaStarResult
 from toolkit.search.anytime.graph import Progress
-from toolkit.search.anytime.restart import search_in_turn
 from toolkit.search.arrival import Arrival, Finish
 from toolkit.search.costs.delay import Delay, Haste
 from toolkit.search.costs.edge_cost import EdgeCost
@@ -36,7 +32,7 @@ from toolkit.search.result import SearchResult, Solution, reason_of
 from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.reader import StateReader
-from toolkit.search.states.state import CONTACTS, is_pending, moved_last, unpack
+from toolkit.search.states.state import CONTACTS, is_pending, unpack
 from toolkit.search.strategies import Strategy, strategy_of
 from toolkit.world.timing import Timing, given_timings, timings_of
 from toolkit.world.world import World
@@ -56,7 +52,6 @@ class ContactPlanner:
         evaluator: Judges the dynamics of transitions.
         config: Settings; the default ones where None.
         finish: Optimises the whole sequences that reach the goal; None: they are not optimised.
-        at_rest: Judges whether the last transitions end at rest, where the robot has to hurry; None: it is not asked.
 
     Attributes:
         ground: The world as the robot can walk it.
@@ -69,10 +64,9 @@ class ContactPlanner:
         evaluator: TransitionEvaluator,
         config: PlannerConfig | None = None,
         finish: Finish | None = None,
-        at_rest: TransitionEvaluator | None = None,
     ):
         self.robot, self.world, self.config = robot, world, config or PlannerConfig()
-        self._evaluator, self._finish, self._at_rest = evaluator, finish, at_rest
+        self._evaluator, self._finish = evaluator, finish
         self.ground = Ground(robot, world, self.config)
 
     def timings(self, calmer: int = 0, *, slides: bool = False) -> tuple[Timing, ...]:
@@ -138,25 +132,13 @@ class ContactPlanner:
         blame = Blame(exclusions, _STRIKES, scale=scale)
         parts = self._parts(way, strategy, timings, tally, blame.exclusions, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
-        unit, paces = parts.cost.unit, self._paces_after(calmer, slides=way.slides)
-        patient = replace(strategy.patient, unit=unit)
+        settings, paces = replace(strategy.search, unit=parts.cost.unit), self._paces_after(calmer, slides=way.slides)
         if paces or way.slides:  # a calmer search follows, or the strategy has extended the limit
-            patient = replace(patient, persistence=1)
-        searches = [(ContactProblem(parts, state), patient)]
-        if strategy.hasty is not None:  # a sequence that begins with the right foot often mirrors one that does not
-            hasty = replace(strategy.hasty, unit=unit)
-            for last in islice(cycle(FEET[::-1]), strategy.attempts):
-                searches.insert(-1, (ContactProblem(parts, moved_last(state, last)), hasty))
-        if strategy.calm is not None:
-            searches[-1:-1] = [(searches[-1][0], replace(strategy.calm, unit=unit))] * strategy.restarts
-        judge = None
-        if self._finish is not None:
-            at_rest = self._at_rest if way.slides else None
-            judge = Arrival(self._finish, at_rest, parts.reader, parts.cost, tally, blame)
-        result, early = search_in_turn(searches, rng, judge, time_limit, observer)
+            settings = replace(settings, persistence=1)
+        judge = None if self._finish is None else Arrival(self._finish, parts.reader, parts.cost, tally, blame)
+        result = AnaStar(ContactProblem(parts, state), rng, settings, judge).run(time_limit, observer)
         return SearchResult(
             solutions=tuple(Solution.of(parts.reader, path) for path in result.paths),
-            hasty=early if early < len(result.paths) else 0,
             seconds=result.seconds,
             heuristic_seconds=heuristic_seconds,
             expansions=result.expansions,
@@ -179,9 +161,8 @@ class ContactPlanner:
         untrained = self._evaluator.evaluate(start, com, np.zeros(3), still).untrained
         tally.untrained += untrained
         stand_in = self._evaluator.stand_in
-        for other in (stand_in, self._at_rest):
-            if other is not None:
-                other.evaluate(start, com, np.zeros(3), still[:1])
+        if stand_in is not None:
+            stand_in.evaluate(start, com, np.zeros(3), still[:1])
         return stand_in if stand_in is not None and untrained == len(still) else self._evaluator
 
     def _parts(
@@ -204,16 +185,12 @@ class ContactPlanner:
         mass = 0.0 if self._finish is None else self.robot.mass
         cost = EdgeCost(strategy.cost, table, timings, self.world.goal, way.distance, way.longest, mass, scale)
         haste = None
-        if strategy.hasty is not None:
+        if strategy.haste:
             haste = Haste(table, self.robot.com_height, way.forced, cost.per_metre, scale.length)
-        delay = Delay(Drift(self.robot, table, timings), haste, cost.per_metre, scale.length)
-        mended = partial(within_reach, self.robot, slack=strategy.slack) if strategy.slack else None
-        at_once, waiting = (
-            None if judge is None else Judging(judge, reader, reach, tally, deadline, mended)
-            for judge in (strategy.at_once, strategy.waiting)
-        )
+        delay = Delay(Drift(self.robot, table, timings), haste, cost.per_metre)
+        judging = Judging(strategy.judge, reader, reach, tally, deadline)
         screen = SequenceScreen(moves, limbs)
-        return Parts(table, reader, candidates, at_once, waiting, cost, delay, tally, screen)
+        return Parts(table, reader, candidates, judging, strategy.lazy, cost, delay, tally, screen)
 
     def _reason(self, result: AnaStarResult[bytes], tally: Tally) -> str:
         limit = self.config.search.max_expansions  # the setting, not the multiple of it that was allowed

@@ -45,8 +45,8 @@ class Parts:
         table: Contacts.
         reader: Reads states.
         candidates: Makes the transitions out of a state, before they are judged.
-        at_once: Asks the judge of the states that are expanded; None: everything waits. See `Strategy`.
-        waiting: Asks the judge of the transitions that have waited; None: nothing waits.
+        judging: Asks the judge of transitions.
+        lazy: Whether they wait to be judged; see `Strategy`.
         cost: Costs of edges, and to the goal.
         delay: Delays of the states.
         tally: Counts the rejections.
@@ -56,8 +56,8 @@ class Parts:
     table: ContactTable
     reader: StateReader
     candidates: CandidateGenerator
-    at_once: Judging | None
-    waiting: Judging | None
+    judging: Judging
+    lazy: bool
     cost: EdgeCost
     delay: Delay
     tally: Tally
@@ -109,9 +109,8 @@ class ContactProblem:
         """See `SearchProblem`: screens all children, then judges them in one query."""
         parts, row = self._parts, unpack([state])[0]
         if is_pending(state):
-            assert parts.waiting is not None
             candidate = self._pending(row)
-            judged = parts.waiting(row, candidate)
+            judged = parts.judging(row, candidate)
             return None if judged is None else self._edges(candidate, *judged, pending=True)
         candidates = parts.candidates.out_of(row[CONTACTS], int(row[LAST]))
         if candidates is None:
@@ -122,15 +121,10 @@ class ContactProblem:
         candidates = parts.candidates.timed(row[CONTACTS], candidates.select(promising))
         if not len(candidates):
             return []
-        if parts.at_once is None:
-            return self._postponed(row, candidates, doubted=False)
-        judged = parts.at_once(row, candidates)
-        if judged is None:
-            return None
-        doubtful = judged[1] == Reason.DYNAMICS
-        if parts.waiting is not None and doubtful.any() and (judged[1] != 0).all():
-            return self._postponed(row, candidates.select(doubtful), doubted=True)
-        return self._edges(candidates, *judged, pending=False)
+        if parts.lazy:
+            return self._postponed(row, candidates)
+        judged = parts.judging(row, candidates)
+        return None if judged is None else self._edges(candidates, *judged, pending=False)
 
     def _edges(
         self, candidates: Candidates, batch: TransitionBatch, codes: np.ndarray, *, pending: bool
@@ -149,12 +143,12 @@ class ContactProblem:
         delay = self._parts.delay.of_states(candidates.contacts, com, velocity)
         return [Edge(*item) for item in zip(states, cost.tolist(), payloads, delay.tolist(), strict=True)]
 
-    def _postponed(self, row: np.ndarray, candidates: Candidates, *, doubted: bool) -> list[Edge[bytes]]:
+    def _postponed(self, row: np.ndarray, candidates: Candidates) -> list[Edge[bytes]]:
         """Edges to pending states, which cost the known part."""
         com, velocity = self._parts.reader.motion(row)
         states = pack_pending(row, candidates.contacts, candidates.limb, candidates.timing)
         cost = self._parts.cost.known(candidates)
-        delay = self._parts.delay.of_waiting(row[CONTACTS], com, velocity, candidates, doubted=doubted)
+        delay = self._parts.delay.of_waiting(row[CONTACTS], com, velocity, candidates)
         return [Edge(*item) for item in zip(states, cost.tolist(), [None] * len(states), delay.tolist(), strict=True)]
 
     def _pending(self, row: np.ndarray) -> Candidates:

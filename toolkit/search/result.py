@@ -69,7 +69,7 @@ class SearchResult:
     """All solutions of one search, oldest first, and how it went.
 
     Attributes:
-        solutions: Solutions in the order in which they were found. Costs fall, except where the search began again.
+        solutions: Solutions in the order in which they were found. Costs fall.
         seconds: Wall-clock time of the search.
         heuristic_seconds: Time for building the heuristic, not part of `seconds`.
         expansions: Number of states expanded.
@@ -77,7 +77,6 @@ class SearchResult:
         expanded: (k, 3) x m, y m, yaw rad; mean of the feet of the expanded states in their order, for display.
         reason: One line where there is no solution, else "".
         warning: One line where the judgements are less reliable, else "".
-        hasty: Number of first solutions that only had to come soon; better ones follow.
         slides: Whether no way leads over resting ground alone; see `CostConfig.where`.
         paced: Whether the planner chose the timing; see there.
         calmer: The calmest timing of every pace to come, the fastest pace first; empty where the pace is not the
@@ -93,7 +92,6 @@ class SearchResult:
     expanded: np.ndarray = field(repr=False)
     reason: str
     warning: str = ""
-    hasty: int = 0
     slides: bool = False
     paced: bool = False
     calmer: tuple[Timing, ...] = ()

@@ -11,10 +11,6 @@ from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.planner_config import PlannerConfig
 
 _SHORTEST = 1.0  # m for a body of the usual size (`toolkit.robot.scale`); shorter ways are taken to be as long
-_ATTEMPTS = 6  # at a first sequence over ground on which no foot rests; more of them find less than patient searches
-_USUAL = 1000  # expansions, of which early searches have a part or a multiple each
-_RESTARTS = 3  # of a patient search for a first sequence there, which finds one soon or hardly at all
-_SLACK = 0.03  # m; legs are stretched in a run, and predicted CoMs are a little out of reach more often than not
 _LAYER = 0.13  # units; random expansions are as likely at every distance from the goal
 
 
@@ -24,31 +20,18 @@ class Strategy:
 
     Attributes:
         cost: Weights of the edges' cost.
-        at_once: Judges all transitions out of a state when the state is expanded. None: all of them wait, each as a
-            state of the graph, until they are the best to go on with (`states.state.pack_pending`).
-        waiting: Judges a transition that has waited. Where there is a judge `at_once` as well and it rejects every way
-            on, the transitions it rejects wait. None: nothing waits.
-        patient: Settings of the search of the whole graph.
-        hasty: Settings of searches before that one, until one of them finds a sequence, in graphs without sequences
-            that begin with one of the feet; states that run ahead of their feet then wait (`costs.delay.Haste`). None:
-            there are no such searches.
-        attempts: Number of those searches.
-        calm: Settings of a search of the whole graph that follows them, until one of its runs finds a sequence; None:
-            there is no such search.
-        restarts: Number of those runs, each with other draws.
-        slack: m for a body of the usual size (`toolkit.robot.scale`); predicted CoMs that are out of reach by up to so
-            much are judged from where they are within it. 0: they stay as they are.
+        judge: Judges transitions.
+        lazy: Whether transitions wait, each as a state of the graph, until they are the best to go on with
+            (`states.state.pack_pending`), and are judged then; else all those out of a state are judged together.
+        search: Settings of the search.
+        haste: Whether states that run ahead of their feet wait (`costs.delay.Haste`).
     """
 
     cost: CostConfig
-    at_once: TransitionEvaluator | None
-    waiting: TransitionEvaluator | None
-    patient: AnaStarConfig
-    hasty: AnaStarConfig | None = None
-    attempts: int = 0
-    calm: AnaStarConfig | None = None
-    restarts: int = 0
-    slack: float = 0.0
+    judge: TransitionEvaluator
+    lazy: bool
+    search: AnaStarConfig
+    haste: bool = False
 
 
 def strategy_of(
@@ -67,7 +50,6 @@ def strategy_of(
     length = max(length, scale * _SHORTEST)
     config = replace(config, cost=config.cost.where(slides=slides, paced=paced))
     if slides:
-        evaluator = evaluator.sliding or evaluator
         # Steep ground need not be avoided. Ways across it are rare and lie deep in the graph. Finding them takes less
         # width than leaving a cul-de-sac does, and so more patience.
         search = replace(config.search, patience=10 * config.search.patience)
@@ -79,40 +61,30 @@ def strategy_of(
 
 def ordinary(config: PlannerConfig, evaluator: TransitionEvaluator, length: float) -> Strategy:
     """Judge all transitions out of a state together, and let the cost so far count from the start."""
-    patient = replace(config.search, initial_cost=_acceptable(config, length), layer=min(config.search.layer, _LAYER))
-    return Strategy(config.cost, evaluator, None, patient)
+    search = replace(config.search, initial_cost=_acceptable(config, length), layer=min(config.search.layer, _LAYER))
+    return Strategy(config.cost, evaluator, False, search)
 
 
 def lazy(config: PlannerConfig, evaluator: TransitionEvaluator, length: float) -> Strategy:
     """Judge a transition only when it is the best to go on with; 20 such expansions count as an ordinary one."""
     limit = config.search.max_expansions
-    patient = replace(
+    search = replace(
         config.search, initial_cost=_acceptable(config, length), max_expansions=None if limit is None else 20 * limit
     )
-    return Strategy(config.cost, None, evaluator, patient)
+    return Strategy(config.cost, evaluator, True, search)
 
 
 def sliding(config: PlannerConfig, evaluator: TransitionEvaluator) -> Strategy:
-    """Find a first sequence soon over ground on which no foot rests, then start again with patience.
+    """Cross ground on which no foot rests before the robot is too fast for its legs.
 
     The cost so far does not count before there is a solution, since it would only lead back: it is high for all states
     that get far. Expansions are ten times as many, as most of them only show that the robot arrives too fast. The
-    usual number of them without a cheaper sequence ends the search. Early searches, hasty ones and then patient ones,
-    are short, since how long one takes to a first sequence varies a lot.
+    usual number of them without a cheaper sequence ends the search.
     """
     limit = config.search.max_expansions
-    usual = _USUAL if limit is None else min(limit, _USUAL)  # a first sequence does not come sooner for a higher limit
-    patient = replace(
-        config.search,
-        layer=0.2,
-        epsilon=0.15,
-        crowding=0.08,
-        max_expansions=None if limit is None else 10 * limit,
-        settled=limit,
-    )
-    calm = replace(patient, max_expansions=2 * usual, settled=None, persistence=1, first_only=True)
-    hasty = replace(calm, layer=0.13, epsilon=0.3, crowding=0.013, max_expansions=3 * usual // 10)
-    return Strategy(config.cost, evaluator, evaluator.stand_in, patient, hasty, _ATTEMPTS, calm, _RESTARTS, _SLACK)
+    most = None if limit is None else 10 * limit
+    search = replace(config.search, layer=0.2, epsilon=0.15, crowding=0.08, max_expansions=most, settled=limit)
+    return Strategy(config.cost, evaluator, False, search, haste=True)
 
 
 def _acceptable(config: PlannerConfig, length: float) -> float:

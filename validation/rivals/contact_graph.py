@@ -72,18 +72,14 @@ def contact_graph(planner: ContactPlanner, evaluator: TransitionEvaluator) -> Co
     limbs = [limb for limb in PALMS if planner.config.palms and moves.has_palm_surfaces and limb in robot.arms]
     reader, reach = StateReader(moves.table, timings, scale), ReachCheck(moves, limbs, timings)
     cost = EdgeCost(strategy.cost, moves.table, timings, world.goal, way.distance, way.longest, scale=scale)
-    at_once, waiting = (
-        None if judge is None else Judging(judge, reader, reach, tally, math.inf)
-        for judge in (strategy.at_once, strategy.waiting)
-    )
     parts = Parts(
         table=moves.table,
         reader=reader,
         candidates=CandidateGenerator(moves, limbs, timings, (), tally.rejected),
-        at_once=at_once,
-        waiting=waiting,
+        judging=Judging(strategy.judge, reader, reach, tally, math.inf),
+        lazy=strategy.lazy,
         cost=cost,
-        delay=Delay(Drift(robot, moves.table, timings), None, cost.per_metre, scale.length),
+        delay=Delay(Drift(robot, moves.table, timings), None, cost.per_metre),
         tally=tally,
         screen=SequenceScreen(moves, limbs),
     )

@@ -105,7 +105,6 @@ class AnaStar(Generic[State]):
         config: Settings; the default ones where None.
         judge: Asked about every edge that reaches a goal. It returns that edge, or another edge in its place (with a
             different cost or payload), or None. After None the search goes on from there.
-        known: Whether there is a solution already, of another search.
     """
 
     def __init__(
@@ -114,11 +113,9 @@ class AnaStar(Generic[State]):
         rng: np.random.Generator,
         config: AnaStarConfig | None = None,
         judge: Judge[State] | None = None,
-        *,
-        known: bool = False,
     ):
         self._problem, self._rng, self._judge = problem, rng, judge
-        self._config, self._known = config or AnaStarConfig(), known
+        self._config = config or AnaStarConfig()
         self._best = math.inf  # cost of the best path
         self._bar = math.inf  # G: that cost, or what the path would have cost without the judge where that is more
         self._missing = -math.inf  # cost that the judge added to the last edge to a goal out of the same state
@@ -166,7 +163,7 @@ class AnaStar(Generic[State]):
                 stopped_by = "solution"
             elif most is not None and len(expanded) >= (most if paths else config.persistence * most):
                 stopped_by = "expansions"
-            elif config.settled is not None and (paths or self._known) and idle >= config.settled:
+            elif config.settled is not None and paths and idle >= config.settled:
                 stopped_by = "settled"
             elif len(self._edge) >= _MAX_STATES:
                 stopped_by = "memory"

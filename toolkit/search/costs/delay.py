@@ -30,7 +30,6 @@ _EARLY = 0.8  # per m of v^2 / 2 a; with 1 or more nothing would be gained by go
 _TURN = 0.5  # per rad between the feet's headings
 # Those of transitions that are not judged yet:
 _MISS = 4.0  # per m by which a transition would have to bend the motion
-_DOUBT = 0.4  # where the evaluator rejected a transition and its stand-in has not judged it yet
 
 
 class Haste:
@@ -70,24 +69,21 @@ class Delay:
         drift: Drift of the CoM.
         haste: Delays of motions that run ahead of their feet; None: these do not wait.
         per_metre: The search's h of 1 m of way.
-        scale: Factor on lengths.
     """
 
-    def __init__(self, drift: Drift, haste: Haste | None, per_metre: float, scale: float = 1.0):
-        self._drift, self._haste, self._per_metre, self._scale = drift, haste, per_metre, scale
+    def __init__(self, drift: Drift, haste: Haste | None, per_metre: float):
+        self._drift, self._haste, self._per_metre = drift, haste, per_metre
 
     def of_states(self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """(n,) delays of states with contact numbers (n, 4), CoM (n, 3) m and velocity (n, 3) m/s."""
         return np.zeros(len(contacts)) if self._haste is None else self._haste.delay(contacts, com, velocity)
 
     def of_waiting(
-        self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray, candidates: Candidates, *, doubted: bool
+        self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray, candidates: Candidates
     ) -> np.ndarray:
-        """(n,) delays of transitions that are not judged yet; `doubted` ones were rejected by one judge already.
+        """(n,) delays of transitions that are not judged yet.
 
         The n candidates lead out of contact numbers (4,) with the CoM (3,) m and its velocity (3,) m/s.
         """
         miss = self._drift.miss(contacts, com, velocity, candidates)
-        doubt = self._scale * _DOUBT if doubted else 0.0
-        waits = self._per_metre * (doubt + _MISS * miss)
-        return waits + self.of_states(contacts[None], com[None], velocity[None])
+        return self._per_metre * _MISS * miss + self.of_states(contacts[None], com[None], velocity[None])

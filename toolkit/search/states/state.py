@@ -54,13 +54,6 @@ def pack_pending(before: np.ndarray, contacts: np.ndarray, limb: np.ndarray, tim
     return _split(rows)
 
 
-def moved_last(state: bytes, limb: int) -> bytes:
-    """The same state with another limb that moved last, so that this one may not move at once."""
-    row = unpack([state]).copy()
-    row[:, LAST] = limb
-    return row.tobytes()
-
-
 def is_pending(state: bytes) -> bool:
     """Whether a state stands for a transition that is still to be judged."""
     return len(state) == 4 * PENDING
