@@ -8,6 +8,7 @@ import pytest
 from tests.prediction.networks import write_random_networks
 from tests.prediction.test_features import random_case
 from toolkit.contacts.category import Category
+from toolkit.geometry.pose import Pose, rotation_on_surface
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.prediction.features import TIMING_AND_FRICTION
 from toolkit.prediction.network import load_network, network_path
@@ -35,6 +36,13 @@ def networks(tmp_path):
     return {CATEGORY: network}
 
 
+def on_level_ground(rng):
+    """A random case whose contacts rest."""
+    stance, *state, transition = random_case(CATEGORY, rng)
+    level = (replace(item, pose=Pose.from_yaw(item.pose.position, 0.0)) for item in stance.contacts)
+    return replace(stance, contacts=tuple(level)), *state, transition
+
+
 def test_what_was_not_trained_goes_to_the_stand_in_and_is_counted(networks):
     stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(0))
     known, strange = (replace(transition, timing=Timing(0.5, swing)) for swing in (0.5, 1e-3))
@@ -48,7 +56,7 @@ def test_what_was_not_trained_goes_to_the_stand_in_and_is_counted(networks):
 
 
 def test_more_time_and_friction_than_trained_are_judged_as_the_most_of_the_training(networks):
-    stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(0))
+    stance, com, velocity, transition = on_level_ground(np.random.default_rng(0))
     shift, swing, friction = networks[CATEGORY].upper[TIMING_AND_FRICTION].tolist()
 
     def case(factor):
@@ -65,13 +73,27 @@ def test_more_time_and_friction_than_trained_are_judged_as_the_most_of_the_train
 
 def test_a_limb_that_lifts_off_at_once_costs_more_than_is_predicted(networks):
     networks[CATEGORY].lower[TIMING_AND_FRICTION] = 0.0
-    stance, com, velocity, transition = random_case(CATEGORY, np.random.default_rng(0))
+    stance, com, velocity, transition = on_level_ground(np.random.default_rng(0))
     both = [replace(transition, timing=Timing(*times)) for times in ((0.05, 0.3), (0.35, 0.6))]
     plain, judge = NetworkEvaluator(networks, GOAL, hasty=1.0), NetworkEvaluator(networks, GOAL)
     predicted, judged = (item.evaluate(stance, com, velocity, both) for item in (plain, judge))
     assert predicted.feasible.all() and (predicted.objective > 0.0).all()
     np.testing.assert_allclose(judged.objective, predicted.objective * [judge.hasty, 1.0])
     np.testing.assert_array_equal(judged.com_velocity, predicted.com_velocity)
+
+
+def test_where_nothing_rests_nothing_is_understated_and_friction_bounds_the_motion(networks):
+    networks[CATEGORY].lower[TIMING_AND_FRICTION] = 0.0
+    stance, com, velocity, transition = on_level_ground(np.random.default_rng(0))
+    tilt = rotation_on_surface(np.array([0.6, 0.0, 0.8]), 0.0)
+    steep = (replace(item, pose=Pose(tilt, item.pose.position), friction=0.3) for item in stance.contacts)
+    steep, quick = replace(stance, contacts=tuple(steep)), replace(transition, timing=Timing(0.05, 0.3))
+    plain, judge = NetworkEvaluator(networks, GOAL, hasty=1.0), NetworkEvaluator(networks, GOAL)
+    predicted, judged = (item.evaluate(steep, com, velocity, [quick]) for item in (plain, judge))
+    assert judged.feasible.all()
+    np.testing.assert_array_equal(judged.objective, predicted.objective)
+    downhill = (judged.com_velocity[0] - velocity) @ [0.8, 0.0, -0.6]
+    assert downhill >= 0.35 * 9.81 * (0.6 - 0.3 * 0.8) - 1e-6
 
 
 def test_a_judge_says_of_itself_what_a_search_has_to_know(networks):
