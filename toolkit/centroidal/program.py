@@ -42,6 +42,9 @@ BRIEF = 0.02  # s for a body of the usual size; shorter steps have the price of 
 # Where a foot at rest already uses more of its friction than the wanted margin leaves, it may use `RESERVE` more than
 # at rest, at most `FULL`. Otherwise the motion would lean and run to spare friction, which is less safe.
 RESERVE, FULL = 0.1, 0.9
+# Where nothing rests all friction is in use, and what a force that comes late leaves undone cannot be made up for. So
+# the price of jerk is so many times as high in motions that slide somewhere, which they are over soon.
+SMOOTH = 10.0
 CONTACT = WRENCH + 2  # variables of a contact: its wrench and its slacks
 SLACKS = 2  # of a step: its excess and the body's slack
 PAIRS = len(FEET) + 1  # one for each foot's contact, and one for the contact that the foot in the air has left
@@ -265,6 +268,8 @@ class Program:
         momenta = w.linear_momentum, w.linear_momentum_rate, w.angular_momentum, w.angular_momentum_rate
         squares = [weight * p.mass**2 * duration for weight in momenta]
         jerk = reg.jerk / (0.2 * np.maximum(p.dt, self._scale.time * BRIEF))
+        resting = p.active & (steepness(p.rotation[..., 2, 2]) < p.friction)
+        jerk = jerk if resting.any(1).all() else SMOOTH * jerk
         squares = np.stack([*squares, jerk, reg.height * duration], 1)
         squares[0, 4] *= not np.any(p.com_velocity)  # the acceleration before a start in motion is unknown
         height = mean_feet(p)[:, 2] + p.home_heights
