@@ -11,7 +11,7 @@ from tests.shipped_robots import OWN
 from toolkit.centroidal.body import body_residuals
 from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_problem
 from toolkit.centroidal.problem import Margins
-from toolkit.centroidal.program import Landing, Program, Regularisers, wanted_friction
+from toolkit.centroidal.program import SMOOTH, Landing, Program, Regularisers, wanted_friction
 from toolkit.centroidal.residual import check, confirmed, cop_margin
 from toolkit.centroidal.sequence import WANTED, WANTED_BODY, SequenceConfig, optimise
 from toolkit.centroidal.stages.method import Squares, Work, evaluate
@@ -365,3 +365,17 @@ def test_a_steep_tile_is_wanted_to_hold_what_resting_on_it_takes(walker):
         np.testing.assert_allclose(wanted_friction(problem, steps, 0), wanted, atol=1e-12)
         unlimited = replace(problem, margins=Margins())
         np.testing.assert_allclose(wanted_friction(unlimited, steps, 0), 1.0, atol=1e-12)
+
+
+def test_motions_that_slide_somewhere_are_smoother(walker):
+    """The price of jerk, beside that of the momenta, is the same wherever feet rest."""
+
+    def jerk(needed):
+        stance = Stance(tuple(foot(walker, limb, 0.0, slope=np.arctan(needed * 0.5)) for limb in FEET))
+        schedule = ContactSchedule.of(ContactSequence(stance, ()), final_rest=1.0)
+        config = SequenceConfig().problem
+        problem = sequence_problem(walker, schedule, initial_com(walker, stance), np.full(3, 0.1), config=config)
+        return Program(problem, walker, WANTED_BODY, Regularisers()).steps.weights[:, 4]
+
+    np.testing.assert_array_equal(jerk(0.2), jerk(0.9))
+    np.testing.assert_allclose(jerk(1.1), SMOOTH * jerk(0.9))
