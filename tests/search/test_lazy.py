@@ -7,7 +7,7 @@ import numpy as np
 from tests.search.worlds import FLOOR, box, make_world
 from toolkit.contacts.projection import Projected
 from toolkit.geometry.limb import Limb
-from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
+from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.moves.candidates import Candidates, mean_feet
@@ -146,29 +146,6 @@ def test_drift_knows_that_nothing_stands_slowly_on_steep_ground(robot):
             for timing in (0, 1)
         )
         assert (slow > 0.5) == slides and quick < 0.1
-
-
-def test_a_second_evaluator_has_its_say_where_the_way_is_slippery(robot):
-    class Timid(Counting):
-        """Believes in nothing beyond x = 0.3 m."""
-
-        def __init__(self, robot, config, stand_in):
-            super().__init__(robot, config)
-            self.stand_in = stand_in
-
-        def evaluate(self, stance, com, com_velocity, transitions):
-            batch = super().evaluate(stance, com, com_velocity, transitions)
-            return replace(batch, feasible=batch.feasible & (batch.com[:, 0] < 0.3) & (com[0] < 0.1))
-
-    longer = PlannerConfig(search=AnaStarConfig(max_expansions=400))
-    aside = box([0.5, 1.2, 0.0], [0.4, 0.3, 0.1], (45, 0, 0), friction=0.5)
-    slope, bold = box([0, 0, 0], [3, 3, 0.05], (0, 20, 0), friction=0.3), KinematicConfig(friction=10.0)
-    for geoms, asked in (((slope,), True), ((FLOOR, aside), False), ((FLOOR,), False)):
-        second = Counting(robot, bold)
-        planner = ContactPlanner(robot, make_world(*geoms, goal=(1.0, 0, 0)), Timid(robot, bold, second), longer)
-        result = planner.search(np.random.default_rng(0), 60.0)
-        assert (second.asked > 1) == asked  # once to warm up
-        assert not asked or result.solutions
 
 
 def test_the_stand_in_judges_timings_that_were_not_trained(robot):
