@@ -197,8 +197,8 @@ def main(argv: list[str] | None = None) -> int:
 NOTE = (
     "The favourite is the feasible sequence that the search holds for the cheapest, the choice the truly cheapest of "
     "all that it returned. Bound: of the last sequence, when it was found. First feasible sequence: search and "
-    "optimisations in turn until the optimiser calls a sequence feasible, sequences of the hasty search included, "
-    "without the heuristic, whose time stands beside it."
+    "optimisations in turn until the optimiser calls a sequence feasible, without the heuristic, "
+    "whose time stands beside it."
 )
 
 if __name__ == "__main__":
