@@ -9,6 +9,7 @@ from toolkit.centroidal.sequence import optimise_transition
 from toolkit.contacts.category import Category
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
+from toolkit.prediction import reach
 from toolkit.prediction.optimiser import OptimiserEvaluator
 from toolkit.prediction.reach import SLACK, within_reach
 from toolkit.robot.loader import load_robot
@@ -82,10 +83,12 @@ def test_a_com_far_out_of_reach_stays(robot):
         np.testing.assert_array_equal(within_reach(robot, sample.stance, com[None])[0], com)
 
 
-def test_how_far_out_of_reach_a_com_may_be_is_asked_for(robot):
+def test_how_far_out_of_reach_a_com_may_be_is_the_slack(robot, monkeypatch):
     sample = next(each for each in states(robot) if just_out(robot, each, 2.0 * SLACK) is not None)
     com = just_out(robot, sample, 2.0 * SLACK)
-    near, nearer = (within_reach(robot, sample.stance, com[None], slack=slack)[0] for slack in (SLACK, 3.0 * SLACK))
+    near = within_reach(robot, sample.stance, com[None])[0]
+    monkeypatch.setattr(reach, "SLACK", 3.0 * SLACK)
+    nearer = within_reach(robot, sample.stance, com[None])[0]
     np.testing.assert_array_equal(near, com)
     assert (nearer != com).any() and excess(robot, sample.stance, nearer) <= 0
 

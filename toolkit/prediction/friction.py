@@ -16,6 +16,7 @@ from toolkit.centroidal.program import LEAST
 from toolkit.contacts.stance import Stance
 from toolkit.geometry.pose import steepness
 from toolkit.physics.impulse import nearest_sum
+from toolkit.physics.momentum import ballistic
 
 
 def rests(stance: Stance) -> bool:
@@ -48,7 +49,7 @@ def allowed(
     normals, friction = _cones(stance)
     cones, time = (normals, LEAST.friction * friction), seconds[:, None]
     free_velocity = com_velocity + time * GRAVITY
-    free_com = com + time * com_velocity + time**2 / 2 * GRAVITY
+    free_com = ballistic(time, com, com_velocity, GRAVITY)
     return (
         free_com + nearest_sum(end_com - free_com, *cones),
         free_velocity + nearest_sum(end_velocity - free_velocity, *cones),
@@ -57,5 +58,5 @@ def allowed(
 
 def _cones(stance: Stance) -> tuple[np.ndarray, np.ndarray]:
     """(k, 3) normals and (k,) friction of the contacts."""
-    normals = np.array([contact.pose.rotation[:, 2] for contact in stance.contacts])
+    normals = np.array([contact.pose.normal for contact in stance.contacts])
     return normals, np.array([contact.friction for contact in stance.contacts])

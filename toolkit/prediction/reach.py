@@ -25,8 +25,6 @@ def within_reach(
     stance: Stance,
     com: np.ndarray,
     config: ProblemConfig | None = None,
-    *,
-    slack: float = SLACK,
 ) -> np.ndarray:
     """CoMs moved by little so that every limb reaches its contact and none is too low.
 
@@ -35,10 +33,10 @@ def within_reach(
         stance: The contacts.
         com: (n, 3) m, world.
         config: Settings of the problems, which say how low a CoM may be; the default ones where None.
-        slack: m for a body of the usual size; a CoM that violates a bound by more is out of reach.
 
     Returns:
-        (n, 3) m, world. Rows that violate nothing, are out of reach or find no such place stay unchanged.
+        (n, 3) m, world. Rows that violate nothing, are out of reach by more than `SLACK` or find no such place stay
+        unchanged.
     """
     com = np.asarray(com, float)
     feet = stance.mean_feet
@@ -62,7 +60,7 @@ def within_reach(
         return np.maximum(distances.max(1), least - points[:, 2])
 
     before = violation(com)
-    rows = np.flatnonzero((before > 0.0) & (before <= robot.scale.length * slack))
+    rows = np.flatnonzero((before > 0.0) & (before <= robot.scale.length * SLACK))
     if not len(rows):
         return com
     moved = com[rows]

@@ -1,1 +1,1 @@
-"""Anytime search of any graph: ANA*, its open list, searches in turn."""
+"""Anytime search of any graph: ANA* and its open list."""

@@ -86,4 +86,4 @@ class Delay:
         The n candidates lead out of contact numbers (4,) with the CoM (3,) m and its velocity (3,) m/s.
         """
         miss = self._drift.miss(contacts, com, velocity, candidates)
-        return self._per_metre * _MISS * miss + self.of_states(contacts[None], com[None], velocity[None])
+        return self._per_metre * _MISS * miss
