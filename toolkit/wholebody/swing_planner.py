@@ -25,7 +25,7 @@ EASY_RAISE = 0.04  # m; paths raised by more than that are first tried with the 
 MARGIN_SHARES = (1.0, 0.5, 0.25)  # parts of the margin, in the order in which they are tried
 MODERATE_RAISE = 0.12  # m; higher paths come after lower ones with less margin
 
-FAST_LAND = Window(0.7, 1.0)  # of feet that swing fast: they stop moving along the surface before they touch it
+FAST_LAND = Window(0.75, 1.0)  # of feet that swing fast: they stop moving along the surface before they touch it
 SLOW, FAST = 1.0, 2.5  # m/s; the easy windows hold up to a mean speed of SLOW, the fast ones from FAST on
 
 # A foot that turns its toes outward by more than LEAST_TURN (rad), and with them its knee, does so before the legs pass

@@ -30,7 +30,7 @@ class SwingTiming:
     leave: Window = Window(0.0, 0.45)
     rise: Window = Window(0.0, 0.5)
     across: Window = Window(0.05, 0.85)
-    fast_across: Window = Window(0.02, 0.95)
+    fast_across: Window = Window(0.0, 0.95)
     descend: Window = Window(0.5, 0.95)
     land: Window = Window(0.55, 1.0)
 
