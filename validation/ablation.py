@@ -98,6 +98,20 @@ def ratios(kind: str, variant: str, records: Sequence[Record], ours: str, other:
     return found
 
 
+def compare(
+    kind: str, variants: Sequence[str], records: Sequence[Record], planners: Sequence[str]
+) -> list[dict[str, Any]]:
+    """The ratios of every planner's figures over those of the others that are there, the baseline as `other` alone."""
+    return [
+        ratios(kind, variant, records, ours, other)
+        for other in (BASELINE, KINEMATIC, JUDGE)
+        if other in planners
+        for ours in planners
+        if ours not in (other, BASELINE)
+        for variant in variants
+    ]
+
+
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """The table of all planners."""
     header = ("world", "planner", "variant", "found", "feasible", "PASS", "true cost", "J", "J, paper's weights")
@@ -240,9 +254,7 @@ def main(argv: list[str] | None = None) -> int:
         for planner in args.planners:
             own = [record for record in same if record["planner"] == planner]
             rows += [summarise(kind, planner, variant, own) for variant in effort.variants]
-        for other in (BASELINE, KINEMATIC):
-            for ours in (planner for planner in args.planners if planner not in (other, BASELINE)):
-                compared += [ratios(kind, variant, same, ours, other) for variant in effort.variants]
+        compared += compare(kind, effort.variants, same, args.planners)
     found = goals_of(compared)
     path = write_results(
         args.results,

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from validation.ablation import goals_of, ratios, summarise
+from validation.ablation import compare, goals_of, ratios, summarise
 from validation.ablation_trial import BEST, LOCAL, RAW, Effort, accounts, spend
 from validation.goals import MET, NOT_CHECKED
 from validation.searched import Searched, cheapest, favourite
@@ -62,6 +62,18 @@ def test_ratios_are_of_the_same_worlds():
     results = {goal.name: goal.result for goal in goals_of([found])}
     assert results[f"rubble_field, {RAW}: true cost over quasi-static"] == MET
     assert results[f"rubble_field, {BEST}: true cost over quasi-static"] == NOT_CHECKED
+
+
+def test_planners_are_compared_with_those_that_ran():
+    records = [record(planner, 1, cost) for planner, cost in (("learned", 9.0), ("optimiser", 10.0))]
+    found = compare("rubble_field", [RAW], records, ["learned", "optimiser", "kinematic"])
+    costs = {(each["planner"], each["over"]): each["true cost"] for each in found}
+    assert costs == {
+        ("learned", "kinematic"): None,
+        ("optimiser", "kinematic"): None,
+        ("learned", "optimiser"): 0.9,
+        ("kinematic", "optimiser"): None,
+    }
 
 
 def test_a_row_counts_worlds_without_a_plan():
