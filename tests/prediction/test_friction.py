@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from toolkit.centroidal.build import ProblemConfig
+from toolkit.centroidal.program import LEAST
 from toolkit.centroidal.sequence import SequenceConfig, optimise_transition
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Contact, Stance
@@ -24,8 +25,9 @@ def stance_on(degrees):
     return Stance(tuple(on_slope(degrees, 0.0, y, limb) for limb, y in zip(FEET, (0.1, -0.1), strict=True)))
 
 
-def test_a_contact_rests_below_its_friction_angle():
-    assert rests(stance_on(26.0)) and not rests(stance_on(27.0))
+def test_a_contact_rests_where_the_friction_that_plans_use_holds_it():
+    most = np.degrees(np.arctan(LEAST.friction * 0.5))  # where a search begins to call its way sliding
+    assert rests(stance_on(most - 0.1)) and not rests(stance_on(most + 0.1))
     assert rests(stance_on(30.0).replace(on_slope(0.0, 0.0, 0.1, Limb.LEFT_FOOT)))
 
 

@@ -20,7 +20,7 @@ from toolkit.physics.momentum import ballistic
 
 
 def rests(stance: Stance) -> bool:
-    """Whether some contact of a stance could stay where it is without the others."""
+    """Whether some contact of a stance could stay where it is without the others, with the friction that plans use."""
     normals, friction = _cones(stance)
     return bool((steepness(normals[:, 2]) < friction).any())
 
@@ -47,7 +47,7 @@ def allowed(
         (n, 3) m CoMs and (n, 3) m/s velocities.
     """
     normals, friction = _cones(stance)
-    cones, time = (normals, LEAST.friction * friction), seconds[:, None]
+    cones, time = (normals, friction), seconds[:, None]
     free_velocity = com_velocity + time * GRAVITY
     free_com = ballistic(time, com, com_velocity, GRAVITY)
     return (
@@ -57,6 +57,6 @@ def allowed(
 
 
 def _cones(stance: Stance) -> tuple[np.ndarray, np.ndarray]:
-    """(k, 3) normals and (k,) friction of the contacts."""
+    """(k, 3) normals of the contacts, and (k,) as much of their friction as plans use."""
     normals = np.array([contact.pose.normal for contact in stance.contacts])
-    return normals, np.array([contact.friction for contact in stance.contacts])
+    return normals, LEAST.friction * np.array([contact.friction for contact in stance.contacts])
