@@ -14,10 +14,10 @@ from validation.ablation_trial import BEST, BY_TIME, LOCAL, RAW, Effort, ablatio
 from validation.cases import make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
+from validation.growing import add_growing_options, earlier_trials, growth_note, stamped, state_of
 from validation.jobs import Job, Record, run_jobs
 from validation.searched import PLANNERS, completed
 from validation.tables import (
-    columns,
     failure_section,
     in_unit,
     markdown_table,
@@ -49,7 +49,6 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "CoP to edge": ("figures", "cop_distance"),
     "CoP to edge, feet": ("figures", "foot_cop_distance"),
 }
-KEPT = ("seed", *(path[-1] for path in QUANTITIES.values()), "palm_contacts", "optimiser_seconds", "executed", "held")
 COST, PAPER_J, SECONDS = "true cost", "J, paper's weights", "seconds of walking"
 MOST = {(FIELD, RAW): 1.0, (CORRIDOR, RAW): 0.8, (FIELD, BEST): 0.95, (CORRIDOR, BEST): 0.75}
 """Most that the true cost may be over the quasi-static planner's, median of the worlds' ratios."""
@@ -173,19 +172,6 @@ def goals_of(found: Sequence[dict[str, Any]]) -> list[Goal]:
     return wanted
 
 
-def _kept(records: Sequence[Record]) -> list[dict[str, Any]]:
-    """Every plan of every variant, as lists by kind of world, planner and variant."""
-    groups: dict[tuple[str, str, str], list[Record]] = {}
-    for record in records:
-        for variant, plan in record["variants"].items():
-            row = {"seed": record["seed"], **plan, **plan["figures"]}
-            groups.setdefault((record["kind"], record["planner"], variant), []).append(row)
-    return [
-        {"kind": kind, "planner": planner, "variant": variant, **columns(rows, KEPT)}
-        for (kind, planner, variant), rows in groups.items()
-    ]
-
-
 def main(argv: list[str] | None = None) -> int:
     """Run the experiment; returns the exit code."""
     parser = options.parser("ablation", DESCRIPTION, KINDS, 50)
@@ -228,26 +214,35 @@ def main(argv: list[str] | None = None) -> int:
         help="motions that a local search may optimise beyond that; 0: no local search (default: %(default)s)",
     )
     parser.add_argument("--execute", action="store_true", help="simulate the chosen plans as well, which takes long")
+    add_growing_options(parser)
     parser.epilog = options.GOAL_CODES
     args = parser.parse_args(argv)
     console = make_console()
     settings, first = options.settings_of(args), options.first_seed(args, "ablation")
     effort = Effort(args.optimisations, args.seconds, args.local_search)
-    cases = [
-        (case, planner)
+    worlds = [
+        case
         for kind in args.kinds
         for case in make_cases([kind], args.trials if kind in (FIELD, CORRIDOR) else args.other_trials, first)
+    ]
+    cases = {
+        f"{planner}-{case.name}": (case, planner)
+        for case in sorted(worlds, key=lambda case: case.seed)  # so that what ends early has worlds of every kind
         for planner in args.planners
         if planner != JUDGE or case.seed - first < (args.optimiser_trials or math.inf)
-    ]
+    }
     chosen = {"optimisations": args.optimisations, "seconds": args.seconds, "local_search": args.local_search}
     chosen |= {"execute": args.execute}
+    described = {**settings.described(), **chosen, "trials": args.trials, "seed_offset": first}
     store = TrialFile(args.out / "trials.jsonl", settings.deciding() | chosen)
-    jobs = [
-        Job(f"{planner}-{case.name}", ablation_trial, (settings, case, planner, effort, args.execute))
-        for case, planner in cases
-    ]
-    records = completed(run_jobs(jobs, store, options.pool_of(args), console, "plans"), cases, {"variants": {}})
+    if args.grow:
+        for record in earlier_trials(args.results / "ablation.json", described, cases):
+            store.records.setdefault(record["name"], record)
+    jobs = [Job(name, ablation_trial, (settings, *case, effort, args.execute)) for name, case in cases.items()]
+    found = run_jobs(jobs, store, options.pool_of(args), console, "plans", args.minutes)
+    ended = [cases[record["name"]] for record in found]
+    records = stamped(completed(found, ended, {"variants": {}}), state_of(settings))
+    growth = growth_note(records, len(cases), state_of(settings))
     rows, compared = [], []
     for kind in args.kinds:
         same = [record for record in records if record["kind"] == kind]
@@ -255,22 +250,22 @@ def main(argv: list[str] | None = None) -> int:
             own = [record for record in same if record["planner"] == planner]
             rows += [summarise(kind, planner, variant, own) for variant in effort.variants]
         compared += compare(kind, effort.variants, same, args.planners)
-    found = goals_of(compared)
+    reached = goals_of(compared)
     path = write_results(
         args.results,
         "ablation",
         title="What the networks buy",
         sections=[
-            ("Planners", f"{table(rows)}\n\n{NOTE}"),
+            ("Planners", "\n\n".join(filter(None, (table(rows), growth, NOTE)))),
             ("Over other planners, median of the worlds' ratios", ratio_table(compared)),
             ("Failures", failure_section(records)),
         ],
-        content={"table": rows, "ratios": compared, "plans": _kept(records)},
-        goals=found,
-        settings={**settings.described(), **chosen, "trials": args.trials, "seed_offset": first},
+        content={"table": rows, "ratios": compared, "trials": records},
+        goals=reached,
+        settings=described,
     )
     show_results(console, path)
-    return options.goal_code(found)
+    return options.goal_code(reached)
 
 
 NOTE = (

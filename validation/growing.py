@@ -11,6 +11,7 @@ from typing import Any
 
 from toolkit import cli
 from toolkit.errors import InputError
+from toolkit.report.files import plain
 from validation.jobs import Record
 from validation.options import TrialSettings
 
@@ -64,7 +65,8 @@ def earlier_trials(path: Path, settings: dict[str, Any], names: Iterable[str]) -
         code = content["code"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: holds no results to go on from ({error}); leave out --grow") from error
-    differ = sorted(name for name in (set(settings) | set(theirs)) - _FREE if settings.get(name) != theirs.get(name))
+    ours = plain(settings)  # as the file holds them
+    differ = sorted(name for name in (set(ours) | set(theirs)) - _FREE if ours.get(name) != theirs.get(name))
     if differ:
         raise InputError(f"{path}: was made with other settings ({', '.join(differ)}); leave out --grow")
     wanted = set(names)

@@ -112,10 +112,11 @@ def test_calibration_prices_every_sequence_and_stands_beside_an_earlier_one(fold
 
 
 @pytest.mark.slow
-def test_ablation_gives_planners_the_same_effort(folders):
+def test_ablation_gives_planners_the_same_effort_and_grows(folders, tmp_path, capsys):
     command = ["--kinds", "any_slope", "--other-trials", "1", "--expansions", "150", "--planners", "learned"]
     command += ["quasi-static", "--optimisations", "2", "--seconds", "1", "--execute"]
-    ablation.main([*command, "--local-search", "3", *folders])
+    command += ["--local-search", "3"]
+    ablation.main([*command, *folders])
     found = result(folders, "ablation")
     assert [row["planner"] for row in found["table"]] == 5 * ["learned"] + 5 * ["quasi-static"]
     assert all(row["feasible"] == 1 for row in found["table"] if row["variant"] != ablation.BY_TIME)
@@ -125,7 +126,13 @@ def test_ablation_gives_planners_the_same_effort(folders):
     (pair,) = [row for row in found["ratios"] if (row["over"], row["variant"]) == ("quasi-static", ablation.RAW)]
     assert pair["worlds"] == 1
     assert pair["true cost"] > 0.0
-    assert [len(group["true_cost"]) for group in found["plans"]] == [1] * len(found["plans"])
+    more = [*command, "--other-trials", "2", "--grow", "--minutes", "0.001", *folders, "--out", str(tmp_path / "more")]
+    ablation.main(more)
+    assert "2 of 4 trials known from before" in capsys.readouterr().out
+    grown = result(folders, "ablation")
+    assert [trial["name"] for trial in grown["trials"]] == [trial["name"] for trial in found["trials"]]
+    assert grown["table"] == found["table"]
+    assert "2 of 4 trials have not been run yet" in (Path(folders[-1]) / "ablation.md").read_text()
 
 
 @pytest.mark.slow
