@@ -378,4 +378,5 @@ def test_motions_that_slide_somewhere_are_smoother(walker):
         return Program(problem, walker, WANTED_BODY, Regularisers()).steps.weights[:, 4]
 
     np.testing.assert_array_equal(jerk(0.2), jerk(0.9))
-    np.testing.assert_allclose(jerk(1.1), SMOOTH * jerk(0.9))
+    for slides in (0.97, 1.1):  # more than a plan may use
+        np.testing.assert_allclose(jerk(slides), SMOOTH * jerk(0.9))

@@ -268,7 +268,7 @@ class Program:
         momenta = w.linear_momentum, w.linear_momentum_rate, w.angular_momentum, w.angular_momentum_rate
         squares = [weight * p.mass**2 * duration for weight in momenta]
         jerk = reg.jerk / (0.2 * np.maximum(p.dt, self._scale.time * BRIEF))
-        resting = p.active & (steepness(p.rotation[..., 2, 2]) < p.friction)
+        resting = p.active & (steepness(p.rotation[..., 2, 2]) < LEAST.friction * p.friction)
         jerk = jerk if resting.any(1).all() else SMOOTH * jerk
         squares = np.stack([*squares, jerk, reg.height * duration], 1)
         squares[0, 4] *= not np.any(p.com_velocity)  # the acceleration before a start in motion is unknown
