@@ -14,7 +14,7 @@ from validation.ablation_trial import BEST, BY_TIME, LOCAL, RAW, Effort, ablatio
 from validation.cases import make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
-from validation.growing import add_growing_options, earlier_trials, growth_note, stamped, state_of
+from validation.growing import add_growing_options, growth_note, stamped, state_of, take_over
 from validation.jobs import Job, Record, run_jobs
 from validation.searched import PLANNERS, completed
 from validation.tables import (
@@ -236,8 +236,7 @@ def main(argv: list[str] | None = None) -> int:
     described = {**settings.described(), **chosen, "trials": args.trials, "seed_offset": first}
     store = TrialFile(args.out / "trials.jsonl", settings.deciding() | chosen)
     if args.grow:
-        for record in earlier_trials(args.results / "ablation.json", described, cases):
-            store.records.setdefault(record["name"], record)
+        take_over(store, args.results / "ablation.json", described, cases)
     jobs = [Job(name, ablation_trial, (settings, *case, effort, args.execute)) for name, case in cases.items()]
     found = run_jobs(jobs, store, options.pool_of(args), console, "plans", args.minutes)
     ended = [cases[record["name"]] for record in found]

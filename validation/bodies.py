@@ -13,7 +13,7 @@ from toolkit.world.scaling import Fit
 from validation import goals, options
 from validation.cases import SCALED, kind_of, make_cases
 from validation.goals import Goal
-from validation.growing import add_growing_options, earlier_trials, growth_note, stamped, state_of
+from validation.growing import add_growing_options, growth_note, stamped, state_of, take_over
 from validation.jobs import Job, Record, run_jobs
 from validation.run_trial import execution_trial
 from validation.tables import (
@@ -127,8 +127,7 @@ def main(argv: list[str] | None = None) -> int:
     described = {**settings.described(), "trials": args.trials, "seed_offset": args.seed_offset}
     store = TrialFile(args.out / f"{robot.name}.jsonl", settings.deciding())
     if args.grow:
-        for record in earlier_trials(args.results / f"bodies_{robot.name}.json", described, cases):
-            store.records.setdefault(record["name"], record)
+        take_over(store, args.results / f"bodies_{robot.name}.json", described, cases)
     jobs = [Job(name, execution_trial, (settings, case)) for name, case in cases.items()]
     found = run_jobs(jobs, store, options.pool_of(args), console, "trials", args.minutes)
     records = stamped(found, state_of(settings))

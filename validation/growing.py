@@ -12,7 +12,7 @@ from typing import Any
 from toolkit import cli
 from toolkit.errors import InputError
 from toolkit.report.files import plain
-from validation.jobs import Record
+from validation.jobs import Record, Store
 from validation.options import TrialSettings
 
 _FREE = {"quick", "seeds", "seed_offset", "trials"}  # settings that choose trials and do not change them
@@ -45,10 +45,11 @@ def stamped(records: Iterable[Record], state: str) -> list[Record]:
     return [{"state": state, **record} for record in records]
 
 
-def earlier_trials(path: Path, settings: dict[str, Any], names: Iterable[str]) -> list[Record]:
-    """Trials of results that are there, which say what they were made with.
+def take_over(store: Store, path: Path, settings: dict[str, Any], names: Iterable[str]) -> None:
+    """Count trials of results that are there as run where a store has none; they say what they were made with.
 
     Args:
+        store: Keeps records.
         path: The results' JSON file; there are no trials where there is no file.
         settings: Those of the results to come; apart from what chooses the trials they have to be the same.
         names: Of the trials that are wanted.
@@ -57,7 +58,7 @@ def earlier_trials(path: Path, settings: dict[str, Any], names: Iterable[str]) -
         InputError: The file cannot be read, or was made with other settings.
     """
     if not path.exists():
-        return []
+        return
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         theirs, trials = content["settings"], content["trials"]
@@ -70,7 +71,9 @@ def earlier_trials(path: Path, settings: dict[str, Any], names: Iterable[str]) -
     if differ:
         raise InputError(f"{path}: was made with other settings ({', '.join(differ)}); leave out --grow")
     wanted = set(names)
-    return stamped((trial for trial in trials if trial["name"] in wanted), f"{code} with robot files unrecorded")
+    for trial in stamped(trials, f"{code} with robot files unrecorded"):
+        if trial["name"] in wanted:
+            store.records.setdefault(trial["name"], trial)
 
 
 def growth_note(records: Sequence[Record], wanted: int, state: str) -> str:

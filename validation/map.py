@@ -11,7 +11,7 @@ from toolkit.report.console import make_console
 from toolkit.robot.loader import default_robot, load_robot
 from validation import goals, map_families, map_scale, map_worlds, options
 from validation.goals import Goal
-from validation.growing import add_growing_options, earlier_trials, growth_note, stamped, state_of
+from validation.growing import add_growing_options, growth_note, stamped, state_of, take_over
 from validation.jobs import Job, run_jobs
 from validation.machine import source_fingerprint
 from validation.map_families import FAMILIES, QUICK, SEEDS, Cell, cells_of
@@ -120,8 +120,7 @@ def main(argv: list[str] | None = None) -> int:
     }
     store = TrialFolder(args.out / "cells", settings.deciding() | {"worlds": worlds, "candidates": CANDIDATES})
     if args.grow:
-        for record in earlier_trials(results / f"{title}.json", described, cells):
-            store.records.setdefault(record["name"], record)
+        take_over(store, results / f"{title}.json", described, cells)
     jobs = [Job(name, map_trial, (settings, cell)) for name, cell in cells.items()]
     found = run_jobs(jobs, store, options.pool_of(args), console, "cells", args.minutes)
     records = stamped(completed(found, cells), state_of(settings))

@@ -20,7 +20,7 @@ from toolkit.report.files import read_json
 from toolkit.robot.loader import load_robot
 from validation import goals, options
 from validation.cases import Case
-from validation.growing import add_growing_options, earlier_trials, growth_note, stamped, state_of
+from validation.growing import add_growing_options, growth_note, stamped, state_of, take_over
 from validation.jobs import Job, Record, run_jobs
 from validation.machine import ROOT
 from validation.options import TrialSettings
@@ -273,8 +273,7 @@ def main(argv: list[str] | None = None) -> int:
         "seed_offset": args.seed_offset,
     }
     if args.grow:
-        for record in earlier_trials(args.results / "paper.json", described, [job.name for job in jobs]):
-            store.records.setdefault(record["name"], record)
+        take_over(store, args.results / "paper.json", described, [job.name for job in jobs])
     found = stamped(run_jobs(jobs, store, options.pool_of(args), console, "trials", args.minutes), state_of(settings))
     records = {record["name"]: without_folders(record) for record in found}
     _write(args, size, settings, described, solvers, records, len(jobs), known, folder, console)
