@@ -213,7 +213,11 @@ def main(argv: list[str] | None = None) -> int:
         metavar="N",
         help="motions that a local search may optimise beyond that; 0: no local search (default: %(default)s)",
     )
-    parser.add_argument("--execute", action="store_true", help="simulate the chosen plans as well, which takes long")
+    parser.add_argument(
+        "--execute",
+        action="store_true",
+        help="simulate the chosen plans of new trials as well, which takes long",
+    )
     add_growing_options(parser)
     parser.epilog = options.GOAL_CODES
     args = parser.parse_args(argv)

@@ -15,7 +15,8 @@ from toolkit.report.files import plain
 from validation.jobs import Record, Store
 from validation.options import TrialSettings
 
-_FREE = {"quick", "seeds", "seed_offset", "trials"}  # settings that choose trials and do not change them
+_FREE = {"quick", "seeds", "seed_offset", "trials", "execute"}
+"""Settings that choose trials, or what is done with their plans, and do not change the plans."""
 
 
 def add_growing_options(target: argparse.ArgumentParser) -> None:
@@ -51,7 +52,7 @@ def take_over(store: Store, path: Path, settings: dict[str, Any], names: Iterabl
     Args:
         store: Keeps records.
         path: The results' JSON file; there are no trials where there is no file.
-        settings: Those of the results to come; apart from what chooses the trials they have to be the same.
+        settings: Those of the results to come; apart from what leaves plans as they are they have to be the same.
         names: Of the trials that are wanted.
 
     Raises:

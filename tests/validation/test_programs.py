@@ -126,7 +126,7 @@ def test_ablation_gives_planners_the_same_effort_and_grows(folders, tmp_path, ca
     (pair,) = [row for row in found["ratios"] if (row["over"], row["variant"]) == ("quasi-static", ablation.RAW)]
     assert pair["worlds"] == 1
     assert pair["true cost"] > 0.0
-    more = [*command, "--other-trials", "2", "--grow", "--minutes", "1e-9", *folders, "--out", str(tmp_path / "more")]
+    more = [*command, "--execute", "--other-trials", "2", "--grow", "--minutes", "1e-9", *folders, "--out", str(tmp_path / "more")]
     ablation.main(more)
     assert "2 of 4 trials known from before" in capsys.readouterr().out
     grown = result(folders, "ablation")
