@@ -114,9 +114,8 @@ def test_calibration_prices_every_sequence_and_stands_beside_an_earlier_one(fold
 @pytest.mark.slow
 def test_ablation_gives_planners_the_same_effort_and_grows(folders, tmp_path, capsys):
     command = ["--kinds", "any_slope", "--other-trials", "1", "--expansions", "150", "--planners", "learned"]
-    command += ["quasi-static", "--optimisations", "2", "--seconds", "1", "--execute"]
-    command += ["--local-search", "3"]
-    ablation.main([*command, *folders])
+    command += ["quasi-static", "--optimisations", "2", "--seconds", "1", "--local-search", "3"]
+    ablation.main([*command, "--execute", *folders])
     found = result(folders, "ablation")
     assert [row["planner"] for row in found["table"]] == 5 * ["learned"] + 5 * ["quasi-static"]
     assert all(row["feasible"] == 1 for row in found["table"] if row["variant"] != ablation.BY_TIME)
@@ -126,7 +125,7 @@ def test_ablation_gives_planners_the_same_effort_and_grows(folders, tmp_path, ca
     (pair,) = [row for row in found["ratios"] if (row["over"], row["variant"]) == ("quasi-static", ablation.RAW)]
     assert pair["worlds"] == 1
     assert pair["true cost"] > 0.0
-    more = [*command, "--execute", "--other-trials", "2", "--grow", "--minutes", "1e-9", *folders, "--out", str(tmp_path / "more")]
+    more = [*command, "--other-trials", "2", "--grow", "--minutes", "1e-9", *folders, "--out", str(tmp_path / "more")]
     ablation.main(more)
     assert "2 of 4 trials known from before" in capsys.readouterr().out
     grown = result(folders, "ablation")
