@@ -23,7 +23,7 @@ from toolkit.centroidal.problem import (
     Weights,
 )
 from toolkit.centroidal.program import Landing, Program, Regularisers, indices
-from toolkit.centroidal.stages.method import Options, Squares, Work, minimise
+from toolkit.centroidal.stages.method import GAP, Options, Squares, Work, minimise
 from toolkit.centroidal.stages.steps import WRENCH
 from toolkit.centroidal.surroundings import Surroundings
 from toolkit.centroidal.verdict import judged
@@ -41,6 +41,7 @@ CALM = Weights(angular_momentum=20.0, angular_momentum_rate=1.0)
 """The paper's weights except for the angular momentum: with the paper's, no body can follow fast swings."""
 WANTED_BODY = BodyMargins(length=0.015, ankle=0.1, hip=0.05, height=0.02, torque=0.75, most_torque=0.88)
 CONVERGED = "converged"
+TAKEN = 0.3  # most of a slack at the start
 STILL = 1e-9  # m; a smaller displacement of a landing point is none
 
 
@@ -184,8 +185,11 @@ def guess(program: Program) -> np.ndarray:
     local = np.concatenate([up[..., :2] * inside[..., None], normal[..., None]], -1)
     step, limb = np.nonzero(p.active)
     y[step[:, None], indices(layout.wrench[step, limb], 3)] = local[step, limb]
-    y[step[:, None], indices(layout.wrench[step, limb] + WRENCH, 2)] = 0.01
-    y[np.arange(n + 1)[:, None], layout.slack] = 0.01
+    # Slacks start where the multipliers of their bounds outweigh their prices.
+    prices, first = program.prices, layout.wrench[step, limb] + WRENCH
+    y[step[:, None], indices(first, 2)] = np.minimum(GAP / program.slack_price[step], TAKEN)[:, None]
+    priced = prices.linear > 0.0
+    y[prices.stage[priced], prices.variable[priced]] = np.minimum(GAP / prices.linear[priced], TAKEN)
     return y
 
 

@@ -74,6 +74,26 @@ def largest_residual(block):
 
 
 @compiled(reordered=True)
+def largest_violation(block):
+    """Largest -g; negative where every row holds."""
+    worst = -np.inf
+    for i in range(block.value.shape[0]):
+        for a in range(block.value.shape[1]):
+            worst = max(worst, -block.value[i, a])
+    return worst
+
+
+@compiled(reordered=True)
+def mismatch(block):
+    """Sum of |g - s| z: by how much the sum of |g z| may exceed that of s z."""
+    total = 0.0
+    for i in range(block.value.shape[0]):
+        for a in range(block.value.shape[1]):
+            total += abs(block.value[i, a] - block.slack[i, a]) * block.multiplier[i, a]
+    return total
+
+
+@compiled(reordered=True)
 def complementarity(block):
     """Sum of s z."""
     total = 0.0

@@ -26,6 +26,8 @@ FLOOR = 1e-3
 
 It falls with the largest violation.
 """
+GAP = 10.0
+"""Complementarity of a row at the start of a motion that nothing is known of."""
 REST_STIFFNESS = 1e5
 """Stiffness of the proximal term for the final rest; a multiplier makes the rest exact."""
 
@@ -125,7 +127,7 @@ class Options(NamedTuple):
         tolerance: Wanted accuracy of the objective, relative.
         feasible: Largest violation of dynamics, rows and rest.
         gap: Complementarity of a row at the start.
-        least: Least slack of a row at the start.
+        least: Least slack of a row at the start; a tenth of it where the row bounds a single variable.
         small: Objective below which accuracy is absolute.
         linear: Whether the body's limits are kept to first order in the change from the start.
     """
@@ -134,7 +136,7 @@ class Options(NamedTuple):
     iterations: int = 150
     tolerance: float = 1e-4
     feasible: float = 4e-7
-    gap: float = 1.0
+    gap: float = GAP
     least: float = 0.3
     small: float = SMALL
     linear: bool = False
@@ -187,18 +189,26 @@ def longest_steps(all_blocks, keep):
 
 
 @compiled(reordered=True)
-def residual(all_blocks, y, rest, work):
-    """Largest violation of dynamics, rows, and rest at the end if wanted."""
+def residuals(all_blocks, y, rest, work):
+    """How far a point is from one that is feasible.
+
+    Returns:
+        Largest residual of dynamics, slacks, and rest at the end if wanted; the largest violation of dynamics, rows and
+        rest, which does not count slacks that differ from rows that hold; and what these differences may cost.
+    """
     worst = 0.0
     for t in range(work.defect.shape[0]):
         for k in range(work.defect.shape[1]):
             worst = max(worst, abs(work.defect[t, k]))
-    for block in all_blocks:
-        worst = max(worst, blocks.largest_residual(block))
     if rest:
         for a in range(3):
             worst = max(worst, abs(y[-1, 3 + a]))
-    return worst
+    violation, cost = worst, 0.0
+    for block in all_blocks:
+        worst = max(worst, blocks.largest_residual(block))
+        violation = max(violation, blocks.largest_violation(block))
+        cost += blocks.mismatch(block)
+    return worst, violation, cost
 
 
 @compiled(kept=True, reordered=True, allocates=True)
@@ -228,10 +238,12 @@ def minimise(steps, prices, squares, all_blocks, size, y, work, options):
     value = evaluate(steps, prices, squares, all_blocks, size, y, FLOOR, False, work)
     for block in all_blocks:
         blocks.start(block, options.least, options.gap)
+    blocks.start(all_blocks.bounds, 0.1 * options.least, options.gap)
     for iteration in range(options.iterations):
         kept = options.linear and iteration > 0
         value = evaluate(steps, prices, squares, all_blocks, size, y, FLOOR * min(worst, 1.0), kept, work)
-        worst, gap = residual(all_blocks, y, options.at_rest, work), 0.0
+        worst, violation, mismatch = residuals(all_blocks, y, options.at_rest, work)
+        gap = 0.0
         for block in all_blocks:
             gap += blocks.complementarity(block)
             blocks.add_curvature(block, work.hessian)
@@ -249,7 +261,7 @@ def minimise(steps, prices, squares, all_blocks, size, y, work, options):
         for t in range(last + 1):
             for k in range(size[t]):
                 decrease += work.gradient[t, k] * work.change[t, k]
-        if worst < options.feasible and gap < accepted and abs(decrease) < accepted:
+        if violation < options.feasible and gap + mismatch < accepted and abs(decrease) < accepted:
             return True, iteration, value
         primal, dual = longest_steps(all_blocks, 1.0)
         after = 0.0
