@@ -124,7 +124,9 @@ def test_steps_keep_slacks_and_multipliers_positive():
         assert block.slack.min() > 0.0 and block.multiplier.min() > 0.0
         assert blocks.complementarity(block) == pytest.approx(expected)
         assert expected == pytest.approx((block.slack * block.multiplier).sum())
-        assert blocks.largest_residual(block) == pytest.approx(np.abs(block.value - block.slack).max())
+        assert blocks.largest_violation(block) == pytest.approx(-block.value.min())
+        off = np.abs(block.value - block.slack)
+        assert blocks.mismatch(block) == pytest.approx((off * block.multiplier).sum())
 
 
 def test_linear_rows_change_with_a_step_as_their_slopes_say():

@@ -64,16 +64,6 @@ def start(block, least, gap):
 
 
 @compiled(reordered=True)
-def largest_residual(block):
-    """Largest |g - s|."""
-    worst = 0.0
-    for i in range(block.value.shape[0]):
-        for a in range(block.value.shape[1]):
-            worst = max(worst, abs(block.value[i, a] - block.slack[i, a]))
-    return worst
-
-
-@compiled(reordered=True)
 def largest_violation(block):
     """Largest -g; negative where every row holds."""
     worst = -np.inf

@@ -22,11 +22,11 @@ from toolkit.compiled import compiled
 SMALL = 1e-3
 """Objective below which accuracy is absolute."""
 FLOOR = 1e-3
-"""Weights; what friction is taken to hold at least under lateral forces, while constraints are violated by 1 or more.
+"""Weights; what friction is taken to hold at least under lateral forces, at the start.
 
-It falls with the largest violation.
+It falls with the distance from a solution. Otherwise lightly loaded contacts could end with more than friction holds.
 """
-GAP = 10.0
+GAP = 3.0
 """Complementarity of a row at the start of a motion that nothing is known of."""
 REST_STIFFNESS = 1e5
 """Stiffness of the proximal term for the final rest; a multiplier makes the rest exact."""
@@ -189,26 +189,22 @@ def longest_steps(all_blocks, keep):
 
 
 @compiled(reordered=True)
-def residuals(all_blocks, y, rest, work):
-    """How far a point is from one that is feasible.
+def violations(all_blocks, y, rest, work):
+    """Largest violation of dynamics, rows, and rest at the end if wanted, and what slacks that differ may cost.
 
-    Returns:
-        Largest residual of dynamics, slacks, and rest at the end if wanted; the largest violation of dynamics, rows and
-        rest, which does not count slacks that differ from rows that hold; and what these differences may cost.
+    A slack that differs from a row that holds violates nothing.
     """
-    worst = 0.0
+    worst, cost = 0.0, 0.0
     for t in range(work.defect.shape[0]):
         for k in range(work.defect.shape[1]):
             worst = max(worst, abs(work.defect[t, k]))
     if rest:
         for a in range(3):
             worst = max(worst, abs(y[-1, 3 + a]))
-    violation, cost = worst, 0.0
     for block in all_blocks:
-        worst = max(worst, blocks.largest_residual(block))
-        violation = max(violation, blocks.largest_violation(block))
+        worst = max(worst, blocks.largest_violation(block))
         cost += blocks.mismatch(block)
-    return worst, violation, cost
+    return worst, cost
 
 
 @compiled(kept=True, reordered=True, allocates=True)
@@ -234,19 +230,19 @@ def minimise(steps, prices, squares, all_blocks, size, y, work, options):
         count += block.value.size
     force = np.zeros(3)  # multiplier of the final rest
     rows.prepare_contacts(all_blocks.contacts)
-    worst = 1.0
+    far = 1.0  # from a solution: the largest violation or, where it is larger, the mean complementarity
     value = evaluate(steps, prices, squares, all_blocks, size, y, FLOOR, False, work)
     for block in all_blocks:
         blocks.start(block, options.least, options.gap)
     blocks.start(all_blocks.bounds, 0.1 * options.least, options.gap)
     for iteration in range(options.iterations):
         kept = options.linear and iteration > 0
-        value = evaluate(steps, prices, squares, all_blocks, size, y, FLOOR * min(worst, 1.0), kept, work)
-        worst, violation, mismatch = residuals(all_blocks, y, options.at_rest, work)
-        gap = 0.0
+        value = evaluate(steps, prices, squares, all_blocks, size, y, FLOOR * min(far, 1.0), kept, work)
+        (worst, mismatch), gap = violations(all_blocks, y, options.at_rest, work), 0.0
         for block in all_blocks:
             gap += blocks.complementarity(block)
             blocks.add_curvature(block, work.hessian)
+        far = max(worst, gap / count)
         if not (value < np.inf and gap < np.inf):
             return False, iteration, value
         if options.at_rest:
@@ -261,7 +257,7 @@ def minimise(steps, prices, squares, all_blocks, size, y, work, options):
         for t in range(last + 1):
             for k in range(size[t]):
                 decrease += work.gradient[t, k] * work.change[t, k]
-        if violation < options.feasible and gap + mismatch < accepted and abs(decrease) < accepted:
+        if worst < options.feasible and gap + mismatch < accepted and abs(decrease) < accepted:
             return True, iteration, value
         primal, dual = longest_steps(all_blocks, 1.0)
         after = 0.0
