@@ -26,7 +26,7 @@ FLOOR = 1e-3
 
 It falls with the distance from a solution. Otherwise lightly loaded contacts could end with more than friction holds.
 """
-GAP = 3.0
+GAP = 5.0
 """Complementarity of a row at the start of a motion that nothing is known of."""
 REST_STIFFNESS = 1e5
 """Stiffness of the proximal term for the final rest; a multiplier makes the rest exact."""
