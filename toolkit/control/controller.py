@@ -50,7 +50,10 @@ COM, BASE, POSTURE = TaskGains(1000.0, 60.0, 14.0), TaskGains(50.0, 100.0, 20.0)
 SPIN = TaskGains(40.0, 5.0, 0.0)  # of the angular momentum in units of MOMENTUM_SCALE; kd is unused
 # A limb in contact is held still by its velocity only, because its resting place is a measured fact. The patch of a
 # palm aligns itself with the surface.
-STANCE, STANCE_PALM_ROTATION = TaskGains(1e4, 0.0, 30.0), TaskGains(20.0, 0.0, 20.0)
+STANCE, STANCE_ROTATION = TaskGains(1e4, 0.0, 24.0), TaskGains(1e4, 0.0, 30.0)
+STANCE_PALM_ROTATION = TaskGains(20.0, 0.0, 20.0)
+# Along its normal a foot stops faster: one that lands fast bounces, and as long as it bears nothing it slips.
+SETTLING = 100.0  # 1/s; kd of the normal velocity of a foot in contact
 LEG_POSTURE = 0.005  # factor on the posture's weight for joints that carry a foot: feet and CoM place them
 ARM_POSTURE = 0.01  # the same for an arm whose palm is in contact, and not quite where it was planned to be
 MOMENTUM_SCALE = 10.0  # kg m^2/s per unit of the task of angular momentum, for a body of the usual size
@@ -78,6 +81,7 @@ class _Gains(NamedTuple):
     stance: TaskGains
     stance_rotation: TaskGains
     stance_palm_rotation: TaskGains
+    settling: float
 
     @classmethod
     def of(cls, scale: Scale) -> _Gains:
@@ -92,8 +96,9 @@ class _Gains(NamedTuple):
             posture=POSTURE.angular(scale),
             spin=SPIN._replace(kp=SPIN.kp / scale.time),
             stance=STANCE.linear(scale),
-            stance_rotation=STANCE.angular(scale),
+            stance_rotation=STANCE_ROTATION.angular(scale),
             stance_palm_rotation=STANCE_PALM_ROTATION.angular(scale),
+            settling=SETTLING / scale.time,
         )
 
 
@@ -293,6 +298,8 @@ class Controller:
             linear, angular = feet if limb.is_foot else hands
         share = 1.0 if self.tracker.in_contact[limb] else targets.authority[limb]
         rows = self._append(limb, slice(0, 3), linear, share, rows)
+        if limb.is_foot and self.tracker.in_contact[limb]:
+            self._settle(limb, rows)
         rows = self._append(limb, slice(3, 6), angular, share, rows)
         if self._robot.limbs[limb].rolls:
             axes = slice(1, 3)  # the leg rolls the sole, in contact and in the air
@@ -314,6 +321,13 @@ class Controller:
         error += task.kp * targets.error[limb, part]
         self._wanted[here] = root * (error + targets.acceleration[limb, part] - dynamics.drift[limb, part])
         return rows + 3
+
+    def _settle(self, limb: Limb, rows: int) -> None:
+        """Have a foot's linear task in contact, the last three rows, stop the foot along its normal."""
+        gains, normal = self._gains, self.dynamics.limb_rotation[limb, :, 2]
+        off = normal @ (self.targets.velocity[limb, :3] - self.dynamics.limb_velocity[limb, :3])
+        more = gains.stance.weight**0.5 * (gains.settling - gains.stance.kd) * off
+        self._wanted[rows - 3 : rows] += more * normal
 
     def _orient_base(self, index: int, qvel: np.ndarray, target: np.ndarray) -> None:
         """Fill in the wanted angular acceleration of the base, in the base."""
