@@ -14,7 +14,8 @@ def test_feet_in_contact_stop_soonest_along_their_normals(robot, standing):
     qpos, qvel = plan.trajectory.qpos[0].copy(), np.zeros(robot.mujoco_model.nv)
     qvel[:3] = 0.1, -0.05, -0.4
     controller.tick(0, qpos, qvel, np.full(4, 100.0))
-    rates = np.array([STANCE.kd, STANCE.kd, SETTLING]) / robot.scale.time
+    sideways = STANCE.kd / robot.scale.time
+    rates = np.array([sideways, sideways, SETTLING])
     for foot in FEET:
         first = 6 + 6 * foot  # rows of the tasks: CoM, angular momentum, then the feet
         wanted = controller._wanted[first : first + 3] / STANCE.weight**0.5 + controller.dynamics.drift[foot, :3]

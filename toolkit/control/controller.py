@@ -53,7 +53,7 @@ SPIN = TaskGains(40.0, 5.0, 0.0)  # of the angular momentum in units of MOMENTUM
 STANCE, STANCE_ROTATION = TaskGains(1e4, 0.0, 24.0), TaskGains(1e4, 0.0, 30.0)
 STANCE_PALM_ROTATION = TaskGains(20.0, 0.0, 20.0)
 # Along its normal a foot stops faster: one that lands fast bounces, and as long as it bears nothing it slips.
-SETTLING = 100.0  # 1/s; kd of the normal velocity of a foot in contact
+SETTLING = 100.0  # 1/s; kd of the normal velocity of a foot in contact; simulated contacts bounce alike at all sizes
 LEG_POSTURE = 0.005  # factor on the posture's weight for joints that carry a foot: feet and CoM place them
 ARM_POSTURE = 0.01  # the same for an arm whose palm is in contact, and not quite where it was planned to be
 MOMENTUM_SCALE = 10.0  # kg m^2/s per unit of the task of angular momentum, for a body of the usual size
@@ -81,7 +81,6 @@ class _Gains(NamedTuple):
     stance: TaskGains
     stance_rotation: TaskGains
     stance_palm_rotation: TaskGains
-    settling: float
 
     @classmethod
     def of(cls, scale: Scale) -> _Gains:
@@ -98,7 +97,6 @@ class _Gains(NamedTuple):
             stance=STANCE.linear(scale),
             stance_rotation=STANCE_ROTATION.angular(scale),
             stance_palm_rotation=STANCE_PALM_ROTATION.angular(scale),
-            settling=SETTLING / scale.time,
         )
 
 
@@ -326,7 +324,7 @@ class Controller:
         """Have a foot's linear task in contact, the last three rows, stop the foot along its normal."""
         gains, normal = self._gains, self.dynamics.limb_rotation[limb, :, 2]
         off = normal @ (self.targets.velocity[limb, :3] - self.dynamics.limb_velocity[limb, :3])
-        more = gains.stance.weight**0.5 * (gains.settling - gains.stance.kd) * off
+        more = gains.stance.weight**0.5 * (SETTLING - gains.stance.kd) * off
         self._wanted[rows - 3 : rows] += more * normal
 
     def _orient_base(self, index: int, qvel: np.ndarray, target: np.ndarray) -> None:
