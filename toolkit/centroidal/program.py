@@ -300,6 +300,11 @@ class Program:
         """(N,) price of a slack in each step."""
         return SCALE * self._regularisers.slack * self.problem.dt / 0.2
 
+    def start_slacks(self, y: np.ndarray, gap: float, most: float) -> None:
+        """See the function of the same name."""
+        excess = self._regularisers.excess
+        start_slacks(y, self.layout, self.problem.active, self.slack_price, excess, gap, most)
+
     def _prices(self) -> Prices:
         """Prices of the excess, the body's slack and of landing points."""
         at = np.repeat([item.step for item in self._landings], 2).astype(int)
@@ -455,6 +460,26 @@ def slack_prices(layout: Layout, price: np.ndarray, excess: float) -> Prices:
     linear = np.concatenate([excess * price, price, price[-1:]])
     stage, variable = np.append(np.arange(n), np.arange(n + 1)), np.append(slack[:-1, 0], slack[:, 1])
     return Prices(stage, variable, linear, EVEN * linear, np.zeros(2 * n + 1))
+
+
+def start_slacks(
+    y: np.ndarray,
+    layout: Layout,
+    active: np.ndarray,
+    price: np.ndarray,
+    excess: float,
+    gap: float,
+    most: float = np.inf,
+) -> None:
+    """Start the slacks of a motion y (N + 1, m) where their prices balance the barrier, at most at `most`.
+
+    Contacts are (N, 4) active; price (N,) and excess are as in `slack_prices`, the gap is the complementarity.
+    """
+    step, limb = np.nonzero(active)
+    knot, balance = np.arange(len(price) + 1), np.minimum(gap / price, most)
+    y[step[:, None], indices(layout.wrench[step, limb] + WRENCH, 2)] = balance[step, None]
+    y[knot, layout.slack[:, 1]] = np.append(balance, balance[-1])
+    y[knot[:-1], layout.slack[:-1, 0]] = np.minimum(gap / (excess * price), most)
 
 
 def single_bounds(layout: Layout, active: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -185,11 +185,7 @@ def guess(program: Program) -> np.ndarray:
     local = np.concatenate([up[..., :2] * inside[..., None], normal[..., None]], -1)
     step, limb = np.nonzero(p.active)
     y[step[:, None], indices(layout.wrench[step, limb], 3)] = local[step, limb]
-    # Slacks start where the multipliers of their bounds balance their prices: near the central path.
-    prices, first = program.prices, layout.wrench[step, limb] + WRENCH
-    y[step[:, None], indices(first, 2)] = np.minimum(GAP / program.slack_price[step], TAKEN)[:, None]
-    priced = prices.linear > 0.0
-    y[prices.stage[priced], prices.variable[priced]] = np.minimum(GAP / prices.linear[priced], TAKEN)
+    program.start_slacks(y, GAP, TAKEN)
     return y
 
 

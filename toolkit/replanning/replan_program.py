@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.program import Layout, contact_block, indices, single_bounds, slack_prices
+from toolkit.centroidal.program import Layout, contact_block, indices, single_bounds, slack_prices, start_slacks
 from toolkit.centroidal.stages.blocks import Block
 from toolkit.centroidal.stages.method import Blocks, Options, Prices, Work, minimise
 from toolkit.centroidal.stages.rows import FINAL_ROWS
@@ -101,13 +101,10 @@ class ReplanProgram:
     def _guess(self) -> np.ndarray:
         """The plan (N + 1, m); slacks start where their prices balance the barrier."""
         layout, price, (step, limb) = self.layout, self._price, np.nonzero(self.contacts.active)
-        knot, wrench = np.arange(len(price) + 1), indices(layout.wrench[step, limb], WRENCH + 2)
-        y = np.zeros((len(knot), int(layout.size.max())))
+        y = np.zeros((len(price) + 1, int(layout.size.max())))
         y[:, :9] = self.track.states
-        y[step[:, None], wrench[:, :WRENCH]] = self.track.wrench
-        y[step[:, None], wrench[:, WRENCH:]] = (OPTIONS.gap / price[step])[:, None]
-        y[knot, layout.slack[:, 1]] = OPTIONS.gap / np.append(price, price[-1])
-        y[knot[:-1], layout.slack[:-1, 0]] = OPTIONS.gap / (CONES * price)
+        y[step[:, None], indices(layout.wrench[step, limb], WRENCH)] = self.track.wrench
+        start_slacks(y, layout, self.contacts.active, price, CONES, OPTIONS.gap)
         for item, place in zip(self.free.items, self.free.goal, strict=True):
             y[item.step, layout.chosen(item)] = place
             y[item.step + 1 :, layout.pair(item.limb)] = place
