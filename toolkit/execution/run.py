@@ -21,7 +21,7 @@ from toolkit.execution.scene_index import SceneIndex
 from toolkit.execution.simulation import Simulation
 from toolkit.execution.standard import Standard
 from toolkit.mjcf import mujoco_warnings
-from toolkit.replanning.replanner import MAX_FRICTION, ReplanCounts, Replanner
+from toolkit.replanning.replanner import ReplanCounts, Replanner
 from toolkit.wholebody.plan import WholeBodyPlan
 
 Observer = Callable[[float, str], None]
@@ -70,9 +70,8 @@ def execute(
     period = config.control_period
     ticks = int(np.ceil((plan.schedule.duration + robot.scale.time * EXTRA_REST) / period - 1e-9))
     reference = sample_reference(period * np.arange(ticks), plan)
-    margins, replanner = plan.motion.solved.margins, None
-    if config.replanning and margins.friction <= MAX_FRICTION:
-        replanner = Replanner(reference, plan)
+    margins = plan.motion.solved.margins
+    replanner = Replanner(reference, plan) if config.replanning else None
     controller = Controller(robot, plan.scene, reference, margins, period, replanner)
     standard = Standard.of(plan, config, reference.swings, ticks)
     recorder = Recorder(standard, ticks, scene, index)

@@ -19,7 +19,6 @@ from toolkit.replanning.replan import DEADBAND, Replan, ReplanProblem
 from toolkit.replanning.situation import Situation
 from toolkit.wholebody.plan import WholeBodyPlan
 
-MAX_FRICTION = 0.9  # largest friction margin of plans to replan: a descent at the limit of friction is better followed
 PERIOD = 0.04  # s; time between replans. The following are those of a body of the usual size
 PACE = 1.9  # largest pace, relative to the plan, of a swing whose contact is needed earlier
 PACE_RATE = 12.0  # 1/s; rate at which the pace changes
