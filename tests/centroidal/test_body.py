@@ -13,7 +13,6 @@ from tests.shipped_robots import OWN
 from toolkit.centroidal.body import (
     BodyMargins,
     body_residuals,
-    knot_contacts,
     lowest_foot,
     swing_ankles,
 )
@@ -21,7 +20,7 @@ from toolkit.centroidal.build import initial_com, sequence_problem
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion
 from toolkit.centroidal.program import leg_limits
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins, leg_clearances, leg_posture, leg_torques
+from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins, leg_clearances, leg_torques
 from toolkit.robot.loader import load_robot
 from validation.reference.pieces import pieces
 
@@ -34,7 +33,7 @@ def walker(request):
 def still(robot, problem, com=None):
     """A motion that shares the weight between the contacts, with the CoM above the middle of the feet in contact."""
     n, weight = problem.steps, -problem.mass * GRAVITY
-    knots, limbs, positions, _ = knot_contacts(problem)
+    knots, limbs, positions, _ = problem.knot_contacts
     middle = np.stack([positions[(knots == t) & (limbs < 2)].mean(0) for t in range(n + 1)])
     middle[:, 2] += robot.com_height
     force = problem.active[:, :, None] * weight / problem.active.sum(1)[:, None, None]
@@ -61,8 +60,8 @@ def test_torques_are_the_jacobian_transpose(walker):
             jacobian = np.zeros((2, 3, model.nv))
             mujoco.mj_jacSite(model, data, jacobian[0], jacobian[1], model.site(limb.label).id)
             torque = (jacobian[0].T @ force + jacobian[1].T @ moment)[model.jnt_dofadr[joints]]
-            posture = leg_posture(leg, com[None], np.zeros(1), position[None], rotation[None])
-            ours = leg_torques(posture, position[None], rotation[None], force[None], moment[None])
+            place = com[None], np.zeros(1), position[None], rotation[None]
+            ours = leg_torques(leg, *place, force[None], moment[None])
             ankle = (
                 ("ankle_pitch", "ankle_roll")
                 if "pitch" in model.joint(joints[4]).name
@@ -84,8 +83,7 @@ def test_casadi_and_numpy_agree_about_a_leg(walker):
             posture = [leg.hip_in_com, ankle, rotation.ravel(), [leg.thigh, leg.shin, 1.0, 0.0], leg.hips.numbers]
             parameters = np.concatenate([*posture, leg_limits(leg, wanted)])
             rows = np.array(pieces()["leg"].value(ca.vertcat(com, 0.0), parameters)).reshape(-1, 2).min(1)
-            found = leg_posture(leg, com[None], np.zeros(1), position[None], rotation[None])
-            clearances = leg_clearances(leg, found, wanted)
+            clearances = leg_clearances(leg, com[None], np.zeros(1), position[None], rotation[None], wanted)
             expected = [clearances[item.name][0] * (5 if item.quantity == "length" else 1) for item in PLANNED]
             np.testing.assert_allclose(rows, expected, atol=1e-9)
 
@@ -97,8 +95,8 @@ def test_casadi_and_numpy_agree_about_torques(walker):
     for _, _, _, com, position, rotation in random_legs(walker, limb, rng, 20):
         velocity, force, moment = rng.normal(size=3), rng.normal(size=3) * 300, rng.normal(size=3) * 30
         middle = com + 0.05 * velocity
-        posture = leg_posture(leg, middle[None], np.zeros(1), position[None], rotation[None])
-        ours = leg_torques(posture, position[None], rotation[None], force[None], moment[None])
+        place = middle[None], np.zeros(1), position[None], rotation[None]
+        ours = leg_torques(leg, *place, force[None], moment[None])
         limits = [leg.torques[role] for role in TORQUE_ROLES]
         parameters = np.concatenate(
             [
@@ -170,7 +168,7 @@ def test_margins_tighten(walker, motion):
 
 def test_contacts_at_knots_and_swings(walker, motion):
     problem = motion.problem
-    knots, limbs, _, _ = knot_contacts(problem)
+    knots, limbs, _, _ = problem.knot_contacts
     seen = list(zip(knots.tolist(), limbs.tolist(), strict=True))
     assert len(seen) == len(set(seen))
     active = problem.active

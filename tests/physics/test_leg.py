@@ -88,8 +88,8 @@ def test_posture_turns_and_shifts_with_the_world(robot, limb):
 
 def leg_feasible(leg, com, yaw, position, rotation):
     """(n,) bool; whether legs reach their soles within every joint range."""
-    posture = leg_posture(leg, com, yaw, position, rotation)
-    return np.all([value >= 0.0 for value in leg_clearances(leg, posture, ReachMargins()).values()], axis=0)
+    clearances = leg_clearances(leg, com, yaw, position, rotation, ReachMargins())
+    return np.all([value >= 0.0 for value in clearances.values()], axis=0)
 
 
 def test_home_posture_is_feasible_and_broken_ones_are_not(robot):
@@ -115,9 +115,9 @@ def test_margins_tighten_every_limit(robot):
     n = 50
     com = np.array([0, 0, robot.com_height]) + 0.1 * rng.normal(size=(n, 3))
     position = np.tile((leg.hip_in_com - leg.ankle_in_sole) * [1, 1, 0], (n, 1))
-    posture = leg_posture(leg, com, np.zeros(n), position, np.tile(np.eye(3), (n, 1, 1)))
-    loose = leg_clearances(leg, posture, ReachMargins(0.0, 0.0, 0.0))
-    tight = leg_clearances(leg, posture, ReachMargins(0.01, 0.1, 0.05))
+    place = com, np.zeros(n), position, np.tile(np.eye(3), (n, 1, 1))
+    loose = leg_clearances(leg, *place, ReachMargins(0.0, 0.0, 0.0))
+    tight = leg_clearances(leg, *place, ReachMargins(0.01, 0.1, 0.05))
     for name, taken in [("leg length", 0.01), ("ankle pitch", 0.1), ("ankle roll", 0.1), ("hip pitch", 0.05)]:
         np.testing.assert_allclose(loose[name] - tight[name], taken, atol=1e-12)
 
@@ -151,7 +151,8 @@ def test_the_law_undoes_the_chain_of_rotations(robot, limb, order, skew):
         found = (posture.hip_point, posture.knee_point, posture.ankle_point)
         np.testing.assert_allclose(np.squeeze(found), points, atol=1e-9)
         force, moment = rng.normal(size=3) * [50, 50, 300], rng.normal(size=3) * 20
-        ours = leg_torques(posture, sole[None], rotation[None], force[None], moment[None])
+        place = com[None], np.array([heading]), sole[None], rotation[None]
+        ours = leg_torques(leg, *place, force[None], moment[None])
         expected = torques(leg, com, heading, angles, force, moment)
         for role, torque in ours.items():
             np.testing.assert_allclose(torque[0], expected[role], atol=1e-5, err_msg=role)  # differences of 1e-6 rad
@@ -187,11 +188,12 @@ def test_a_leg_that_is_too_long_points_at_its_hip(robot):
     leg = robot.legs[Limb.LEFT_FOOT]
     position = ((leg.hip_in_com - leg.ankle_in_sole) * [1, 1, 0])[None]
     com = np.array([[0.0, 0.0, 2.0 * robot.com_height]])
-    posture = leg_posture(leg, com, np.zeros(1), position, np.eye(3)[None])
+    place = com, np.zeros(1), position, np.eye(3)[None]
+    posture = leg_posture(leg, *place)
     assert posture.length[0] > leg.max_length and posture.knee[0] < 0.0142
     up = np.squeeze(posture.knee_point) - np.squeeze(posture.ankle_point)
     np.testing.assert_allclose(up / np.linalg.norm(up), [0.0, 0.0, 1.0], atol=0.0142)
-    assert leg_clearances(leg, posture, ReachMargins())["leg length"][0] < 0.0
+    assert leg_clearances(leg, *place, ReachMargins())["leg length"][0] < 0.0
 
 
 def test_numbers_arrays_and_symbols_take_the_same_law(robot):

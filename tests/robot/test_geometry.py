@@ -112,7 +112,7 @@ def test_angles_and_torques_whatever_the_order_of_a_hip(robot: RobotModel) -> No
             force, moment = rng.normal(size=3) * [30, 30, 300], rng.normal(size=3) * 5
             mujoco.mj_jacSite(model, data, jacobian[0], jacobian[1], sole.id)
             expected = jacobian[0].T @ force + jacobian[1].T @ moment
-            for role, torque in leg_torques(posture, *place, force[None], moment[None]).items():
+            for role, torque in leg_torques(leg, com[None], np.zeros(1), *place, force[None], moment[None]).items():
                 if not role.startswith("ankle"):
                     assert abs(torque[0]) == pytest.approx(abs(expected[joints[role].dofadr[0]]), abs=1e-4), role
 

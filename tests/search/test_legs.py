@@ -4,7 +4,7 @@ import pytest
 from tests.shipped_robots import OWN
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z, rotation_on_surface
-from toolkit.physics.leg import LIMITS, ReachMargins, leg_clearances, leg_posture
+from toolkit.physics.leg import LIMITS, ReachMargins, leg_clearances
 from toolkit.robot.loader import load_robot
 from toolkit.search.moves.legs import legs_of, reach, stances_violated
 from toolkit.search.moves.reasons import OF_LIMIT, Reason
@@ -28,7 +28,7 @@ def test_same_verdict_as_the_closed_form(name):
         offset = np.column_stack([rng.uniform(-0.4, 0.4, n), (1 - 2 * side) * rng.uniform(-0.1, 0.4, n), np.zeros(n)])
         position = np.einsum("nij,nj->ni", rotation_about_z(yaw), offset) + [0, 0, 1] * rng.uniform(-0.1, 0.3, (n, 1))
         leg = robot.legs[limb]
-        clearances = leg_clearances(leg, leg_posture(leg, com, yaw, position, rotation), margins)
+        clearances = leg_clearances(leg, com, yaw, position, rotation, margins)
         stacked = np.stack([clearances[limit.name] for limit in LIMITS])
         expected = np.where((stacked < 0).any(0), np.array(OF_LIMIT)[(stacked < 0).argmax(0)], 0)
         got = np.array([reach(legs, side, tuple(com[i]), yaw[i], position[i], rotation[i])[0] for i in range(n)])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple
+from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
+from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem, Weights
+
+_WEIGHTS = [field.name for field in fields(Weights)]
 
 
 class ProblemArrays(NamedTuple):
@@ -58,7 +60,7 @@ class ProblemArrays(NamedTuple):
             "active": _plain(p.active, bool),
             "min_height": float(p.min_height),
             "final_at_rest": bool(p.final_at_rest),
-            "weights": np.array(astuple(p.weights), float),
+            "weights": np.array([getattr(p.weights, name) for name in _WEIGHTS]),
             "friction_margin": float(p.margins.friction),
             "yaw_margin": float(p.margins.yaw),
             "landing_limb": int(p.landing_limb),

@@ -15,7 +15,7 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
-from toolkit.physics.leg import PLANNED, ReachMargins, leg_clearances, leg_posture, leg_torques
+from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins, leg_clearances, leg_torques
 from toolkit.robot.model import RobotModel
 
 CROSSING = (0.02, 0.95)  # part of a swing in which the foot moves horizontally from contact to contact
@@ -70,27 +70,6 @@ class BodyResiduals:
         return name, int(knot), Limb(int(limb))
 
 
-def knot_contacts(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Contacts that must be in reach at each knot: those of the steps that touch it, and a landing at the last.
-
-    Returns:
-        (n,) knots, (n,) limbs, (n, 3) positions and (n, 3, 3) rotations, each contact once.
-    """
-    n = problem.steps
-    step, limb = np.nonzero(problem.active)
-    first = np.ones(len(step), bool)
-    later = step > 0
-    first[later] = ~problem.active[step[later] - 1, limb[later]]
-    knot = np.concatenate([step + 1, step[first]])  # each contact at the end of its steps, and where it begins
-    at, limb = np.concatenate([step, step[first]]), np.concatenate([limb, limb[first]])
-    position, rotation = problem.position[at, limb], problem.rotation[at, limb]
-    if problem.landing_position is not None and problem.landing_rotation is not None:
-        knot, limb = np.append(knot, n), np.append(limb, problem.landing_limb)
-        position = np.concatenate([position, problem.landing_position[None]])
-        rotation = np.concatenate([rotation, problem.landing_rotation[None]])
-    return knot, limb, position, rotation
-
-
 def swing_ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Where the ankle of a foot in the air is, on a smooth path from the contact it left to the one it will make.
 
@@ -139,34 +118,27 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
     p, n = motion.solved, motion.problem.steps
     violation: dict[str, np.ndarray] = {}
 
-    def enter(name: str, at: np.ndarray, limb: np.ndarray | int, value: np.ndarray) -> None:
+    def enter(name: str, at: np.ndarray, limb: np.ndarray, value: np.ndarray) -> None:
         table = violation.setdefault(name, np.full((n + 1, 4), -np.inf))
-        flat = np.ravel_multi_index((at, np.broadcast_to(limb, at.shape)), table.shape)
-        np.maximum.at(table.reshape(-1), flat, np.where(np.isnan(value), np.inf, value))
+        np.maximum.at(table, (at, limb), np.where(np.isnan(value), np.inf, value))
 
-    knots, limbs, positions, rotations = knot_contacts(p)
+    knots, limbs, positions, _ = p.knot_contacts
+    violation |= _posture_violations(p, motion, robot, margins)
     swing_knots, swing_delays, swing_limbs, swing_tips, _ = swing_ankles(p)
     base = rotation_about_z(p.yaw)
-    for limb in FEET:
-        leg, here = robot.legs[limb], limbs == limb
-        if here.any():
-            at = knots[here]
-            posture = leg_posture(leg, motion.com[at], p.yaw[at], positions[here], rotations[here])
-            clearances = leg_clearances(leg, posture, margins)
-            for limit in PLANNED:
-                enter(limit.name, at, limb, -clearances[limit.name])
-        at, later = swing_knots[swing_limbs == limb], swing_delays[swing_limbs == limb, None]
-        com = motion.com[at] + later * motion.linear_momentum[at] / p.mass
-        hip = com + base[at] @ leg.hip_in_com
-        length = np.linalg.norm(hip - swing_tips[swing_limbs == limb], axis=-1)
-        enter("swing leg length", at, limb, length - leg.max_length + margins.length)
-        _enter_torques(motion, robot, limb, margins.torque, enter)
+    com = motion.com[swing_knots] + swing_delays[:, None] * motion.linear_momentum[swing_knots] / p.mass
+    hips = np.array([robot.legs[limb].hip_in_com for limb in FEET])
+    longest = np.array([robot.legs[limb].max_length for limb in FEET])
+    hip = com + (base[swing_knots] @ hips[swing_limbs, :, None])[..., 0]
+    length = np.linalg.norm(hip - swing_tips, axis=-1)
+    enter("swing leg length", swing_knots, swing_limbs, length - longest[swing_limbs] + margins.length)
+    violation |= _torque_violations(p, motion, robot, margins.torque)
     for limb, arm in robot.arms.items():
         here = limbs == limb
         shoulder = motion.com[knots[here]] + base[knots[here]] @ arm.shoulder_in_com
         length = np.linalg.norm(shoulder - positions[here], axis=-1)
         outside = np.maximum(arm.min_reach - length, length - arm.max_reach) + margins.length
-        enter("arm reach", knots[here], limb, outside)
+        enter("arm reach", knots[here], limbs[here], outside)
     floor, foot = lowest_foot(p)
     enter("CoM height", np.arange(n + 1), foot, floor + p.min_height + margins.height - motion.com[:, 2])
     if p.room is not None:
@@ -174,9 +146,41 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
     return BodyResiduals(violation)
 
 
+def _posture_violations(
+    p: CentroidalProblem, motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins
+) -> dict[str, np.ndarray]:
+    """By how much the postures of the legs in contact exceed their limits, as in `BodyResiduals`."""
+    knots, limbs, positions, rotations = p.knot_contacts
+    table = np.full((len(PLANNED), p.steps + 1, 4), -np.inf)
+    for limb in FEET:
+        leg, here = robot.legs[limb], limbs == limb
+        at = knots[here]
+        clearances = leg_clearances(leg, motion.com[at], p.yaw[at], positions[here], rotations[here], margins)
+        table[:, at, limb] = [-clearances[limit.name] for limit in PLANNED]
+    return dict(zip((limit.name for limit in PLANNED), np.where(np.isnan(table), np.inf, table), strict=True))
+
+
+def _torque_violations(
+    p: CentroidalProblem, motion: CentroidalMotion, robot: RobotModel, part: float
+) -> dict[str, np.ndarray]:
+    """How far the torques of legs in the middle of each step exceed `part` of their limits, as in `BodyResiduals`."""
+    table = np.full((len(TORQUE_ROLES), p.steps + 1, 4), -np.inf)
+    for limb in FEET:
+        leg, step = robot.legs[limb], np.flatnonzero(p.active[:, limb])
+        sole, rotation, force = p.position[step, limb], p.rotation[step, limb], motion.force[step, limb]
+        arm = np.einsum("nij,nj->ni", rotation[:, :, :2], motion.cop[step, limb])
+        moment = np.cross(arm, force) + motion.yaw_torque[step, limb, None] * rotation[:, :, 2]
+        yaw = (p.yaw[step] + p.yaw[step + 1]) / 2
+        middle = motion.com[step] + p.dt[step, None] / 2 * motion.linear_momentum[step] / p.mass
+        torques = leg_torques(leg, middle, yaw, sole, rotation, force, moment)
+        table[:, step, limb] = [np.abs(torques[role]) / leg.torques[role] - part for role in TORQUE_ROLES]
+    names = (role.replace("_", " ") + " torque" for role in TORQUE_ROLES)
+    return dict(zip(names, np.where(np.isnan(table), np.inf, table), strict=True))
+
+
 def lowest_foot(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
     """(N + 1,) m height of the lowest foot in contact around each knot, and (N + 1,) which foot; -inf without one."""
-    knots, limbs, positions, _ = knot_contacts(problem)
+    knots, limbs, positions, _ = problem.knot_contacts
     height = np.full((problem.steps + 1, 2), np.inf)
     feet = limbs < 2
     np.minimum.at(height, (knots[feet], limbs[feet]), positions[feet, 2])
@@ -186,7 +190,7 @@ def lowest_foot(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
 
 def mean_feet(problem: CentroidalProblem) -> np.ndarray:
     """(N + 1, 3) m; mean of the feet in contact around each knot; zero without one."""
-    knots, limbs, positions, _ = knot_contacts(problem)
+    knots, limbs, positions, _ = problem.knot_contacts
     feet = limbs < 2
     total, count = np.zeros((problem.steps + 1, 3)), np.zeros(problem.steps + 1)
     np.add.at(total, knots[feet], positions[feet])
@@ -204,19 +208,3 @@ def rough_com(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
     window = np.hanning(2 * width + 3)[1:-1]
     com = np.stack([np.convolve(padded[:, i], window / window.sum(), "valid") for i in range(3)], 1)
     return com, np.vstack([np.diff(com, axis=0) / p.dt[:, None], np.zeros(3)])
-
-
-def _enter_torques(motion: CentroidalMotion, robot: RobotModel, limb: Limb, part: float, enter) -> None:
-    """Enter how far the torques of a leg in the middle of each step exceed `part` of their limits."""
-    p, leg = motion.solved, robot.legs[limb]
-    step = np.flatnonzero(p.active[:, limb])
-    if not len(step):
-        return
-    sole, rotation, force = p.position[step, limb], p.rotation[step, limb], motion.force[step, limb]
-    arm = np.einsum("nij,nj->ni", rotation[:, :, :2], motion.cop[step, limb])
-    moment = np.cross(arm, force) + motion.yaw_torque[step, limb, None] * rotation[:, :, 2]
-    yaw = (p.yaw[step] + p.yaw[step + 1]) / 2
-    middle = motion.com[step] + p.dt[step, None] / 2 * motion.linear_momentum[step] / p.mass
-    posture = leg_posture(leg, middle, yaw, sole, rotation)
-    for role, torque in leg_torques(posture, sole, rotation, force, moment).items():
-        enter(role.replace("_", " ") + " torque", step, limb, np.abs(torque) / leg.torques[role] - part)

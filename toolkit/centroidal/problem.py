@@ -19,6 +19,7 @@ by the weight, torques are not.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -172,6 +173,25 @@ class CentroidalProblem:
     def steps(self) -> int:
         """Number of intervals N."""
         return len(self.dt)
+
+    @cached_property
+    def knot_contacts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Contacts that must be in reach at each knot: those of the steps that touch it, and a landing at the last.
+
+        They are (n,) knots, (n,) limbs, (n, 3) positions and (n, 3, 3) rotations, each contact once.
+        """
+        step, limb = np.nonzero(self.active)
+        first = np.ones(len(step), bool)
+        later = step > 0
+        first[later] = ~self.active[step[later] - 1, limb[later]]
+        knot = np.concatenate([step + 1, step[first]])  # each contact at the end of its steps, and where it begins
+        at, limb = np.concatenate([step, step[first]]), np.concatenate([limb, limb[first]])
+        position, rotation = self.position[at, limb], self.rotation[at, limb]
+        if self.landing_position is not None and self.landing_rotation is not None:
+            knot, limb = np.append(knot, self.steps), np.append(limb, self.landing_limb)
+            position = np.concatenate([position, self.landing_position[None]])
+            rotation = np.concatenate([rotation, self.landing_rotation[None]])
+        return knot, limb, position, rotation
 
     @property
     def reduced_half_size(self) -> np.ndarray:

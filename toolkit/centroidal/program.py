@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolkit.centroidal.body import BodyMargins, knot_contacts, lowest_foot, mean_feet, rough_com, swing_ankles
+from toolkit.centroidal.body import BodyMargins, lowest_foot, mean_feet, rough_com, swing_ankles
 from toolkit.centroidal.leg_momentum import ground_share, leg_spin
 from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalProblem, ComRoom, Margins
 from toolkit.centroidal.stages.blocks import Block
@@ -242,7 +242,6 @@ class Program:
         self._heading = rotation_about_z(problem.yaw)
         self._middle_heading = rotation_about_z((problem.yaw[:-1] + problem.yaw[1:]) / 2)
         self._weight = problem.mass * STANDARD_GRAVITY
-        self._knot_contacts = knot_contacts(problem)
         self.steps = self._steps()
         self.prices = self._prices()
         self.blocks = Blocks(
@@ -344,7 +343,7 @@ class Program:
 
     def _legs(self) -> Block:
         """Limits of stance legs at the knots."""
-        knots, limbs, positions, rotations = self._knot_contacts
+        knots, limbs, positions, rotations = self.problem.knot_contacts
         parts = []
         for limb in FEET:
             leg = self.robot.legs[limb]
@@ -382,7 +381,7 @@ class Program:
             root = (self._heading @ leg.hip_in_com)[knots[here]]
             span = 0.0, leg.max_length
             parts.append(self._distance(knots[here], delays[here], root, tips[here], span, limb, tangents[here]))
-        knots, limbs, tips, _ = self._knot_contacts
+        knots, limbs, tips, _ = self.problem.knot_contacts
         for limb, arm in self.robot.arms.items():
             here = limbs == limb
             root, span = (self._heading @ arm.shoulder_in_com)[knots[here]], (arm.min_reach, arm.max_reach)

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from toolkit.compiled import law
+from toolkit.compiled import compiled, law
 from toolkit.robot.model import HipJoints, LegGeometry
 
 _STRAIGHT = 0.9999  # largest |cosine| or |sine| whose angle is taken, so that derivatives stay finite
@@ -108,6 +108,9 @@ class LegPosture(NamedTuple):
     hip_point: tuple
     knee_point: tuple
     ankle_point: tuple
+
+
+_LIMITED = [LegPosture._fields.index(limit.quantity) for limit in LIMITS]  # field of each limit's quantity
 
 
 @law
@@ -357,23 +360,68 @@ def leg_posture(
     return posture_between(hip, ankle, r, heading, leg.thigh, leg.shin, leg.hips)
 
 
-def leg_clearances(leg: LegGeometry, posture: LegPosture, margins: ReachMargins) -> dict[str, np.ndarray]:
+def leg_clearances(
+    leg: LegGeometry,
+    com: np.ndarray,
+    yaw: np.ndarray,
+    position: np.ndarray,
+    rotation: np.ndarray,
+    margins: ReachMargins,
+) -> dict[str, np.ndarray]:
     """Distance of n postures of a leg to each of its limits less its margin; negative where exceeded.
+
+    The first arguments are those of `leg_posture`.
 
     Returns:
         Name of the limit -> (n,) m or rad: the smaller distance to the two ends of the range.
     """
-    clearances = {}
-    for limit in LIMITS:
-        lower, upper = limit.range_of(leg)
-        value = getattr(posture, limit.quantity)
-        clearances[limit.name] = np.minimum(value - lower, upper - value) - getattr(margins, limit.margin)
-    return clearances
+    value = _quantities(leg.numbers, com, yaw, position, rotation)[:, _LIMITED]
+    lower, upper = np.array([limit.range_of(leg) for limit in LIMITS]).T
+    taken = [getattr(margins, limit.margin) for limit in LIMITS]
+    clearance = np.minimum(value - lower, upper - value) - taken
+    return dict(zip((limit.name for limit in LIMITS), clearance.T, strict=True))
 
 
 def leg_torques(
-    posture: LegPosture, sole: np.ndarray, rotation: np.ndarray, force: np.ndarray, moment: np.ndarray
+    leg: LegGeometry,
+    com: np.ndarray,
+    yaw: np.ndarray,
+    sole: np.ndarray,
+    rotation: np.ndarray,
+    force: np.ndarray,
+    moment: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """Role -> (n,) N m of n stance legs; the arguments are those of `joint_torques` with a first axis of n."""
-    torques = joint_torques(posture, sole.T, np.moveaxis(rotation, 0, -1), force.T, moment.T)
-    return dict(zip(TORQUE_ROLES, torques, strict=True))
+    """Role -> (n,) N m of n stance legs; the last arguments are those of `joint_torques` with a first axis of n."""
+    torques = _torques(leg.numbers, com, yaw, sole, rotation, force, moment)
+    return dict(zip(TORQUE_ROLES, torques.T, strict=True))
+
+
+@compiled
+def _posture(leg, com, yaw, position, rotation):
+    """Posture of a leg with the `numbers` of its geometry."""
+    heading = (np.cos(yaw), np.sin(yaw))
+    hip, ankle = hip_at(com, heading, leg[:3]), ankle_at(position, rotation, leg[3:6])
+    return posture_between(hip, ankle, rotation, heading, leg[6], leg[7], hip_joints(leg, 8))
+
+
+@compiled(kept=True, allocates=True)
+def _quantities(leg, com, yaw, position, rotation):
+    """(n, 7) scalar fields of the postures of a leg; arrays as in `leg_posture`."""
+    found = np.empty((len(com), 7))
+    for row in range(len(com)):
+        values = quantities(_posture(leg, com[row], yaw[row], position[row], rotation[row]))
+        for k in range(7):
+            found[row, k] = values[k]
+    return found
+
+
+@compiled(kept=True, allocates=True)
+def _torques(leg, com, yaw, sole, rotation, force, moment):
+    """(n, 6) N m in the order of `TORQUE_ROLES`; arrays as in `leg_torques`."""
+    found = np.empty((len(com), 6))
+    for row in range(len(com)):
+        posture = _posture(leg, com[row], yaw[row], sole[row], rotation[row])
+        torques = joint_torques(posture, sole[row], rotation[row], force[row], moment[row])
+        for k in range(6):
+            found[row, k] = torques[k]
+    return found

@@ -98,6 +98,11 @@ class LegGeometry:
     torques: dict[str, float]
     hips: HipJoints = HipJoints()
 
+    @cached_property
+    def numbers(self) -> np.ndarray:
+        """(16,) for compiled functions: hip, ankle, lengths of thigh and shin, and the numbers of the `HipJoints`."""
+        return np.array([*self.hip_in_com, *self.ankle_in_sole, self.thigh, self.shin, *self.hips.numbers])
+
 
 class LegMass(NamedTuple):
     """How mass lies along a leg, from hip centre to ankle centre, in parts of the robot's mass; the mean of both legs.
@@ -199,7 +204,7 @@ class RobotModel:
             sizes[limb] = model.bearing
         return sizes
 
-    @property
+    @cached_property
     def scale(self) -> Scale:
         """Factors on lengths, times and forces that are written for a body of the usual size."""
         return Scale.of(float(np.mean([leg.thigh + leg.shin for leg in self.legs.values()])), self.mass)
