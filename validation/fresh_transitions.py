@@ -16,6 +16,7 @@ from toolkit.learning.jobs import executor
 from toolkit.learning.samples import Samples
 from toolkit.robot.model import RobotModel
 
+_LABELS = 0.6  # labels to ask for per transition of a test set: most categories get several times what is asked for
 DEFAULT, ALL = "1 s + 1 s, friction 0.5", "all timings and frictions"
 
 
@@ -33,7 +34,7 @@ def fresh(folder: Path, robot: RobotModel, *, count: int, seed: int, workers: in
         robot=robot.name,
         robots=str(robot.folder.parent.resolve()),
         seed=seed,
-        samples_per_category=2 * count,
+        samples_per_category=round(_LABELS * count),
         paper_share=0.5,  # the paper's timing in as many transitions as the tables need
         planned_share=0.2,
         own_share=0.15,
