@@ -15,7 +15,7 @@ from toolkit.robot.model import RobotModel
 
 
 class OptimiserEvaluator(TransitionEvaluator):
-    """Solves the centroidal problem of every transition, which takes about five milliseconds each.
+    """Solves the centroidal problem of every transition, which takes about four milliseconds each.
 
     Args:
         robot: The robot.
