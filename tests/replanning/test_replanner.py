@@ -1,15 +1,18 @@
 """Replanning: the program about a plan, and runs with it."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from toolkit.centroidal.problem import STANDARD_GRAVITY as G
+from toolkit.centroidal.problem import Margins
 from toolkit.control.corrector import Cones
 from toolkit.control.sampled_plan import sample_reference
 from toolkit.execution.config import ExecutionConfig
 from toolkit.execution.disturbance import Disturbance
+from toolkit.execution.run import execute
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.physics.wrench import sole_rows
 from toolkit.replanning.nominal import HORIZON, Nominal
@@ -209,3 +212,10 @@ def test_an_answer_that_fails_is_counted_and_the_last_goes_on(walking, monkeypat
     run = walking.run(config=ExecutionConfig(disturbance=Disturbance(push=60.0, push_time=0.3, push_direction=1.5)))
     assert run.replanning.replan_failures == run.replanning.replan_departures > 0
     assert not run.fell
+
+
+def test_a_plan_that_uses_all_friction_is_replanned_too(walking):
+    motion = replace(walking.motion, kept=Margins(friction=0.97))
+    push = Disturbance(push=60.0, push_time=0.3, push_direction=1.5)
+    run = execute(replace(walking.whole, motion=motion), config=ExecutionConfig(disturbance=push))
+    assert not run.fell and run.replanning.replan_departures > 0
