@@ -11,7 +11,6 @@ from toolkit.centroidal.intervals import intervals
 from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.prediction.networks import NetworkEvaluator, load_networks
-from toolkit.prediction.optimiser import OptimiserEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.reader import StateReader
@@ -51,7 +50,7 @@ class Judge:
 
     def __init__(self, robot: RobotModel, world: World):
         self._robot, self._world = robot, world
-        self._networks = NetworkEvaluator(load_networks(robot), world.goal, OptimiserEvaluator(robot))
+        self._networks = NetworkEvaluator(load_networks(robot), world.goal)
 
     def __call__(self, sequence: ContactSequence, plan: MotionPlan) -> Judgement:
         """Judge the transitions one after the other, each from the state that the one before it is predicted to leave.

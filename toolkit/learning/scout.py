@@ -27,7 +27,7 @@ class Scout(TransitionEvaluator):
 
     def __init__(self, judge: TransitionEvaluator, factors: np.ndarray, noise: float, rng: np.random.Generator):
         self._judge, self._factors, self._noise, self._rng = judge, factors, noise, rng
-        self.costly, self.rejection, self.stand_in = judge.costly, judge.rejection, judge.stand_in
+        self.costly, self.rejection = judge.costly, judge.rejection
         self._asked: dict[bytes, Sequence[ContactTransition]] = {}
         self._touched: dict[bytes, Sequence[ContactTransition]] = {}
 

@@ -68,8 +68,7 @@ def make_planner(
     if kind == "kinematic":
         config = replace(config, one_timing=True, cost=replace(config.cost, time=0.0, pace=0.0))
         return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
-    optimiser = OptimiserEvaluator(robot)
-    judge = NetworkEvaluator(load_networks(robot), world.goal, optimiser) if kind == "learned" else optimiser
+    judge = NetworkEvaluator(load_networks(robot), world.goal) if kind == "learned" else OptimiserEvaluator(robot)
     motions, room = PipelineConfig().motions(robot.scale), BodyRoom(robot, world)  # as a run plans them by default
     finish = partial(plan_motion, robot, world, config=motions, surroundings=room)
     return ContactPlanner(robot, world, judge, config, finish)

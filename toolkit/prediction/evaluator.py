@@ -37,12 +37,10 @@ class TransitionEvaluator(ABC):
     Attributes:
         costly: Whether a search should ask about one transition at a time, since each takes some milliseconds.
         rejection: What it means that a transition is infeasible, for messages.
-        stand_in: The judge of what this one was not trained for; None where there is no such judge.
     """
 
     costly: bool = False
     rejection: str = "dynamics"
-    stand_in: TransitionEvaluator | None = None
 
     @abstractmethod
     def evaluate(

@@ -53,9 +53,11 @@ def digest(folder: Path) -> str:
 
 @dataclass(frozen=True)
 class NetworkEvaluator(TransitionEvaluator):
-    """Judges by networks; hands transitions with less time or friction than in the training to another judge.
+    """Judges by networks, also beyond their training.
 
-    Those with more are judged as with the most of the training.
+    More time or friction than in the training is judged as the most of it. Of less they can only guess, and the
+    optimisation of a sequence on arrival has the last word. A search finds more that way than with the optimiser as
+    judge, which takes a hundred times as long.
 
     What a transition costs whose limb lifts off at once depends on the pace of what follows, which the networks are not
     told. A search that may choose between such transitions and calm ones would prefer them where they are understated.
@@ -66,13 +68,11 @@ class NetworkEvaluator(TransitionEvaluator):
     Attributes:
         networks: Networks by category.
         goal: Where the sequences lead.
-        stand_in: Judges what is quicker or more slippery than the training; None: the networks judge this as well.
         hasty: Factor on the predicted objective of transitions whose limb lifts off at once.
     """
 
     networks: dict[Category, TransitionNetwork]
     goal: Goal
-    stand_in: TransitionEvaluator | None = None
     hasty: float = _HASTY_COST
 
     def evaluate(
@@ -99,17 +99,7 @@ class NetworkEvaluator(TransitionEvaluator):
             frame, features = encode(stance, com, com_velocity, same)
             if not np.isfinite(features).all():
                 raise NetworkError(f"a query of category {int(category)} holds NaN or infinite values")
-            inside = network.knows(features)
-            rows_out = rows[~inside]
-            if len(rows_out):
-                untrained += len(rows_out)
-                if self.stand_in is not None:
-                    batch = self.stand_in.evaluate(stance, com, com_velocity, all_rows.select(rows_out))
-                    feasible[rows_out], objective[rows_out] = batch.feasible, batch.objective
-                    end_com[rows_out], end_velocity[rows_out] = batch.com, batch.com_velocity
-                    rows, features = rows[inside], features[inside]
-                    if not len(rows):
-                        continue
+            untrained += int((~network.knows(features)).sum())
             features = network.within(features)
             accepted = network.feasible(features)
             feasible[rows] = accepted

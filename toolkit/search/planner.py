@@ -39,7 +39,8 @@ from toolkit.world.world import World
 
 _STRIKES = 2  # failures of the whole sequence in like transitions after which the search avoids them
 _UNTRAINED = (
-    "times or friction below what the networks were trained for; the optimiser judged there instead, which is slower"
+    "times or friction below what the networks were trained for, where they can only guess; what they accept wrongly "
+    "is found out when a sequence is optimised"
 )
 
 
@@ -127,8 +128,11 @@ class ContactPlanner:
         heuristic_seconds = time.perf_counter() - began
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
         tally, timings = Tally(), self.timings(calmer, slides=way.slides)
-        suited, scale = self._suited(start, com, timings, tally), self.robot.scale.length
-        strategy = strategy_of(self.config, suited, way.length, slides=way.slides, paced=self.paced, scale=scale)
+        self._warm_up(start, com, timings)
+        scale = self.robot.scale.length
+        strategy = strategy_of(
+            self.config, self._evaluator, way.length, slides=way.slides, paced=self.paced, scale=scale
+        )
         blame = Blame(exclusions, _STRIKES, scale=scale)
         parts = self._parts(way, strategy, timings, tally, blame.exclusions, palms, time.perf_counter() + time_limit)
         state = parts.reader.at_rest(start, com)
@@ -152,18 +156,10 @@ class ContactPlanner:
             screen=parts.screen,
         )
 
-    def _suited(self, start: Stance, com: np.ndarray, timings: tuple[Timing, ...], tally: Tally) -> TransitionEvaluator:
-        """The evaluator for the timings: its stand-in where it was trained for none of them.
-
-        All evaluators are asked here once, so that what they compile or load at first takes no time of the search.
-        """
-        still = [ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], timing) for timing in timings]
-        untrained = self._evaluator.evaluate(start, com, np.zeros(3), still).untrained
-        tally.untrained += untrained
-        stand_in = self._evaluator.stand_in
-        if stand_in is not None:
-            stand_in.evaluate(start, com, np.zeros(3), still[:1])
-        return stand_in if stand_in is not None and untrained == len(still) else self._evaluator
+    def _warm_up(self, start: Stance, com: np.ndarray, timings: tuple[Timing, ...]) -> None:
+        """Ask the evaluator once, so that what it compiles or loads at first takes no time of the search."""
+        still = [ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], timing) for timing in timings[:1]]
+        self._evaluator.evaluate(start, com, np.zeros(3), still)
 
     def _parts(
         self,

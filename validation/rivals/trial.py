@@ -159,7 +159,7 @@ class _Arena:
 def judge_of(robot: RobotModel, world: World, planner: str) -> TransitionEvaluator:
     """The judge of transitions of a kind of planner, as the pipeline makes it."""
     if planner == "learned":
-        return NetworkEvaluator(load_networks(robot), world.goal, OptimiserEvaluator(robot))
+        return NetworkEvaluator(load_networks(robot), world.goal)
     return OptimiserEvaluator(robot) if planner == "optimiser" else KinematicEvaluator(robot)
 
 
