@@ -116,14 +116,13 @@ def swing_ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np
 def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins = BodyMargins()) -> BodyResiduals:
     """How far a motion, feasible or not, exceeds the limits of the robot's legs and arms less the margins."""
     p, n = motion.solved, motion.problem.steps
-    violation: dict[str, np.ndarray] = {}
+    violation = _posture_violations(p, motion, robot, margins)
 
     def enter(name: str, at: np.ndarray, limb: np.ndarray, value: np.ndarray) -> None:
         table = violation.setdefault(name, np.full((n + 1, 4), -np.inf))
-        np.maximum.at(table, (at, limb), np.where(np.isnan(value), np.inf, value))
+        np.maximum.at(table, (at, limb), value)
 
     knots, limbs, positions, _ = p.knot_contacts
-    violation |= _posture_violations(p, motion, robot, margins)
     swing_knots, swing_delays, swing_limbs, swing_tips, _ = swing_ankles(p)
     base = rotation_about_z(p.yaw)
     com = motion.com[swing_knots] + swing_delays[:, None] * motion.linear_momentum[swing_knots] / p.mass
@@ -143,13 +142,13 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
     enter("CoM height", np.arange(n + 1), foot, floor + p.min_height + margins.height - motion.com[:, 2])
     if p.room is not None:
         enter("room of the body", p.room.knot, foot[p.room.knot], p.room.excess(motion.com))
-    return BodyResiduals(violation)
+    return BodyResiduals({name: np.where(np.isnan(table), np.inf, table) for name, table in violation.items()})
 
 
 def _posture_violations(
     p: CentroidalProblem, motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins
 ) -> dict[str, np.ndarray]:
-    """By how much the postures of the legs in contact exceed their limits, as in `BodyResiduals`."""
+    """By how much the postures of the legs in contact exceed their limits, as in `BodyResiduals`; nan if undefined."""
     knots, limbs, positions, rotations = p.knot_contacts
     table = np.full((len(PLANNED), p.steps + 1, 4), -np.inf)
     for limb in FEET:
@@ -157,13 +156,13 @@ def _posture_violations(
         at = knots[here]
         clearances = leg_clearances(leg, motion.com[at], p.yaw[at], positions[here], rotations[here], margins)
         table[:, at, limb] = [-clearances[limit.name] for limit in PLANNED]
-    return dict(zip((limit.name for limit in PLANNED), np.where(np.isnan(table), np.inf, table), strict=True))
+    return dict(zip((limit.name for limit in PLANNED), table, strict=True))
 
 
 def _torque_violations(
     p: CentroidalProblem, motion: CentroidalMotion, robot: RobotModel, part: float
 ) -> dict[str, np.ndarray]:
-    """How far the torques of legs in the middle of each step exceed `part` of their limits, as in `BodyResiduals`."""
+    """How far the torques of legs amid each step exceed `part` of their limits, as in `BodyResiduals`; or nan."""
     table = np.full((len(TORQUE_ROLES), p.steps + 1, 4), -np.inf)
     for limb in FEET:
         leg, step = robot.legs[limb], np.flatnonzero(p.active[:, limb])
@@ -175,7 +174,7 @@ def _torque_violations(
         torques = leg_torques(leg, middle, yaw, sole, rotation, force, moment)
         table[:, step, limb] = [np.abs(torques[role]) / leg.torques[role] - part for role in TORQUE_ROLES]
     names = (role.replace("_", " ") + " torque" for role in TORQUE_ROLES)
-    return dict(zip(names, np.where(np.isnan(table), np.inf, table), strict=True))
+    return dict(zip(names, table, strict=True))
 
 
 def lowest_foot(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:

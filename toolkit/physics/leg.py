@@ -110,7 +110,8 @@ class LegPosture(NamedTuple):
     ankle_point: tuple
 
 
-_LIMITED = [LegPosture._fields.index(limit.quantity) for limit in LIMITS]  # field of each limit's quantity
+LIMITED = tuple(LegPosture._fields.index(limit.quantity) for limit in LIMITS)
+"""Field of each limit's quantity."""
 
 
 @law
@@ -375,7 +376,7 @@ def leg_clearances(
     Returns:
         Name of the limit -> (n,) m or rad: the smaller distance to the two ends of the range.
     """
-    value = _quantities(leg.numbers, com, yaw, position, rotation)[:, _LIMITED]
+    value = _quantities(leg.numbers, com, yaw, position, rotation)[:, LIMITED]
     lower, upper = np.array([limit.range_of(leg) for limit in LIMITS]).T
     taken = [getattr(margins, limit.margin) for limit in LIMITS]
     clearance = np.minimum(value - lower, upper - value) - taken

@@ -9,8 +9,8 @@ import numpy as np
 from toolkit.compiled import compiled
 from toolkit.geometry.limb import FEET
 from toolkit.physics.leg import (
+    LIMITED,
     LIMITS,
-    LegPosture,
     ReachMargins,
     ankle_at,
     distance,
@@ -23,7 +23,6 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.moves.reasons import OF_LIMIT, Reason
 from toolkit.search.moves.shanks import legs_apart
 
-_FIELD = tuple(LegPosture._fields.index(limit.quantity) for limit in LIMITS)  # field of each limit's quantity
 _LENGTH = [limit.quantity for limit in LIMITS].index("length")
 _BARELY = 1e-6  # m; what a leg is bent more than at its greatest length, against rounding
 
@@ -55,7 +54,7 @@ def legs_of(robot: RobotModel, margins: ReachMargins) -> Legs:
     return Legs(
         hip=np.array([leg.hip_in_com for leg in legs]),
         ankle=np.array([leg.ankle_in_sole for leg in legs]),
-        links=np.array([[leg.thigh, leg.shin, *leg.hips.numbers] for leg in legs]).ravel(),
+        links=np.concatenate([leg.numbers[6:] for leg in legs]),
         ranges=np.array([[limit.range_of(leg) for limit in LIMITS] + inward for leg in legs]),
         toes=np.array([left[0] - right[1], left[1] - right[0]]),
     )
@@ -79,7 +78,7 @@ def reach(legs, side, com, yaw, position, rotation):
     points = (posture.hip_point, posture.knee_point, posture.ankle_point)
     values = quantities(posture)
     for k in range(len(OF_LIMIT)):
-        value = values[_FIELD[k]]
+        value = values[LIMITED[k]]
         if value < ranges[k, 0] or value > ranges[k, 1]:
             return OF_LIMIT[k], points
     return 0, points
