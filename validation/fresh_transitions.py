@@ -16,7 +16,7 @@ from toolkit.learning.jobs import executor
 from toolkit.learning.samples import Samples
 from toolkit.robot.model import RobotModel
 
-_LABELS = 0.75  # labels to ask for per transition of a test set: most categories get several times what is asked for
+_LABELS = 0.8  # labels to ask for per transition of a test set: most categories get several times what is asked for
 DEFAULT, ALL = "1 s + 1 s, friction 0.5", "all timings and frictions"
 
 
