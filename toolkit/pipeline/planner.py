@@ -13,6 +13,7 @@ from toolkit.centroidal.plan import plan_motion
 from toolkit.errors import PlanningError
 from toolkit.mjcf import warnings_refused
 from toolkit.pipeline.config import PipelineConfig
+from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.prediction.networks import NetworkEvaluator, load_networks
 from toolkit.prediction.optimiser import OptimiserEvaluator
@@ -48,6 +49,17 @@ def planner_kind(robot: RobotModel, kind: str) -> str:
     return "learned" if (robot.folder / "networks").is_dir() else "kinematic"
 
 
+def judge_of(robot: RobotModel, world: World, kind: str) -> TransitionEvaluator:
+    """The judge of transitions in the search of a planner whose kind is "learned", "optimiser" or "kinematic".
+
+    Raises:
+        NetworkError: `kind` is "learned" and the networks are missing or do not fit.
+    """
+    if kind == "learned":
+        return NetworkEvaluator(load_networks(robot), world.goal)
+    return OptimiserEvaluator(robot) if kind == "optimiser" else KinematicEvaluator(robot)
+
+
 @warnings_refused("the planner", PlanningError)
 def make_planner(
     robot: RobotModel, world: World, kind: str = "auto", config: PlannerConfig | None = None
@@ -65,10 +77,10 @@ def make_planner(
         from toolkit.search.quasi_static import quasi_static_planner
 
         return quasi_static_planner(robot, world, config)
+    judge = judge_of(robot, world, kind)
     if kind == "kinematic":
         config = replace(config, one_timing=True, cost=replace(config.cost, time=0.0, pace=0.0))
-        return ContactPlanner(robot, world, KinematicEvaluator(robot), config)
-    judge = NetworkEvaluator(load_networks(robot), world.goal) if kind == "learned" else OptimiserEvaluator(robot)
+        return ContactPlanner(robot, world, judge, config)
     motions, room = PipelineConfig().motions(robot.scale), BodyRoom(robot, world)  # as a run plans them by default
     finish = partial(plan_motion, robot, world, config=motions, surroundings=room)
     return ContactPlanner(robot, world, judge, config, finish)

@@ -12,10 +12,8 @@ import numpy as np
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
-from toolkit.prediction.evaluator import TransitionEvaluator
+from toolkit.pipeline.planner import judge_of, planner_kind
 from toolkit.prediction.kinematic import KinematicEvaluator
-from toolkit.prediction.networks import NetworkEvaluator, load_networks
-from toolkit.prediction.optimiser import OptimiserEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.planner import ContactPlanner
 from toolkit.world.world import World
@@ -147,20 +145,14 @@ class _Arena:
     @property
     def graph(self) -> ContactGraph:
         """The graph of the planner with its own judges."""
-        return contact_graph(self.planner, judge_of(self.robot, self.world, self.settings.planner))
+        kind = planner_kind(self.robot, self.settings.planner)
+        return contact_graph(self.planner, judge_of(self.robot, self.world, kind))
 
     @property
     def limits(self) -> Limits:
         """Those of our own search: seconds, and expansions where there is such a limit."""
         expansions = self.settings.planning.expansions
         return Limits(self.seconds, 10**9 if expansions is None else expansions)
-
-
-def judge_of(robot: RobotModel, world: World, planner: str) -> TransitionEvaluator:
-    """The judge of transitions of a kind of planner, as the pipeline makes it."""
-    if planner == "learned":
-        return NetworkEvaluator(load_networks(robot), world.goal)
-    return OptimiserEvaluator(robot) if planner == "optimiser" else KinematicEvaluator(robot)
 
 
 def _ours(arena: _Arena) -> Plan:
