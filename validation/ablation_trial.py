@@ -16,7 +16,7 @@ from toolkit.wholebody.plan import whole_body
 from toolkit.world.scene import compose_scene
 from toolkit.world.world import World
 from validation.cases import Case
-from validation.jobs import Record
+from validation.jobs import Record, reason_of
 from validation.options import TrialSettings
 from validation.run_trial import executed, robot_of
 from validation.searched import Searched, Tested, cheapest, favourite, search
@@ -115,7 +115,7 @@ def ablation_trial(settings: TrialSettings, case: Case, planner: str, effort: Ef
         while len(searches) < effort.rounds and _left(effort, searches):
             searches.append(search(settings, world, planner, [case.seed, len(searches)], truth))
     except PlanningError as error:
-        return record | {"found": False, "feasible": False, "passed": False, "reason": str(error)}
+        return record | {"found": False, "feasible": False, "passed": False, "reason": reason_of(error)}
     first = searches[0]
     chosen = dict(zip((RAW, BY_COUNT, BY_TIME), (favourite(first.tested), *spend(effort, searches)), strict=True))
     plans: dict[str, MotionPlan] = {}

@@ -12,7 +12,7 @@ from validation import goals, options
 from validation.cases import Case, make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
-from validation.jobs import Job, Record, run_jobs
+from validation.jobs import Job, Record, reason_of, run_jobs
 from validation.options import TrialSettings
 from validation.path_bounds import BoundCheck
 from validation.run_trial import robot_of
@@ -54,7 +54,8 @@ def budget_trial(settings: TrialSettings, case: Case, budgets: Sequence[int]) ->
             searched = search(with_expansions(settings, budget), world, settings.planner, [case.seed, 0], truth)
             check = BoundCheck(searched.planner)
         except PlanningError as error:
-            return record | {"found": False, "feasible": False, "passed": False, "reason": str(error), "budgets": {}}
+            record |= {"found": False, "feasible": False, "passed": False, "budgets": {}}
+            return record | {"reason": reason_of(error)}
         by_budget[str(budget)] = _described(searched)
         paths = [check(tested) for tested in searched.tested]
         violations, states = violations + sum(p.violations for p in paths), states + sum(len(p.h) for p in paths)

@@ -15,7 +15,7 @@ from validation.calibration_figures import PREDICTORS, world_figures
 from validation.cases import DRAWN, Case, make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
-from validation.jobs import Job, Record, run_jobs
+from validation.jobs import Job, Record, reason_of, run_jobs
 from validation.judged_again import CHAIN, Judge
 from validation.options import TrialSettings
 from validation.path_bounds import BoundCheck
@@ -74,7 +74,7 @@ def calibration_trial(settings: TrialSettings, case: Case, planner: str, search_
         searched = search(settings, world, planner, [case.seed, search_number], truth)
         bounds = BoundCheck(searched.planner)
     except PlanningError as error:
-        return record | {"found": False, "passed": False, "reason": str(error), "entries": []}
+        return record | {"found": False, "passed": False, "reason": reason_of(error), "entries": []}
     entries = []
     for tested in searched.tested:
         entry, plan = tested.record(), tested.outcome.plan

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import time
 import traceback
 from collections.abc import Callable, Sequence
@@ -17,6 +18,7 @@ from toolkit.report.console import progress_bar
 
 Record = dict[str, Any]
 _BATCH = 16  # trials of a process before a fresh one takes over: what it has freed stays with it, and looks like need
+_FOLDERS = re.compile(r"(?<![\w.])/(?:[^\s/:']+/)+")  # before the name of a file
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -72,8 +74,13 @@ def run_job(job: Job) -> Record:
     try:
         record = job.function(*job.arguments)
     except Exception as error:  # whatever it is, the trial has failed
-        record = failed_record(f"{type(error).__name__}: {' '.join(str(error).split())}", traceback.format_exc())
+        record = failed_record(f"{type(error).__name__}: {reason_of(error)}", traceback.format_exc())
     return {"name": job.name, **record, "load": load, "wall_seconds": time.perf_counter() - began}
+
+
+def reason_of(error: Exception) -> str:
+    """What an error says, on one line and without the folders of this machine."""
+    return _FOLDERS.sub("", " ".join(str(error).split()))
 
 
 def failed_record(reason: str, trace: str = "") -> Record:

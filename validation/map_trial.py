@@ -8,7 +8,7 @@ from typing import Any
 
 from toolkit import pipeline
 from toolkit.errors import PlanningError
-from validation.jobs import Record
+from validation.jobs import Record, reason_of
 from validation.map_families import Cell
 from validation.map_scale import world_of
 from validation.options import TrialSettings
@@ -39,7 +39,7 @@ def map_trial(settings: TrialSettings, cell: Cell) -> Record:
     try:
         result = pipeline.run(robot, world, make_planner(settings, world), config, log)
     except PlanningError as error:
-        reason = " ".join(str(error).split()).removeprefix(f"{world.path}: ")
+        reason = reason_of(error).removeprefix(f"{world.path.name}: ")
         if _PROOF in reason:
             return _record(cell, IMPOSSIBLE, "planning", reason)
         return _record(cell, FAILURES["start"], "start", reason)

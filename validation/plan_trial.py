@@ -22,6 +22,7 @@ from toolkit.search.moves.exclusion import Exclusion
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.search.result import SearchResult
 from validation.cases import Case
+from validation.jobs import reason_of
 from validation.machine import memory
 from validation.motion_figures import motion_figures
 from validation.options import TrialSettings
@@ -167,7 +168,7 @@ def plan_trial(settings: TrialSettings, case: Case, planner_kind: str, repeat: b
         planner = TimedPlanner(make_planner(settings, world, planner_kind))
         result = run(robot_of(settings.robot, settings.robots), world, planner, config, log)
     except ToolkitError as error:
-        return record | {"reason": " ".join(str(error).split())}
+        return record | {"reason": reason_of(error)}
     first, trial = planner.search_result, result.trial
     assert first is not None
     feasible, count = result.first_feasible, sum(candidate.feasible for candidate in result.candidates)
@@ -227,7 +228,7 @@ def growth_trial(settings: TrialSettings, case: Case, length: float, whole: bool
         planner = TimedPlanner(make_planner(settings, world, first_only=not whole))
         search = planner.search(np.random.default_rng(case.seed), limit)
     except ToolkitError as error:
-        return record | {"reason": " ".join(str(error).split())}
+        return record | {"reason": reason_of(error)}
     found = bool(search.solutions)
     late = search.seconds / limit - 1.0 if whole else None
     return record | planner.figures | {"found": found, "passed": found, "overtime": late, "reason": search.reason}

@@ -29,7 +29,7 @@ from toolkit.world.timing import Timing
 from toolkit.world.world import World
 from validation.ablation_trial import run_plan
 from validation.cases import Case, kind_of
-from validation.jobs import Record
+from validation.jobs import Record, reason_of
 from validation.motion_figures import motion_figures
 from validation.options import TrialSettings
 from validation.rivals.even_steps import even_steps
@@ -55,7 +55,7 @@ def pyramid_trial(settings: TrialSettings, case: Case, simulate: bool) -> Record
     try:
         sequence = contacts_of(settings, robot, world, case)
     except PlanningError as error:
-        return record | {"reason": str(error), "motions": {}}
+        return record | {"reason": reason_of(error), "motions": {}}
     if sequence is None:
         return record | {"reason": "no contact sequence found", "motions": {}}
     motions: dict[str, Any] = {}

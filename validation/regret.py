@@ -20,7 +20,7 @@ from validation.ablation import TIMING
 from validation.cases import Case, make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
-from validation.jobs import Job, Record, run_jobs
+from validation.jobs import Job, Record, reason_of, run_jobs
 from validation.options import TrialSettings
 from validation.run_trial import robot_of
 from validation.searched import Tested, cheapest, search
@@ -76,7 +76,7 @@ def regret_trial(settings: TrialSettings, case: Case, effort: Effort, known: Pat
                 searched = search(settings, world, planner, [case.seed, index], truth)
                 found += [(planner, tested) for tested in searched.tested if tested.outcome.feasible]
     except PlanningError as error:
-        return record | {"reason": str(error)}
+        return record | {"reason": reason_of(error)}
     chosen = cheapest(own.tested)
     if chosen is None:
         return record | {"stage": "dynamics", "reason": own.result.reason or "no sequence of the run is feasible"}

@@ -18,7 +18,7 @@ from toolkit.wholebody.plan import WholeBodyPlan
 from validation import goals, options
 from validation.cases import Case, make_cases
 from validation.goals import Goal
-from validation.jobs import Job, Record, run_jobs
+from validation.jobs import Job, Record, reason_of, run_jobs
 from validation.options import TrialSettings
 from validation.run_trial import held_within, keep_run, run_pipeline
 from validation.tables import (
@@ -73,7 +73,7 @@ def robustness_trial(settings: TrialSettings, case: Case, levels: Sequence[float
     try:
         result, log = run_pipeline(settings, case, world, PipelineConfig(execution=settings.execution))
     except ToolkitError as error:
-        return record | {"stage": "planning", "reason": " ".join(str(error).split())}
+        return record | {"stage": "planning", "reason": reason_of(error)}
     trial = result.trial
     if trial is None or not isinstance(trial.plan, WholeBodyPlan) or not trial.plan.trajectory.feasible:
         return record | {"stage": "planning", "reason": result.reason, "stages": log.entries}
@@ -104,7 +104,7 @@ def disturbed_run(
             rng=np.random.default_rng([case.seed, 1, index]),
         )
     except ToolkitError as error:
-        return {"survived": False, "held": False, "passed": False, "reason": " ".join(str(error).split())}
+        return {"survived": False, "held": False, "passed": False, "reason": reason_of(error)}
     reason = "" if execution.failure is None else execution.failure.reason
     survived = execution.completed and not execution.fell and execution.goal_reached
     run: dict[str, Any] = {

@@ -25,6 +25,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.planner import ContactPlanner
 from toolkit.world.world import World
 from validation.cases import Case
+from validation.jobs import reason_of
 from validation.options import TrialSettings
 
 WORLD_FILE = "world.xml"  # in a run's folder, to run it again
@@ -82,7 +83,7 @@ def execution_trial(settings: TrialSettings, case: Case) -> dict[str, Any]:
     try:
         result, log = run_pipeline(settings, case, world, pipeline.PipelineConfig(execution=settings.execution))
     except ToolkitError as error:
-        reason = " ".join(str(error).split())
+        reason = reason_of(error)
         folder = keep_failure(settings, case, world, reason)
         return record | {"stage": "planning", "reason": reason, "folder": folder}
     trial = result.trial

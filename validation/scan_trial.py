@@ -20,6 +20,7 @@ from toolkit.world.scene import compose_scene
 from toolkit.world.surface import Surface
 from toolkit.world.world import World
 from validation.cases import Case
+from validation.jobs import reason_of
 from validation.options import TrialSettings
 from validation.run_trial import executed, robot_of, run_pipeline
 from validation.virtual_scan import virtual_scan
@@ -56,7 +57,7 @@ def scan_trial(settings: TrialSettings, scanning: ScanSettings, case: Case) -> d
     try:
         made = made_of(world, read_scene([scan]), case.name)
     except ToolkitError as error:
-        return record | {"stage": "scan", "reason": " ".join(str(error).split())}
+        return record | {"stage": "scan", "reason": reason_of(error)}
     record |= {
         "scan_seconds": time.perf_counter() - began[0],
         "scan_processor_seconds": time.process_time() - began[1],
@@ -70,7 +71,7 @@ def scan_trial(settings: TrialSettings, scanning: ScanSettings, case: Case) -> d
     try:
         result, _ = run_pipeline(settings, case, made.world, config)
     except ToolkitError as error:
-        return record | {"stage": "planning", "reason": " ".join(str(error).split())}
+        return record | {"stage": "planning", "reason": reason_of(error)}
     record |= {"planned": result.passed, "tested": result.tested, "reason": result.reason}
     if not result.passed or result.trial is None or not isinstance(result.trial.plan, WholeBodyPlan):
         return record | {"stage": "planning"}

@@ -19,7 +19,7 @@ from validation.cases import DRAWN, Case, make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
 from validation.growth import exponent
-from validation.jobs import Job, Record, run_jobs
+from validation.jobs import Job, Record, reason_of, run_jobs
 from validation.options import TrialSettings
 from validation.plan_trial import WarmUp, warm_up
 from validation.random_contacts import sample_walk
@@ -55,7 +55,7 @@ def search_trial(settings: TrialSettings, case: Case) -> Record:
     try:
         found = make_planner(settings, world, planner).search(rng, settings.planning.time_limit)
     except PlanningError as error:
-        return record | {"reason": str(error)}
+        return record | {"reason": reason_of(error)}
     if not found.solutions:
         return record | {"reason": found.reason}
     sequence = found.solutions[int(rng.integers(len(found.solutions)))].sequence

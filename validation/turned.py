@@ -16,7 +16,7 @@ from validation import goals, options
 from validation.cases import Case, make_cases
 from validation.fresh_seeds import add_seed_option
 from validation.goals import Goal
-from validation.jobs import Job, Record, run_jobs
+from validation.jobs import Job, Record, reason_of, run_jobs
 from validation.map_worlds import anywhere
 from validation.options import TrialSettings
 from validation.run_trial import make_planner, robot_of
@@ -46,7 +46,7 @@ def turned_trial(settings: TrialSettings, case: Case, copy: int) -> Record:
         robot = robot_of(settings.robot, settings.robots)
         result = pipeline.run(robot, world, make_planner(settings, world), config)
     except PlanningError as error:
-        return record | {"stage": "planning", "reason": " ".join(str(error).split())}
+        return record | {"stage": "planning", "reason": reason_of(error)}
     cost = None if result.cost is None else result.cost.total
     return record | {"stage": result.stage, "reason": result.reason, "passed": result.passed, "cost": cost}
 

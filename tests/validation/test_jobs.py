@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from toolkit.errors import InputError
-from validation.jobs import Job, PoolOptions, run_jobs
+from validation.jobs import Job, PoolOptions, reason_of, run_jobs
 from validation.trial_file import TrialFile
 
 
@@ -35,6 +35,11 @@ def deadly(value: int) -> dict:
 
 def job(name: str, function=good) -> Job:
     return Job(name, function, (len(name),))
+
+
+def test_a_reason_names_files_without_their_folders():
+    error = ValueError("/home/me/runs/a-1.xml: too fast at 3 m/s,\n 1/2 of 'worlds/b.xml'; see /a/b c/d")
+    assert reason_of(error) == "a-1.xml: too fast at 3 m/s, 1/2 of 'worlds/b.xml'; see b c/d"
 
 
 def test_an_interrupted_experiment_goes_on_where_it_stopped(tmp_path):

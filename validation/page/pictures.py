@@ -13,7 +13,7 @@ from toolkit.report.pictures import strip
 from toolkit.report.top_view import draw_top_view
 from toolkit.world.loader import load_world
 from validation.cases import WORLDS
-from validation.jobs import Record
+from validation.jobs import Record, reason_of
 from validation.options import TrialSettings
 from validation.run_trial import make_planner, robot_of
 
@@ -77,7 +77,7 @@ def picture_trial(settings: TrialSettings, picture: Picture, folder: Path) -> Re
     try:
         result = pipeline.run(robot, world, make_planner(settings, world, picture.planner), config, pipeline.Observer())
     except PlanningError as error:
-        return record | {"reason": str(error)}
+        return record | {"reason": reason_of(error)}
     trial = result.trial
     if trial is None:
         return record | {"reason": result.reason}

@@ -19,7 +19,7 @@ from toolkit.search.planner import ContactPlanner
 from toolkit.world.world import World
 from validation.ablation_trial import run_plan
 from validation.cases import Case
-from validation.jobs import Record
+from validation.jobs import Record, reason_of
 from validation.options import TrialSettings
 from validation.rivals.best_first import Limits, a_star
 from validation.rivals.contact_graph import ContactGraph, contact_graph
@@ -102,7 +102,7 @@ def rival_trial(settings: TrialSettings, case: Case, rival: str | Mixed, seconds
         else:
             plan = _mixed(robot, world, planner, rival)
     except PlanningError as error:
-        return record | {"reason": str(error)}
+        return record | {"reason": reason_of(error)}
     share = min((time.process_time() - worked) / (time.perf_counter() - began), 1.0)
     record |= {"seconds": plan.seconds, "processor_seconds": share * plan.seconds, **plan.figures}
     if plan.sequence is None:
