@@ -108,7 +108,7 @@ def test_the_independent_check_agrees_with_the_laws(robot, feet, margins):
             total += STANDARD_GRAVITY * to_world @ w
             *motion[1][t, i], motion[2][t, i] = pressure(w, w[2])
             motion[0][t, i], motion[2][t, i] = weight * problem.rotation[t, i] @ w[:3], weight * motion[2][t, i]
-            x, y = problem.reduced_half_size[i]
+            x, y = problem.reduced_half_size[t, i]
             turning = margins.yaw * margins.friction * problem.friction[t, i]
             rows = [yaw_row(turning, x, y, *signs) for signs in SIGNS]
             worst["cop"] = max(worst["cop"], (np.array(pressure_rows(x, y)) @ w).max())

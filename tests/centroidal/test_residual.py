@@ -112,7 +112,7 @@ def test_margins_tighten_the_constraints(standing):
     tight = replace(shifted, problem=replace(p, margins=Margins(cop=(0.05, 0.0))))
     np.testing.assert_allclose(check(tight).cop, 0.02 / 2, rtol=1e-9)  # 2 cm outside, half the weight
     # At most half of a small patch is taken away.
-    np.testing.assert_allclose(replace(p, margins=Margins(cop=(0.08, 0.05))).reduced_half_size[0], [0.055, 0.0325])
+    np.testing.assert_allclose(replace(p, margins=Margins(cop=(0.08, 0.05))).reduced_half_size[0, 0], [0.055, 0.0325])
 
 
 def test_yaw_moment_at_its_bound(standing):
@@ -154,7 +154,7 @@ def test_the_objective_is_the_sum_of_its_terms(standing):
         cost += w.angular_momentum * motion.angular_momentum[t + 1] @ motion.angular_momentum[t + 1]
         for i in np.flatnonzero(p.active[t]):
             local = p.rotation[t, i].T @ motion.force[t, i] / weight
-            z = motion.cop[t, i] / (2 * p.half_size[i])
+            z = motion.cop[t, i] / (2 * p.half_size[t, i])
             cost += w.force * local @ local + w.lateral_force * local[:2] @ local[:2]
             cost += w.torque * motion.yaw_torque[t, i] ** 2 + w.cop * z @ z
         total += p.dt[t] / 0.2 * cost

@@ -62,7 +62,7 @@ def situation(walking, nominal, time, com=(0, 0, 0), velocity=(0, 0, 0), **optio
         earliest={},
         com_shift=np.zeros(3),
         displaced=True,
-        cones=Cones(0.85, 0.8, walking.robot.half_sizes - 0.02),
+        cones=Cones(0.85, 0.8, 0.02, 1.0),
     )
     return Situation(**(values | options))
 
@@ -131,14 +131,14 @@ def test_a_push_moves_the_landing_along(walking, nominal, problem):
 
 def test_wrenches_stay_in_the_cones_and_on_the_feet(walking, nominal, problem):
     """Also under a push that lets a swing end early. The polygon of the rows is made large enough to hold the cone."""
-    time, cones = mid_swing(nominal), Cones(0.85, 0.8, walking.robot.half_sizes - 0.02)
+    time, cones = mid_swing(nominal), Cones(0.85, 0.8, 0.02, 1.0)
     for push in ((0.1, 0.0, 0.0), (0.0, -0.3, 0.0), (0.0, 0.5, 0.0)):
         state = situation(walking, nominal, time, velocity=push, earliest={0: time + 0.1}, landing={0: np.inf})
         replan = problem.solve(state)
         assert np.isfinite(replan.wrench).all() and replan.wrench[:, :2, 2].sum(1).min() > 0.5
         friction = cones.friction * nominal.problem.friction[0, 0]
         for limb in FEET:
-            rows = sole_rows(friction / np.cos(np.pi / 24), cones.half_size[limb], cones.yaw)
+            rows = sole_rows(friction / np.cos(np.pi / 24), cones.within(walking.robot.half_sizes[limb]), cones.yaw)
             assert (replan.wrench[:, limb] @ rows.T).max() < 2e-3  # in weights, and in weights times 1 m
         lands = replan.ends.get(0, nominal.swings[0].end)
         middle = (replan.times[:-1] + replan.times[1:]) / 2

@@ -179,7 +179,7 @@ def make_run(steps: int = 4) -> MadeUpRun:
             force[step, contact.limb] = share * weight * contact.pose.normal
         com[step + 1] = np.mean([c.pose.position for c in phase.contacts if c.limb < 2], axis=0)
     com[:, 2] = 0.9
-    half_size = np.tile(HALF_SIZE, (4, 1))
+    half_size = np.tile(HALF_SIZE, (n, 4, 1))
     problem = CentroidalProblem(
         mass=robot.mass,
         dt=dt,

@@ -26,7 +26,7 @@ def standing() -> CentroidalMotion:
         position=np.zeros((n, 4, 3)),
         rotation=np.tile(np.eye(3), (n, 4, 1, 1)),
         friction=np.full((n, 4), 0.5),
-        half_size=np.tile([0.1, 0.05], (4, 1)),
+        half_size=np.tile([0.1, 0.05], (n, 4, 1)),
         max_normal_force=np.full(4, 1e4),
         yaw=np.zeros(n + 1),
         com=np.zeros(3),
@@ -140,7 +140,7 @@ def test_a_run_that_breaks_one_condition_does_not_hold(name, value):
 def test_centres_of_pressure_of_the_feet_alone_leave_palms_out():
     motion = standing()
     active, force, half = motion.problem.active.copy(), motion.force.copy(), motion.problem.half_size.copy()
-    active[:, 2], force[:, 2], half[2] = True, [0.0, 0.0, WEIGHT / 10], 0.01
+    active[:, 2], force[:, 2], half[:, 2] = True, [0.0, 0.0, WEIGHT / 10], 0.01
     held = motion_figures(replace(motion, force=force, problem=replace(motion.problem, active=active, half_size=half)))
     assert held.foot_cop_distance == pytest.approx(motion_figures(motion).cop_distance)
     assert held.cop_distance < held.foot_cop_distance

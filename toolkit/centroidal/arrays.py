@@ -16,7 +16,7 @@ class ProblemArrays(NamedTuple):
     """A `CentroidalProblem`, field by field, with its margins applied where that is possible.
 
     Attributes:
-        reduced_half_size: (4, 2) m; half extents with the CoP margin taken off.
+        reduced_half_size: (N, 4, 2) m; half extents with the CoP margin taken off.
         weights: (8,) in the order of `Weights`.
         friction_margin: Factor on the friction.
         yaw_margin: Factor of the yaw margin.

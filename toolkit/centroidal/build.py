@@ -155,20 +155,21 @@ def sequence_problem(
     return _problem(robot, config, arrays, dt, yaw, com, com_velocity, last, True, landing=None)
 
 
-def _contact_arrays(steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Empty `active`, `position`, `rotation` and `friction` of a problem."""
+def _contact_arrays(steps: int) -> tuple[np.ndarray, ...]:
+    """Empty `active`, `position`, `rotation` and `friction` of a problem, and the share of patches that bears."""
     rotation = np.zeros((steps, 4, 3, 3))
     rotation[:, :, (0, 1, 2), (0, 1, 2)] = 1.0
-    return np.zeros((steps, 4), bool), np.zeros((steps, 4, 3)), rotation, np.zeros((steps, 4))
+    return np.zeros((steps, 4), bool), np.zeros((steps, 4, 3)), rotation, np.zeros((steps, 4)), np.ones((steps, 4))
 
 
 def _put(arrays: tuple[np.ndarray, ...], contact: Contact, begin: int, end: int) -> None:
     """Enter a contact that holds in steps [begin, end); its place stays known afterwards."""
-    active, position, rotation, friction = arrays
+    active, position, rotation, friction, bearing = arrays
     active[begin:end, contact.limb] = True
     position[begin:, contact.limb] = contact.pose.position
     rotation[begin:, contact.limb] = contact.pose.rotation
     friction[begin:, contact.limb] = contact.friction
+    bearing[begin:, contact.limb] = contact.bearing
 
 
 def _problem(
@@ -220,7 +221,7 @@ def _problem(
         position=arrays[1],
         rotation=arrays[2],
         friction=arrays[3],
-        half_size=half_size,
+        half_size=arrays[4][..., None] * half_size,
         max_normal_force=force,
         yaw=yaw,
         com=com,

@@ -115,7 +115,7 @@ class CentroidalProblem:
         position: (N, 4, 3) m; centre of the patch. Where not active, it is the last known one or zero.
         rotation: (N, 4, 3, 3); world_from_contact, whose z axis is the surface's normal.
         friction: (N, 4); coefficient of the surface, without margins.
-        half_size: (4, 2) m; half extents of the patches, without margins.
+        half_size: (N, 4, 2) m; half extents of what bears of the patches, without margins.
         max_normal_force: (4,) N.
         yaw: (N + 1,) rad; assumed heading of the base at each knot: the mean of the feet in contact or just left.
         com: (3,) m; initial CoM.
@@ -195,7 +195,7 @@ class CentroidalProblem:
 
     @property
     def reduced_half_size(self) -> np.ndarray:
-        """(4, 2) m; half extents that bound the CoP and the yaw moment: the CoP margin taken off, at most half."""
+        """(N, 4, 2) m; half extents that bound the CoP and the yaw moment: the CoP margin taken off, at most half."""
         return self.margins.within(self.half_size)
 
     @property

@@ -327,7 +327,7 @@ class Program:
         squares[:, :4] = w.force, w.lateral_force, w.torque * self._weight**2, w.cop
         squares[:, 4], squares[:, 5] = reg.cop / usual**2, press
         weights = np.sqrt(SCALE * p.dt[step, None] / 0.2 * squares)
-        cop = (p.half_size - p.reduced_half_size)[limb]
+        cop = (p.half_size - p.reduced_half_size)[step, limb]
         friction = np.full(len(step), p.margins.friction)
         friction[foot] = wanted_friction(p, step[foot], limb[foot])
         yaw = np.full(len(step), p.margins.yaw)
@@ -338,7 +338,7 @@ class Program:
         least[:, 3] = np.maximum(LEAST.yaw, yaw)
         load, price = np.where(foot, 0.0, reg.palm_force), self.slack_price[step]
         mu = p.friction[step, limb]
-        parameters = np.column_stack([mu, p.half_size[limb], wanted, least, weights, load, price])
+        parameters = np.column_stack([mu, p.half_size[step, limb], wanted, least, weights, load, price])
         return contact_block(self.layout, p.active, parameters)
 
     def _legs(self) -> Block:

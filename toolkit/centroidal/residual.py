@@ -176,8 +176,8 @@ def evaluate(p, motion):
             lateral = local[0] ** 2 + local[1] ** 2
             cost += p.weights[4] * (lateral + local[2] ** 2) + p.weights[6] * lateral + p.weights[5] * tau**2
             for a in range(2):
-                if p.half_size[i, a] > 0.0:
-                    cost += p.weights[7] * (z[a] / (2.0 * p.half_size[i, a])) ** 2
+                if p.half_size[t, i, a] > 0.0:
+                    cost += p.weights[7] * (z[a] / (2.0 * p.half_size[t, i, a])) ** 2
         for a in range(3):
             acceleration[a] = total[a] / p.mass - (STANDARD_GRAVITY if a == 2 else 0.0)
             v = linear[t, a] / p.mass
@@ -227,7 +227,7 @@ def _beyond_cone(p, step, limb, force, cop, torque):
     """
     fx, fy, fz = force[0], force[1], force[2]
     mu = p.friction_margin * p.friction[step, limb]
-    x, y = p.reduced_half_size[limb, 0], p.reduced_half_size[limb, 1]
+    x, y = p.reduced_half_size[step, limb, 0], p.reduced_half_size[step, limb, 1]
     tau_x, tau_y = cop[1] * fz, -cop[0] * fz  # moment at the patch centre
     tau_z = torque + cop[0] * fy - cop[1] * fx
     turning = p.yaw_margin * mu

@@ -56,9 +56,8 @@ def _wider(motion: CentroidalMotion) -> list[Margins]:
     lateral = np.hypot(local[..., 0], local[..., 1]) - accepted
     friction = np.max(lateral / (np.maximum(p.friction, 1e-9) * normal), where=p.active, initial=wanted.friction)
     from_edge = p.half_size - np.abs(motion.cop) + accepted / normal[..., None]
-    kept = np.min(from_edge, axis=0, where=p.active[..., None], initial=np.inf)
-    less = kept < p.half_size - p.reduced_half_size
-    cop = np.min(kept, axis=0, where=less, initial=np.inf)
+    less = p.active[..., None] & (from_edge < p.half_size - p.reduced_half_size)
+    cop = np.min(from_edge, axis=(0, 1), where=less, initial=np.inf)
     friction, (cop_x, cop_y) = min(float(friction), 1.0), np.clip(cop, 0.0, wanted.cop).tolist()
     offers = []
     for part in np.linspace(0.0, 1.0, 6).tolist():
@@ -82,7 +81,7 @@ def _failure(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray, s
     p = motion.problem
     local = np.einsum("lji,lj->li", p.rotation[step], motion.force[step]) / (p.mass * -GRAVITY[2])
     friction = np.hypot(local[:, 0], local[:, 1]) - p.friction[step] * local[:, 2]
-    edge = (np.abs(motion.cop[step]) - p.half_size).max(-1) * local[:, 2]
+    edge = (np.abs(motion.cop[step]) - p.half_size[step]).max(-1) * local[:, 2]
     beyond = np.stack([friction, 5 / scale * edge])  # a sole is a fifth of a metre
     beyond = np.where(p.active[step], beyond, -np.inf)
     kind, worst = np.unravel_index(int(np.argmax(beyond)), beyond.shape)

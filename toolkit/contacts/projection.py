@@ -102,6 +102,7 @@ class Projector:
 
     Attributes:
         config: The settings for this robot.
+        bearing: (S,) share of a patch that bears on each surface.
     """
 
     def __init__(
@@ -115,6 +116,7 @@ class Projector:
         self.half_sizes = robot.half_sizes + self.config.margin
         self.room = robot.foot_room(self.config.margin)
         self.half_sizes[list(PALMS)] = robot.half_sizes[list(PALMS)] + self.config.palm_margin
+        self.bearing = np.array([surface.bearing for surface in surfaces])
         self.table = surface_table(surfaces, reach=float(np.linalg.norm(self.room)))
         self.offsets = shifts(self.config.shift, self.config.shift_step)
         self._model = model

@@ -157,7 +157,8 @@ class Controller:
             urgent: Cones(
                 min(1.0 + NESTING * (margins.friction - 1.0), MAX_FRICTION),
                 min(1.0 + NESTING * (margins.yaw - 1.0), MAX_YAW),
-                robot.bearings - shrink * np.minimum(margins.cop, robot.bearings / 2.0),
+                margins.cop,
+                shrink,
             )
             for urgent, shrink in ((False, NESTING), (True, URGENT_NESTING))
         }
@@ -228,9 +229,10 @@ class Controller:
         """Fill in dynamics, cones and boxes."""
         tracker = self.tracker
         friction, limits = self._reference.friction[index], self._limits[self._urgent]
+        half_size = limits.within(self._reference.half_size[index])
         qp.set_dynamics(self.dynamics, self._torque_limit)
         for limb in qp.limbs:
-            qp.set_cone(limb, friction[limb] * limits.friction, limits.half_size[limb], limits.yaw)
+            qp.set_cone(limb, friction[limb] * limits.friction, half_size[limb], limits.yaw)
             qp.set_normal_force(limb, tracker.min_force[limb], tracker.max_force[limb])
         self._box.update(qpos[7:], qvel[6:])
         qp.set_acceleration(self._box.lower, self._box.upper)

@@ -25,12 +25,18 @@ class Cones:
     Attributes:
         friction: factor on the friction.
         yaw: factor on the friction that may be used for the yaw moment.
-        half_size: (4, 2) m half extents of the patches within which the centre of pressure stays.
+        cop: m; wanted distance of the centre of pressure from the edge of what bears, along x and y.
+        part: what is kept of that distance, or of half of what bears where that is less.
     """
 
     friction: float
     yaw: float
-    half_size: np.ndarray
+    cop: float | tuple[float, float]
+    part: float
+
+    def within(self, half_size: np.ndarray) -> np.ndarray:
+        """(..., 2) m half extents within which the centre of pressure stays, of those that bear."""
+        return half_size - self.part * np.minimum(self.cop, half_size / 2.0)
 
 
 @dataclass

@@ -51,6 +51,7 @@ class Reference:
         authority: (C, 4) in [0, 1]; how binding a limb's pose is (0: it hangs free).
         in_contact: (C, 4) bool; the planned contacts.
         friction: (C, 4) of the contact that holds or that the limb moves to; 1 where there is none.
+        half_size: (C, 4, 2) m half extents of what bears of that contact's patch.
         wrench: (C, 4, 6) planned force and moment about the patch's centre, in the contact frame.
         swings: The planned moves in order of time.
     """
@@ -74,6 +75,7 @@ class Reference:
     authority: np.ndarray
     in_contact: np.ndarray
     friction: np.ndarray
+    half_size: np.ndarray
     wrench: np.ndarray
     swings: tuple[Swing, ...]
 
@@ -105,6 +107,7 @@ def sample_reference(times: np.ndarray, plan: WholeBodyPlan) -> Reference:
                 velocity[k, limb], acceleration[k, limb] = rates
                 authority[k, limb] = paths.authority(limb, float(time))
     swings = _swings(plan.sequence, plan.schedule)
+    friction, bearing = _ground(times, plan.sequence, swings)
     return Reference(
         times=times,
         com=com[:, 0],
@@ -124,7 +127,8 @@ def sample_reference(times: np.ndarray, plan: WholeBodyPlan) -> Reference:
         limb_acceleration=acceleration,
         authority=authority,
         in_contact=in_contact,
-        friction=_friction(times, plan.sequence, swings),
+        friction=friction,
+        half_size=bearing[..., None] * robot.bearings,
         wrench=planned_wrench(motion)[interval],
         swings=swings,
     )
@@ -167,12 +171,11 @@ def _posture(times: np.ndarray, trajectory: WholeBodyTrajectory) -> tuple[np.nda
     return joints, rotation_from_quaternion(quaternion), np.where(rest, 0.0, qvel), np.where(rest, 0.0, qacc)
 
 
-def _friction(times: np.ndarray, sequence: ContactSequence, swings: tuple[Swing, ...]) -> np.ndarray:
-    """Friction (C, 4) of the contact that each limb has or moves to."""
-    friction = np.ones((len(times), 4))
-    for contact in sequence.start.contacts:
-        friction[:, contact.limb] = contact.friction
-    for swing in swings:
-        if swing.contact is not None:
-            friction[times >= swing.start, swing.limb] = swing.contact.friction
-    return friction
+def _ground(times: np.ndarray, sequence: ContactSequence, swings: tuple[Swing, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """(C, 4) friction of the contact that each limb has or moves to, and (C, 4) the share of its patch that bears."""
+    friction, bearing = np.ones((2, len(times), 4))
+    held = [(contact, times >= times[0]) for contact in sequence.start.contacts]
+    held += [(swing.contact, times >= swing.start) for swing in swings if swing.contact is not None]
+    for contact, since in held:
+        friction[since, contact.limb], bearing[since, contact.limb] = contact.friction, contact.bearing
+    return friction, bearing

@@ -94,6 +94,7 @@ def _rested(motion: CentroidalMotion, pace: float) -> CentroidalMotion:
         position=problem.position[step],
         rotation=problem.rotation[step],
         friction=problem.friction[step],
+        half_size=problem.half_size[step],
         yaw=np.append(problem.yaw, np.full(rest, problem.yaw[-1])),
         room=None if room is None else replace(room, sink=np.append(room.sink, np.full(rest, room.sink[-1]))),
     )

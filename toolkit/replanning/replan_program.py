@@ -135,7 +135,7 @@ class ReplanProgram:
         step, limb = np.nonzero(contacts.active)
         margins = np.tile([cones.friction, 0.0, 0.0, cones.yaw], (len(step), 2))
         mu, unpriced = contacts.friction[step, limb], np.zeros((len(step), 7))
-        parameters = [mu, cones.half_size[limb], margins, unpriced, self._price[step]]
+        parameters = [mu, cones.within(contacts.half_size[step, limb]), margins, unpriced, self._price[step]]
         return contact_block(self.layout, contacts.active, np.column_stack(parameters))
 
     def _bounds(self) -> Block:

@@ -48,7 +48,7 @@ class HorizonContacts:
     """Contacts in N steps of a horizon.
 
     Attributes:
-        active, rotation, friction: (N, 4), (N, 4, 3, 3) and (N, 4).
+        active, rotation, friction, half_size: (N, 4), (N, 4, 3, 3), (N, 4) and (N, 4, 2).
         position: (N, 4, 3) m, as planned.
         event: (N, 4) swing that makes or made the contact; -1 for those of the start.
         shift: (N, 4, 3) m from the plan, of contacts that stand or whose landing point is kept.
@@ -58,6 +58,7 @@ class HorizonContacts:
     position: np.ndarray
     rotation: np.ndarray
     friction: np.ndarray
+    half_size: np.ndarray
     event: np.ndarray
     shift: np.ndarray
 
@@ -77,6 +78,7 @@ class HorizonContacts:
         plan = nominal.problem
         active, position = plan.active[span].copy(), plan.position[span].copy()
         rotation, friction = plan.rotation[span].copy(), plan.friction[span].copy()
+        half_size = plan.half_size[span].copy()
         event, shift = nominal.landing[span].copy(), np.zeros((steps, 4, 3))
         landed = {number: -np.inf for number, _, _ in situation.standing.values() if number >= 0}
         for number, time in (early | landed).items():
@@ -87,6 +89,7 @@ class HorizonContacts:
             active[here, limb], event[here, limb] = True, number
             position[here, limb], rotation[here, limb] = swing.contact.pose.position, swing.contact.pose.rotation
             friction[here, limb] = swing.contact.friction
+            half_size[here, limb] = plan.half_size[np.argmax(nominal.landing[:, limb] == number), limb]
         for limb in range(4):
             if active[0, limb] and limb not in situation.standing:
                 active[0, limb] = False  # the limb is late and bears nothing yet
@@ -97,4 +100,4 @@ class HorizonContacts:
         for number, moved in situation.fixed.items():
             limb = nominal.swings[number].limb
             shift[event[:, limb] == number, limb] = moved
-        return cls(active, position, rotation, friction, event, shift)
+        return cls(active, position, rotation, friction, half_size, event, shift)

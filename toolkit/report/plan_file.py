@@ -153,6 +153,7 @@ def _contact_entry(contact: Contact) -> dict[str, Any]:
         "rotation": contact.pose.rotation.ravel(),
         "surface": contact.surface,
         "friction": contact.friction,
+        "bearing": contact.bearing,
     }
 
 
@@ -168,13 +169,16 @@ def _read_contact(entry: dict[str, Any]) -> Contact:
         raise ValueError(f"position, quaternion_wxyz and friction are numbers within {LARGEST:g}, friction above zero")
     if not abs(surface) < 2**31:
         raise ValueError("surface is no index of a surface")
+    bearing = float(entry.get("bearing", 1.0))
+    if not 0.0 < bearing <= 1.0:
+        raise ValueError("bearing is a share above 0, at most 1")
     pose = Pose.from_quaternion(position, quaternion_wxyz)
     if entry.get("rotation") is not None:
         rotation = np.array(entry["rotation"], float)
         if rotation.shape != (9,) or not np.abs(rotation - pose.rotation.ravel()).max() <= ROUNDING:
             raise ValueError("rotation is not that of quaternion_wxyz; leave it out where you turn a contact")
         pose = Pose(rotation.reshape(3, 3), position)
-    return Contact(Limb.from_label(entry["limb"]), pose, friction, surface)
+    return Contact(Limb.from_label(entry["limb"]), pose, friction, surface, bearing)
 
 
 def _read_transition(entry: dict[str, Any], position: str) -> ContactTransition:

@@ -36,6 +36,8 @@ class SurfaceConfig:
         flush_angle: Largest angle between the normals of merged faces, rad.
         foot_area, palm_area: Smaller regions are dropped, m^2.
         foot_width, palm_width: Regions in which no circle of this diameter fits are dropped, m.
+        bed: Ground that is off its plane by no more bears everywhere, m. A patch on a curved one bears where it is
+            within this of the highest point: with the height off by d at its ends, a share of sqrt(bed / d) of it.
         simplify: Covering shapes are widened by this, and corners that stand out less are left out, m.
         plane_margin: Infinite planes end this far beyond start and goal, m.
     """
@@ -50,6 +52,7 @@ class SurfaceConfig:
     palm_area: float = 3e-3
     foot_width: float = 0.06
     palm_width: float = 0.05
+    bed: float = 4e-4
     simplify: float = 1e-3
     plane_margin: float = 3.0
 
@@ -97,6 +100,7 @@ def extract_surfaces(
                 friction=face.friction,
                 serves_foot=foot,
                 serves_palm=palm,
+                bearing=min(1.0, float(np.sqrt(config.bed / max(face.off, config.bed)))),
             )
         )
     return tuple(surfaces)
@@ -161,7 +165,8 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
         for batch in [[other] for other in others] if len(others) < _MANY else [others]:
             polygon = _sealed([polygon, *batch], config.flush)
         names = dict.fromkeys(faces[member].geom for member in members)
-        result[min(members)] = Face("+".join(names), faces[seed].friction, frame, polygon)
+        off = max(faces[member].off for member in members)
+        result[min(members)] = Face("+".join(names), faces[seed].friction, frame, polygon, off)
     return [result[first] for first in sorted(result)]
 
 

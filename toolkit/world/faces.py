@@ -28,12 +28,14 @@ class Face:
         friction: Sliding coefficient.
         frame: World_from_face pose; z is the outward normal.
         polygon: Outline in the frame's xy, m; it may have holes.
+        off: m; how far the geom's surface is apart there along the normal; 0 where it is flat.
     """
 
     geom: str
     friction: float
     frame: Pose
     polygon: Polygon
+    off: float = 0.0
 
 
 def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) -> list[Face]:
@@ -50,36 +52,37 @@ def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) ->
         label, friction = source.owner[index], float(model.geom_friction[index, 0])
         pose = Pose(data.geom_xmat[index].reshape(3, 3).copy(), data.geom_xpos[index].copy())
         if label in source.facets:  # the facets of a mesh that consists of parts are added once
-            found = [(facet.frame, facet.polygon) for facet in source.facets[label]] if label not in done else []
+            # They are as flat as the parts that collide, however curved the mesh was.
+            found = [(facet.frame, facet.polygon, 0.0) for facet in source.facets[label]] if label not in done else []
             done.add(label)
         else:
             found = _local_faces(model, data, index, pose, square, least_area)
-        for frame, polygon in found:
+        for frame, polygon, off in found:
             if polygon.area > least_area:
-                faces.append(Face(label, friction, frame, polygon))
+                faces.append(Face(label, friction, frame, polygon, off))
     return faces
 
 
 def _local_faces(
     model, data, index: int, pose: Pose, square: tuple[float, ...], least_area: float
-) -> list[tuple[Pose, Polygon]]:
-    """(world_from_face, outline) of a geom's faces."""
+) -> list[tuple[Pose, Polygon, float]]:
+    """(world_from_face, outline, m that it is off) of a geom's faces."""
     types, size = mujoco.mjtGeom, model.geom_size[index]
     kind = model.geom_type[index]
     if kind == types.mjGEOM_PLANE:
         rectangle = plane_rectangle(pose, square)
         drawn = np.where(size[:2] > 0, size[:2], np.inf)
         low, high = np.maximum(rectangle.min(axis=0), -drawn), np.minimum(rectangle.max(axis=0), drawn)
-        return [(pose, shapely.box(*low, *high))] if (high > low).all() else []
+        return [(pose, shapely.box(*low, *high), 0.0)] if (high > low).all() else []
     if kind == types.mjGEOM_BOX:
         halves = [np.abs(turn[:, :2].T @ size) for turn in _BOX_TURNS]
         shapes = [shapely.box(*-half, *half) for half in halves]
-        return [(pose @ Pose(turn, turn[:, 2] * size), box) for turn, box in zip(_BOX_TURNS, shapes, strict=True)]
+        return [(pose @ Pose(turn, turn[:, 2] * size), box, 0.0) for turn, box in zip(_BOX_TURNS, shapes, strict=True)]
     if kind == types.mjGEOM_CYLINDER:
         angle = 2 * np.pi * np.arange(_CAP_SIDES) / _CAP_SIDES
         cap = Polygon(size[0] * np.column_stack([np.cos(angle), np.sin(angle)]))
         down = np.diag([1.0, -1.0, -1.0])
-        return [(pose @ Pose(turn, turn[:, 2] * size[1]), cap) for turn in (np.eye(3), down)]
+        return [(pose @ Pose(turn, turn[:, 2] * size[1]), cap, 0.0) for turn in (np.eye(3), down)]
     import trimesh  # here, since it takes long to import
 
     if kind == types.mjGEOM_MESH:
@@ -91,7 +94,7 @@ def _local_faces(
     else:
         return []
     facets = find_facets(hull, angle=FACET_ANGLE, distance=FACET_DISTANCE, least_area=least_area)
-    return [(facet.frame, facet.polygon) for facet in facets]
+    return [(facet.frame, facet.polygon, facet.off) for facet in facets]
 
 
 def _box_turns() -> list[np.ndarray]:

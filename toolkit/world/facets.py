@@ -28,11 +28,13 @@ class Facet:
         frame: Frame of the plane (any_from_facet); z is the outward normal and the origin lies in the facet.
         polygon: Outline in the frame's xy, m; it may have holes.
         triangles: Indices of its triangles in the mesh, (k,) int.
+        off: m; how far its triangles' corners lie apart along the normal.
     """
 
     frame: Pose
     polygon: Polygon
     triangles: np.ndarray
+    off: float
 
 
 def plane_frame(origin: np.ndarray, normal: np.ndarray) -> Pose:
@@ -125,7 +127,7 @@ def facet_of(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
     if not isinstance(shape, Polygon):  # the pieces touch only in points, and the largest is kept
         parts = [part for part in shapely.get_parts(shapely.make_valid(shape)) if isinstance(part, Polygon)]
         shape = max(parts, key=lambda part: part.area, default=Polygon())
-    return Facet(frame, shape, np.sort(group))
+    return Facet(frame, shape, np.sort(group), float(np.ptp(flat[..., 2])))
 
 
 def _union(triangles: np.ndarray) -> shapely.Geometry:

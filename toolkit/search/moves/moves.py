@@ -91,7 +91,8 @@ class MoveGenerator:
         feet: FootCollision | None = None,
     ):
         self._drawn, self._feet = drawn, feet
-        self.robot, self.arms, self.table = robot, arms, ContactTable(projector.table.friction, robot.scale.length)
+        self.robot, self.arms = robot, arms
+        self.table = ContactTable(projector.table.friction, robot.scale.length, projector.bearing)
         self._projector, self._model = projector, model
         self._climb, self._scale = climb(robot), robot.scale.length
         self.legs, self.shanks = legs_of(robot, margins(robot)), shanks_of(robot)

@@ -20,6 +20,7 @@ class ContactTable:
     Args:
         friction: (S,) coefficient of each surface of the world.
         scale: Factor on the rounding, for bodies of other sizes (`toolkit.robot.scale`).
+        bearing: (S,) share of a patch that bears on each surface; None for all of it.
 
     Attributes:
         position: (capacity, 3) m; world.
@@ -29,8 +30,9 @@ class ContactTable:
         limb: (capacity,) int; the limb in contact.
     """
 
-    def __init__(self, friction: np.ndarray, scale: float = 1.0):
+    def __init__(self, friction: np.ndarray, scale: float = 1.0, bearing: np.ndarray | None = None):
         self._friction, self._per_metre = friction, 1000 / scale
+        self._bearing = np.ones(len(friction)) if bearing is None else bearing
         self._number: dict[bytes, int] = {}
         self._objects: dict[int, Contact] = {}
         self.position = np.zeros((256, 3))
@@ -78,7 +80,8 @@ class ContactTable:
                 self._objects.clear()
             surface = int(self.surface[number])
             pose = Pose(self.rotation[number].copy(), self.position[number].copy())
-            found = Contact(_LIMBS[self.limb[number]], pose, float(self._friction[surface]), surface)
+            friction, bearing = float(self._friction[surface]), float(self._bearing[surface])
+            found = Contact(_LIMBS[self.limb[number]], pose, friction, surface, bearing)
             self._objects[number] = found
         return found
 

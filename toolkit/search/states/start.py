@@ -63,6 +63,7 @@ def place_feet(robot: RobotModel, world: World, projector: Projector) -> list[St
                 Pose(soles.rotation[row], soles.position[row]),
                 float(projector.table.friction[soles.surface[row]]),
                 int(soles.surface[row]),
+                float(projector.bearing[soles.surface[row]]),
             )
             for row in found[:12]
         ]
