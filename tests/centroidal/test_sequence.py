@@ -20,7 +20,7 @@ from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import InputError
-from toolkit.geometry.limb import FEET, PALMS
+from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose
 from toolkit.robot.loader import load_robot
 from validation.reference.pieces import pieces
@@ -55,6 +55,20 @@ def test_flat_walking_keeps_the_wanted_margins(walker, timing, stride):
     _, _, first = motion.sample(0.0)
     _, _, last = motion.sample(motion.problem.times[-1])
     assert np.linalg.norm(first) < 1.0 and np.linalg.norm(last) < 0.3
+
+
+def test_the_centre_of_pressure_stays_where_curved_ground_bears(walker):
+    start, schedule = walk(walker, 4, 0.25, (0.6, 0.8), rest=1.0)
+    share = {Limb.LEFT_FOOT: 0.4, Limb.RIGHT_FOOT: 1.0}
+    phases = tuple(
+        replace(phase, contacts=tuple(replace(each, bearing=share[each.limb]) for each in phase.contacts))
+        for phase in schedule.phases
+    )
+    motion = optimise(walker, replace(schedule, phases=phases), initial_com(walker, start), np.zeros(3))
+    assert motion.feasible and check(motion).within()
+    for limb, part in share.items():
+        half = part * walker.limbs[limb].bearing
+        assert (np.abs(motion.cop[:, limb]) <= motion.problem.margins.within(half) + 1e-6).all()
 
 
 def test_slow_single_support_is_over_the_foot(walker):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import shapely
 import trimesh
 
 from tests.world.probe import area_of, ball_gap, random_points, ray_gap
@@ -166,6 +167,29 @@ def test_rough_height_field_is_split_as_mujoco_splits_it(make_world):
         # Triangles of a facet may lie 1.5 mm off its plane; the wrong diagonal would be off by centimetres.
         np.testing.assert_allclose(ray_gap(world.mujoco_model, surface, points), 0, atol=1.6e-3)
         np.testing.assert_allclose(ball_gap(world.mujoco_model, surface, points), 0, atol=1.6e-3)
+
+
+def test_curved_ground_has_places_everywhere_that_bear_in_part(make_world):
+    """A crest with a radius of 8 m, level where |x| > 1 m: facets overlap there, and no sole goes far to find room."""
+    x = np.linspace(-2, 2, 81)
+    rise = np.where(np.abs(x) < 1, np.sqrt(64 - np.clip(x, -1, 1) ** 2) - np.sqrt(63), 0.0)
+    data = " ".join(f"{value:.8f}" for value in np.tile(rise / rise.max(), 21))
+    asset = f'<hfield name="h" nrow="21" ncol="81" size="2 0.5 {rise.max():.8f} 0.2" elevation="{data}"/>'
+    world = make_world('<geom type="hfield" hfield="h"/>', assets=asset, start="-1.5 0 0")
+    level = [s for s in tops(world) if s.normal[2] > 1 - 1e-9 and abs(s.pose.position[0]) > 1]
+    curved = [s for s in tops(world) if abs(s.pose.position[0]) < 0.9]
+    assert [s.bearing for s in level] == [1.0, 1.0] and min(s.bearing for s in curved) < 0.6
+    sole = shapely.box(-0.12, -0.07, 0.12, 0.07)
+
+    def held(place: float) -> bool:
+        middles = [(s.pose.inverse() @ np.array([place, 0.0, s.pose.position[2]]))[:2] for s in curved]
+        return any(
+            s.region.contains(shapely.transform(sole, lambda points, by=middle: points + by))
+            for s, middle in zip(curved, middles, strict=True)
+        )
+
+    found = [held(place) for place in np.linspace(-0.7, 0.7, 57)]
+    assert all(any(found[begin : begin + 8]) for begin in range(0, 50))  # within 0.2 m of any place
 
 
 def test_box_on_the_floor_leaves_a_hole(make_world):

@@ -12,10 +12,13 @@ from shapely.geometry import Polygon
 from toolkit.geometry.pose import Pose
 from toolkit.geometry.triangles import height_field_triangles
 from toolkit.world.decomposition import FACET_ANGLE, FACET_DISTANCE
-from toolkit.world.facets import find_facets
+from toolkit.world.facets import find_facets, overlapping_facets
 from toolkit.world.solids import plane_rectangle
 from toolkit.world.source import Source, mesh_of_geom
 
+_OVERLAP_ANGLE, _OVERLAP_DISTANCE = np.radians(6.0), 2e-3  # rad, m; tolerances of facets that overlap others
+_OVERLAP_AREA = 0.01  # m^2; smaller ones are no use to a sole
+_CURVED = 1e-4  # m; facets that are off their plane by more are overlapped
 _CAP_SIDES = 64  # corners of a cylinder's cap; they lie on the circle
 
 
@@ -94,6 +97,14 @@ def _local_faces(
     else:
         return []
     facets = find_facets(hull, angle=FACET_ANGLE, distance=FACET_DISTANCE, least_area=least_area)
+    facets += overlapping_facets(
+        hull,
+        facets,
+        angle=_OVERLAP_ANGLE,
+        distance=_OVERLAP_DISTANCE,
+        flat=_CURVED,
+        least_area=max(_OVERLAP_AREA, least_area),
+    )
     return [(facet.frame, facet.polygon, facet.off) for facet in facets]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import trimesh
 
 _STRICT = 0.07  # part of the tolerances within which the seed of a facet is flat
+_DEGENERATE = 1e-10  # m^2; smaller triangles belong to no facet
+_SPACING = 0.2  # m; distance of the seeds of overlapping facets
 _MANY = 100  # more triangles are merged along edges; for fewer the general union is as quick and allows overlaps
 
 
@@ -59,31 +61,68 @@ def find_facets(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_a
 
 def flat_groups(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_area: float = 0.0) -> list[np.ndarray]:
     """Triangles (k,) of each flat facet of a mesh, in the order in which they joined; see `find_facets`."""
-    area = mesh.area_faces
-    pairs = mesh.face_adjacency
-    ends = pairs.ravel()
-    order = np.argsort(ends, kind="stable")
-    first, neighbours = np.searchsorted(ends[order], np.arange(len(area) + 1)), pairs[:, ::-1].ravel()[order]
-    normals, corners = np.ascontiguousarray(mesh.face_normals), np.ascontiguousarray(mesh.triangles)
-
-    def grown(seeds: np.ndarray, part: float) -> list[np.ndarray]:
-        members, last = np.empty(len(area), np.int64), np.empty(len(area), np.int64)
-        within = float(np.cos(part * angle)), part * distance
-        count = _grow(seeds, area > 1e-10, first, neighbours, normals, corners, *within, members, last)
-        return np.split(members[: last[count - 1]], last[: count - 1]) if count else []
-
-    seed_area = area.copy()
-    for patch in grown(np.argsort(-area, kind="stable"), _STRICT):
+    table, area = _Triangles.of(mesh), mesh.area_faces
+    free, seed_area = area > _DEGENERATE, area.copy()
+    for patch in table.grown(np.argsort(-area, kind="stable"), free, _STRICT * angle, _STRICT * distance):
         seed_area[patch] = area[patch].sum()
-    groups = grown(np.lexsort([-area, -seed_area]), 1.0)
+    groups = table.grown(np.lexsort([-area, -seed_area]), free, angle, distance)
     return [group for group in groups if area[group].sum() >= least_area]
+
+
+def overlapping_facets(
+    mesh: trimesh.Trimesh, facets: list[Facet], *, angle: float, distance: float, flat: float, least_area: float
+) -> list[Facet]:
+    """More facets of the curved parts of a mesh, which overlap each other: a sole finds its place between others, too.
+
+    They grow as in `find_facets`, but over all triangles, around seeds that are `_SPACING` apart seen from above. None
+    is in one of the `facets` that are off their plane by at most `flat` m and at least as large as a square of that.
+    """
+    table, area = _Triangles.of(mesh), mesh.area_faces
+    free = area > _DEGENERATE
+    curved = free.copy()
+    for facet in facets:
+        curved[facet.triangles] &= facet.off > flat or facet.polygon.area < _SPACING**2
+    place = mesh.triangles_center[:, :2] / _SPACING
+    near = np.flatnonzero(curved)
+    near = near[np.argsort(np.abs(place[near] % 1.0 - 0.5).max(1), kind="stable")]  # to the middle of their cell
+    _, first = np.unique(np.floor(place[near]), axis=0, return_index=True)
+    groups = [np.sort(table.grown(np.array([seed]), free, angle, distance)[0]) for seed in near[first].tolist()]
+    new = {group.tobytes(): group for group in groups if area[group].sum() >= least_area}
+    for facet in facets:
+        new.pop(facet.triangles.tobytes(), None)
+    return [facet_of(mesh, group) for group in new.values()]
+
+
+class _Triangles(NamedTuple):
+    """A mesh as `_grow` reads it."""
+
+    first: np.ndarray
+    neighbours: np.ndarray
+    normals: np.ndarray
+    corners: np.ndarray
+
+    @classmethod
+    def of(cls, mesh: trimesh.Trimesh) -> _Triangles:
+        """The triangles of a mesh with merged vertices."""
+        pairs = mesh.face_adjacency
+        ends = pairs.ravel()
+        order = np.argsort(ends, kind="stable")
+        first = np.searchsorted(ends[order], np.arange(len(mesh.triangles) + 1))
+        normals, corners = np.ascontiguousarray(mesh.face_normals), np.ascontiguousarray(mesh.triangles)
+        return cls(first, pairs[:, ::-1].ravel()[order], normals, corners)
+
+    def grown(self, seeds: np.ndarray, free: np.ndarray, angle: float, distance: float) -> list[np.ndarray]:
+        """Groups (k,) of triangles that are `free` around seeds, none in two groups; at most one for each seed."""
+        members, last = np.empty(len(free), np.int64), np.empty(len(free), np.int64)
+        count = _grow(seeds, free.copy(), *self, float(np.cos(angle)), distance, members, last)
+        return np.split(members[: last[count - 1]], last[: count - 1]) if count else []
 
 
 @compiled(kept=True, allocates=True)
 def _grow(seeds, free, first, neighbours, normals, corners, cosine, distance, members, last):
     """Fill `members` with triangles, group by group, and `last` with the end of each group; return their number."""
     count, end = 0, 0
-    stack = np.empty(len(seeds), np.int64)
+    stack = np.empty(len(free), np.int64)
     for seed in seeds:
         if not free[seed]:
             continue
