@@ -62,7 +62,7 @@ def situation(walking, nominal, time, com=(0, 0, 0), velocity=(0, 0, 0), **optio
         earliest={},
         com_shift=np.zeros(3),
         displaced=True,
-        cones=Cones(0.85, 0.8, 0.02, 1.0),
+        cones=Cones(0.85, 0.8, Margins(cop=(0.02, 0.02)), 1.0),
     )
     return Situation(**(values | options))
 
@@ -131,7 +131,7 @@ def test_a_push_moves_the_landing_along(walking, nominal, problem):
 
 def test_wrenches_stay_in_the_cones_and_on_the_feet(walking, nominal, problem):
     """Also under a push that lets a swing end early. The polygon of the rows is made large enough to hold the cone."""
-    time, cones = mid_swing(nominal), Cones(0.85, 0.8, 0.02, 1.0)
+    time, cones = mid_swing(nominal), Cones(0.85, 0.8, Margins(cop=(0.02, 0.02)), 1.0)
     for push in ((0.1, 0.0, 0.0), (0.0, -0.3, 0.0), (0.0, 0.5, 0.0)):
         state = situation(walking, nominal, time, velocity=push, earliest={0: time + 0.1}, landing={0: np.inf})
         replan = problem.solve(state)

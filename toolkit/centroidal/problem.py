@@ -78,9 +78,9 @@ class Margins:
         """The same with its lengths multiplied by a factor."""
         return replace(self, cop=(factor * self.cop[0], factor * self.cop[1]))
 
-    def within(self, half_size: np.ndarray) -> np.ndarray:
-        """(..., 2) m; the half extents of patches with the CoP margin taken off, at most half of each."""
-        return half_size - np.minimum(self.cop, half_size / 2)
+    def within(self, half_size: np.ndarray, part: float = 1.0) -> np.ndarray:
+        """(..., 2) m; the half extents of patches with `part` of the CoP margin, at most half of each, taken off."""
+        return half_size - part * np.minimum(self.cop, half_size / 2)
 
 
 @dataclass(frozen=True)

@@ -157,7 +157,7 @@ class Controller:
             urgent: Cones(
                 min(1.0 + NESTING * (margins.friction - 1.0), MAX_FRICTION),
                 min(1.0 + NESTING * (margins.yaw - 1.0), MAX_YAW),
-                margins.cop,
+                margins,
                 shrink,
             )
             for urgent, shrink in ((False, NESTING), (True, URGENT_NESTING))

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from toolkit.centroidal.problem import Margins
 from toolkit.control.dynamics import RobotDynamics
 from toolkit.control.limb_target import LimbTargets
 from toolkit.control.sampled_plan import Reference
@@ -25,18 +26,18 @@ class Cones:
     Attributes:
         friction: factor on the friction.
         yaw: factor on the friction that may be used for the yaw moment.
-        cop: m; wanted distance of the centre of pressure from the edge of what bears, along x and y.
-        part: what is kept of that distance, or of half of what bears where that is less.
+        margins: those of the plan.
+        part: what the controller keeps of the plan's margin of the centre of pressure.
     """
 
     friction: float
     yaw: float
-    cop: float | tuple[float, float]
+    margins: Margins
     part: float
 
     def within(self, half_size: np.ndarray) -> np.ndarray:
         """(..., 2) m half extents within which the centre of pressure stays, of those that bear."""
-        return half_size - self.part * np.minimum(self.cop, half_size / 2.0)
+        return self.margins.within(half_size, self.part)
 
 
 @dataclass

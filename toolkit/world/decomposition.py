@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 FACET_ANGLE = np.radians(3.0)  # triangles of one facet have normals within this angle of the first triangle's
 FACET_DISTANCE = 1.5e-3  # m; their corners are within this distance of its plane
-FLAT = 4e-4  # m; ground that is off its plane by no more is flat, and bears everywhere
 
 _DEPTH = 0.06  # m; thickness of a part where the mesh is thick enough
 _LEAST_DEPTH = 2e-3  # m; least thickness of a part

@@ -12,7 +12,6 @@ from shapely.geometry.polygon import orient
 
 from toolkit.geometry.pose import Pose
 from toolkit.world.convex import convex_partition
-from toolkit.world.decomposition import FLAT
 from toolkit.world.faces import Face, faces_of
 from toolkit.world.overlay import cut, overlap, united
 from toolkit.world.solids import Solids
@@ -53,7 +52,7 @@ class SurfaceConfig:
     palm_area: float = 3e-3
     foot_width: float = 0.06
     palm_width: float = 0.05
-    bed: float = FLAT
+    bed: float = 4e-4
     simplify: float = 1e-3
     plane_margin: float = 3.0
 

@@ -63,7 +63,7 @@ def flat_groups(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_a
     """Triangles (k,) of each flat facet of a mesh, in the order in which they joined; see `find_facets`."""
     table, area = _Triangles.of(mesh), mesh.area_faces
     free, seed_area = area > _DEGENERATE, area.copy()
-    for patch in table.grown(np.argsort(-area, kind="stable"), free, _STRICT * angle, _STRICT * distance):
+    for patch in table.grown(np.argsort(-area, kind="stable"), free.copy(), _STRICT * angle, _STRICT * distance):
         seed_area[patch] = area[patch].sum()
     groups = table.grown(np.lexsort([-area, -seed_area]), free, angle, distance)
     return [group for group in groups if area[group].sum() >= least_area]
@@ -86,11 +86,14 @@ def overlapping_facets(
     near = np.flatnonzero(curved)
     near = near[np.argsort(np.abs(place[near] % 1.0 - 0.5).max(1), kind="stable")]  # to the middle of their cell
     _, first = np.unique(np.floor(place[near]), axis=0, return_index=True)
-    groups = [np.sort(table.grown(np.array([seed]), free, angle, distance)[0]) for seed in near[first].tolist()]
-    new = {group.tobytes(): group for group in groups if area[group].sum() >= least_area}
-    for facet in facets:
-        new.pop(facet.triangles.tobytes(), None)
-    return [facet_of(mesh, group) for group in new.values()]
+    known, found = {facet.triangles.tobytes() for facet in facets}, []
+    for seed in near[first].tolist():
+        group = np.sort(table.grown(np.array([seed]), free, angle, distance)[0])
+        free[group] = True  # for the facets of the seeds to come
+        if area[group].sum() >= least_area and (key := group.tobytes()) not in known:
+            known.add(key)
+            found.append(facet_of(mesh, group))
+    return found
 
 
 class _Triangles(NamedTuple):
@@ -112,9 +115,9 @@ class _Triangles(NamedTuple):
         return cls(first, pairs[:, ::-1].ravel()[order], normals, corners)
 
     def grown(self, seeds: np.ndarray, free: np.ndarray, angle: float, distance: float) -> list[np.ndarray]:
-        """Groups (k,) of triangles that are `free` around seeds, none in two groups; at most one for each seed."""
-        members, last = np.empty(len(free), np.int64), np.empty(len(free), np.int64)
-        count = _grow(seeds, free.copy(), *self, float(np.cos(angle)), distance, members, last)
+        """Groups (k,) of triangles that are `free` around seeds, at most one for each seed; then they are not free."""
+        members, last = np.empty(len(free), np.int64), np.empty(len(seeds), np.int64)
+        count = _grow(seeds, free, *self, float(np.cos(angle)), distance, members, last)
         return np.split(members[: last[count - 1]], last[: count - 1]) if count else []
 
 
