@@ -196,5 +196,6 @@ FAMILIES: dict[str, Family] = {
         Family("rubble_corridor", _RUBBLE, map_worlds.rubble_corridor, _DRAWN),
         Family("mesh_ground", _height(0.0, 0.08), map_worlds.mesh_ground),
         Family("field_ground", _height(0.0, 0.08), map_worlds.field_ground),
+        Family("hills", _height(0.0, 0.12), map_worlds.hills),
     )
 }

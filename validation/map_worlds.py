@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from scipy.ndimage import label
 from scipy.spatial.transform import Rotation
+from scipy.special import expit
 
 from toolkit.world import generators, regular
 from toolkit.world.authoring import WorldText, numbers
@@ -25,6 +26,7 @@ _FARTHEST = 100.0  # m; largest distance between a moved world and the origin
 _MOST_DRAWS = 10_000  # draws of rubble until one has a walkable way
 _FACET, _CELL, _APRON, _ROWS, _COLUMNS = 0.3, 0.1, 0.9, 6, 4  # m, m, m and facets; a facet has three cells a side
 _SIDE = 4  # points along a facet's side
+_HILLS, _POINT, _WAVES, _WAVE = (5.0, 3.0), 0.05, 3, 2.5  # m, m between points, and m of the shortest wave
 
 
 def slope_length(angle: float) -> float:
@@ -177,6 +179,25 @@ def field_ground(rng: np.random.Generator, height: float) -> str:
     world, corner = _ground("field_ground", height, heights)
     world.height_field("ground", heights, _CELL, corner)
     return world.render()
+
+
+def hills(rng: np.random.Generator, height: float) -> str:
+    """A height field of waves of `_WAVE` m and more, together up to `height` m above and below start and goal."""
+    x, y = (np.arange(-size / 2, size / 2 + 1e-9, _POINT) for size in _HILLS)
+    grid_x, grid_y = np.meshgrid(x, y, indexing="ij")
+    heights = np.zeros_like(grid_x)
+    for _ in range(_WAVES):
+        way, phase, length = rng.uniform(0.0, np.pi), rng.uniform(0.0, 2.0 * np.pi), _WAVE * rng.uniform(1.0, 1.5)
+        along = grid_x * np.cos(way) + grid_y * np.sin(way)
+        heights += height / _WAVES * np.sin(2.0 * np.pi * along / length + phase)
+    end = _HILLS[0] / 2 - 0.6
+    for middle in (-end, end):  # level there
+        heights *= 1.0 - expit((0.6 - np.hypot(grid_x - middle, grid_y)) / 0.08)
+    text = WorldText(
+        "hills", f"hills of {height:g} m", FRICTION, TIMING, (end, 0.0, 0.0), start=(-end, 0.0, 0.0), abyss=-1.0
+    )
+    text.height_field("hills", heights, _POINT, (x[0], y[0]))
+    return text.render()
 
 
 def moved(mjcf: str, x: float, y: float, yaw: float) -> str:

@@ -294,12 +294,16 @@ def test_a_report_of_a_run_without_a_search_has_every_figure(run):
 
 def test_the_plan_round_trips(run, tmp_path):
     path = tmp_path / "plan.json"
-    write_plan(path, run.plan, run.solution)
+    sequence = run.plan.sequence
+    first, *others = sequence.transitions
+    curved = replace(first, contact=replace(first.contact, bearing=0.05))
+    plan = replace(run.plan, sequence=replace(sequence, transitions=(curved, *others)))
+    write_plan(path, plan, run.solution)
     again = read_plan(path)
-    assert len(again.transitions) == len(run.plan.sequence.transitions)
-    for old, new in zip(run.plan.sequence.transitions, again.transitions, strict=True):
+    assert len(again.transitions) == len(plan.sequence.transitions)
+    for old, new in zip(plan.sequence.transitions, again.transitions, strict=True):
         assert old.limb == new.limb and old.timing == new.timing and (old.contact is None) == (new.contact is None)
-    for old, new in zip(run.plan.sequence.stances, again.stances, strict=True):
+    for old, new in zip(plan.sequence.stances, again.stances, strict=True):
         for a, b in zip(old.contacts, new.contacts, strict=True):
             assert (a.limb, a.friction, a.surface, a.bearing) == (b.limb, b.friction, b.surface, b.bearing)
             np.testing.assert_allclose(a.pose.matrix, b.pose.matrix, rtol=0, atol=1e-14)  # rotation via quaternion
@@ -357,7 +361,7 @@ def test_equal_arrays_make_equal_files_whatever_the_clock_said(run, tmp_path):
         (lambda plan: plan["start"][0].update(surface=1e400), "start is broken"),
         (lambda plan: plan["start"][0].update(friction=10**400), "start is broken"),
         (lambda plan: plan["start"][0].update(friction=-1), "friction above zero"),
-        (lambda plan: plan["start"][0].update(bearing=1.5), "bearing is a share above 0"),
+        (lambda plan: plan["start"][0].update(bearing=-0.1), "bearing is a distance above 0"),
         (lambda plan: plan["start"][0].update(position=[1e308, 0, 0]), "numbers within 10000"),
         (lambda plan: plan["start"][0].update(quaternion_wxyz=[1e-300, 0, 0, 0]), "not all zero"),
         (lambda plan: plan["transitions"][0]["times"].update(swing=1e9), "at most 10 s"),

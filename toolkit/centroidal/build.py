@@ -156,10 +156,11 @@ def sequence_problem(
 
 
 def _contact_arrays(steps: int) -> tuple[np.ndarray, ...]:
-    """Empty `active`, `position`, `rotation` and `friction` of a problem, and the share of patches that bears."""
+    """Empty `active`, `position`, `rotation` and `friction` of a problem, and how far patches bear."""
     rotation = np.zeros((steps, 4, 3, 3))
     rotation[:, :, (0, 1, 2), (0, 1, 2)] = 1.0
-    return np.zeros((steps, 4), bool), np.zeros((steps, 4, 3)), rotation, np.zeros((steps, 4)), np.ones((steps, 4))
+    bearing = np.full((steps, 4), np.inf)
+    return np.zeros((steps, 4), bool), np.zeros((steps, 4, 3)), rotation, np.zeros((steps, 4)), bearing
 
 
 def _put(arrays: tuple[np.ndarray, ...], contact: Contact, begin: int, end: int) -> None:
@@ -221,7 +222,7 @@ def _problem(
         position=arrays[1],
         rotation=arrays[2],
         friction=arrays[3],
-        half_size=arrays[4][..., None] * half_size,
+        half_size=np.minimum(arrays[4][..., None], half_size),
         max_normal_force=force,
         yaw=yaw,
         com=com,

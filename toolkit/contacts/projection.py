@@ -102,7 +102,7 @@ class Projector:
 
     Attributes:
         config: The settings for this robot.
-        bearing: (S,) share of a patch that bears on each surface.
+        bearing: (S,) m; how far from the middle of a patch each surface bears.
     """
 
     def __init__(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from toolkit.geometry.limb import FEET, PALMS, Limb
@@ -18,14 +19,14 @@ class Contact:
             x of a foot points along its toes. The limb's site in the robot model coincides with this frame.
         friction: Coulomb coefficient of the surface.
         surface: Index of the surface in `World.surfaces`, -1 where there is none.
-        bearing: Share of the patch's half extents on which the centre of pressure can be; see `Surface`.
+        bearing: m; how far from the middle of the patch the centre of pressure can be; see `Surface`.
     """
 
     limb: Limb
     pose: Pose
     friction: float
     surface: int = -1
-    bearing: float = 1.0
+    bearing: float = math.inf
 
 
 @dataclass(frozen=True)

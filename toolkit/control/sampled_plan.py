@@ -128,7 +128,7 @@ def sample_reference(times: np.ndarray, plan: WholeBodyPlan) -> Reference:
         authority=authority,
         in_contact=in_contact,
         friction=friction,
-        half_size=bearing[..., None] * robot.bearings,
+        half_size=np.minimum(bearing[..., None], robot.bearings),
         wrench=planned_wrench(motion)[interval],
         swings=swings,
     )
@@ -172,7 +172,7 @@ def _posture(times: np.ndarray, trajectory: WholeBodyTrajectory) -> tuple[np.nda
 
 
 def _ground(times: np.ndarray, sequence: ContactSequence, swings: tuple[Swing, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """(C, 4) friction of the contact that each limb has or moves to, and (C, 4) the share of its patch that bears."""
+    """(C, 4) friction of the contact that each limb has or moves to, and (C, 4) m how far its patch bears."""
     friction, bearing = np.ones((2, len(times), 4))
     held = [(contact, times >= times[0]) for contact in sequence.start.contacts]
     held += [(swing.contact, times >= swing.start) for swing in swings if swing.contact is not None]

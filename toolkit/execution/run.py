@@ -29,6 +29,7 @@ Observer = Callable[[float, str], None]
 
 # Time and length are those of a body of the usual size (`toolkit.robot.scale`).
 EXTRA_REST = 0.5  # s; time on the last stance after the plan's own rest, in which an unstable robot would topple
+_SETTLING, _DAMPING = 300, 0.05  # physics steps of sinking on curved ground, and what each takes of the speed
 _UNDERFOOT = 0.02  # m; geoms so near to a patch are what it stands on
 _DEFAULT = ExecutionConfig()
 
@@ -42,7 +43,7 @@ def execute(
 ) -> Execution:
     """Simulate a plan under the controller.
 
-    The robot starts in the trajectory's first state. Only joint torques within its limits drive it, apart from a push
+    The robot starts in the trajectory's first state, settled where the ground under it is curved. Only joint torques within its limits drive it, apart from a push
     that `config.disturbance` asks for. The run ends `EXTRA_REST` after the plan, or with a fall.
 
     Args:
@@ -64,6 +65,8 @@ def execute(
     index = SceneIndex(scene, robot)
     _check_plan(plan)
     qpos0, qvel0 = trajectory.qpos[0].copy(), trajectory.qvel[0].copy()
+    if any(np.isfinite(contact.bearing) for contact in plan.sequence.start.contacts):
+        qpos0 = _settled(scene, qpos0)
     config.disturbance.disturb_model(
         scene, index.robot_geom, _touched(scene, index, qpos0, robot.scale.length * _UNDERFOOT), rng
     )
@@ -137,6 +140,21 @@ def _check_plan(plan: WholeBodyPlan) -> None:
             )
     if not (np.isfinite(trajectory.qpos).all() and np.isfinite(motion.com).all()):
         raise ExecutionError("the plan has values that are not finite; it cannot be executed")
+
+
+def _settled(scene: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
+    """A state near (nq,) in which the ground bears a robot that holds its posture.
+
+    Patches planned on curved ground are above it in places. Feet that begin in the air strike it, as the controller's
+    torques count on its force at once.
+    """
+    stiff, data = copy.copy(scene), mujoco.MjData(scene)
+    stiff.dof_armature[6:] = 1e3 * scene.body_subtreemass[0]
+    data.qpos[:] = qpos
+    for _ in range(_SETTLING):
+        mujoco.mj_step(stiff, data)
+        data.qvel[:] *= 1.0 - _DAMPING
+    return np.concatenate([data.qpos[:7], qpos[7:]])
 
 
 def _touched(scene: mujoco.MjModel, index: SceneIndex, qpos: np.ndarray, within: float) -> np.ndarray:

@@ -19,7 +19,7 @@ from toolkit.search.result import Solution
 from toolkit.world.timing import LONGEST, Timing
 
 SCHEMA = 1
-_PATCH = ("position", "quaternion_wxyz", "rotation", "surface", "friction")
+_PATCH = ("position", "quaternion_wxyz", "rotation", "surface", "friction", "bearing")
 LARGEST = 1e4
 """Greatest number that a contact may have: no world is so large in m."""
 ROUNDING = 1e-9
@@ -169,9 +169,9 @@ def _read_contact(entry: dict[str, Any]) -> Contact:
         raise ValueError(f"position, quaternion_wxyz and friction are numbers within {LARGEST:g}, friction above zero")
     if not abs(surface) < 2**31:
         raise ValueError("surface is no index of a surface")
-    bearing = float(entry.get("bearing", 1.0))
-    if not 0.0 < bearing <= 1.0:
-        raise ValueError("bearing is a share above 0, at most 1")
+    bearing = np.inf if entry.get("bearing") is None else float(entry["bearing"])
+    if not bearing > 0.0:
+        raise ValueError("bearing is a distance above 0 m, or null where the ground is flat")
     pose = Pose.from_quaternion(position, quaternion_wxyz)
     if entry.get("rotation") is not None:
         rotation = np.array(entry["rotation"], float)

@@ -21,12 +21,13 @@ from toolkit.world.world import World
 
 
 def surface_table(world: World) -> Table:
-    """A row per surface: index, geom, position, area, angle from up, friction, what bears, pieces, feet or palms."""
+    """A row per surface: index, geom, position, area, angle, friction, how far it bears, pieces, feet or palms."""
     feet = sum(surface.serves_foot for surface in world.surfaces)
     palms = sum(surface.serves_palm for surface in world.surfaces)
     title = f"{escape(world.name)}: {len(world.surfaces)} surfaces, {feet} for feet, {palms} for palms"
     table = Table(box=box.SIMPLE, pad_edge=False, title=title, title_justify="left")
-    for name in ("index", "geom", "x, y, z, m", "area, m²", "from up, deg", "friction", "bears", "pieces", "serves"):
+    names = ("index", "geom", "x, y, z, m", "area, m²", "from up, deg", "friction", "bears, mm", "pieces", "serves")
+    for name in names:
         table.add_column(name, justify="left" if name in ("geom", "serves") else "right")
     for surface in world.surfaces:
         serves = [name for name, yes in (("foot", surface.serves_foot), ("palm", surface.serves_palm)) if yes]
@@ -37,7 +38,7 @@ def surface_table(world: World) -> Table:
             f"{surface.region.area:.4f}",
             f"{np.degrees(np.arccos(np.clip(surface.normal[2], -1, 1))):.1f}",
             f"{surface.friction:g}",
-            f"{surface.bearing:.0%}",
+            f"{1e3 * surface.bearing:.0f}" if np.isfinite(surface.bearing) else "all",
             str(len(surface.pieces)),
             ", ".join(serves),
         )

@@ -21,8 +21,9 @@ def first_collision(robot: RobotModel, scene: mujoco.MjModel, times: np.ndarray,
     `scene` is the robot and the world in one model. Pairs of links that touch in the home posture are left out.
     """
     model, data = scene, mujoco.MjData(scene)
-    static = model.body_weldid[model.geom_bodyid] == 0
-    patch = np.isin(model.geom_bodyid, [model.body(limb.body).id for limb in robot.limbs.values()])
+    link_of = model.body_weldid[model.geom_bodyid]
+    static = link_of == 0
+    patch = np.isin(link_of, [model.body(limb.body).weldid for limb in robot.limbs.values()])
     resting = _touching_at_home(model, data, static, robot.home)
     length, rate = robot.scale.length, RATE / robot.scale.time
     stride = max(int(np.floor(1.0 / (rate * (times[1] - times[0])) + 1e-9)), 1)

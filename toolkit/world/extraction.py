@@ -36,8 +36,8 @@ class SurfaceConfig:
         flush_angle: Largest angle between the normals of merged faces, rad.
         foot_area, palm_area: Smaller regions are dropped, m^2.
         foot_width, palm_width: Regions in which no circle of this diameter fits are dropped, m.
-        bed: Ground that is off its plane by no more bears everywhere, m. A patch on a curved one bears where it is
-            within this of the highest point: with the height off by d at its ends, a share of sqrt(bed / d) of it.
+        bed: Ground up to this far below the highest point under a patch bears, m: on ground of curvature c as far as
+            sqrt(2 bed / c) from there.
         simplify: Covering shapes are widened by this, and corners that stand out less are left out, m.
         plane_margin: Infinite planes end this far beyond start and goal, m.
     """
@@ -100,7 +100,7 @@ def extract_surfaces(
                 friction=face.friction,
                 serves_foot=foot,
                 serves_palm=palm,
-                bearing=min(1.0, float(np.sqrt(config.bed / max(face.off, config.bed)))),
+                bearing=float(np.sqrt(2.0 * config.bed / face.curvature)) if face.curvature > 0.0 else np.inf,
             )
         )
     return tuple(surfaces)
@@ -165,8 +165,8 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
         for batch in [[other] for other in others] if len(others) < _MANY else [others]:
             polygon = _sealed([polygon, *batch], config.flush)
         names = dict.fromkeys(faces[member].geom for member in members)
-        off = max(faces[member].off for member in members)
-        result[min(members)] = Face("+".join(names), faces[seed].friction, frame, polygon, off)
+        curvature = max(faces[member].curvature for member in members)
+        result[min(members)] = Face("+".join(names), faces[seed].friction, frame, polygon, curvature)
     return [result[first] for first in sorted(result)]
 
 

@@ -31,14 +31,14 @@ class Face:
         friction: Sliding coefficient.
         frame: World_from_face pose; z is the outward normal.
         polygon: Outline in the frame's xy, m; it may have holes.
-        off: m; how far the geom's surface is apart there along the normal; 0 where it is flat.
+        curvature: 1/m; of the geom's surface there; 0 where it is flat.
     """
 
     geom: str
     friction: float
     frame: Pose
     polygon: Polygon
-    off: float = 0.0
+    curvature: float = 0.0
 
 
 def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) -> list[Face]:
@@ -60,16 +60,16 @@ def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) ->
             done.add(label)
         else:
             found = _local_faces(model, data, index, pose, square, least_area)
-        for frame, polygon, off in found:
+        for frame, polygon, curvature in found:
             if polygon.area > least_area:
-                faces.append(Face(label, friction, frame, polygon, off))
+                faces.append(Face(label, friction, frame, polygon, curvature))
     return faces
 
 
 def _local_faces(
     model, data, index: int, pose: Pose, square: tuple[float, ...], least_area: float
 ) -> list[tuple[Pose, Polygon, float]]:
-    """(world_from_face, outline, m that it is off) of a geom's faces."""
+    """(world_from_face, outline, curvature in 1/m) of a geom's faces."""
     types, size = mujoco.mjtGeom, model.geom_size[index]
     kind = model.geom_type[index]
     if kind == types.mjGEOM_PLANE:
@@ -105,7 +105,7 @@ def _local_faces(
         flat=_CURVED,
         least_area=max(_OVERLAP_AREA, least_area),
     )
-    return [(facet.frame, facet.polygon, facet.off) for facet in facets]
+    return [(facet.frame, facet.polygon, facet.curvature) for facet in facets]
 
 
 def _box_turns() -> list[np.ndarray]:

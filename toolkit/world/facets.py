@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _STRICT = 0.07  # part of the tolerances within which the seed of a facet is flat
 _DEGENERATE = 1e-10  # m^2; smaller triangles belong to no facet
+_FLAT = 1e-6  # m; corners that lie less apart are in a plane
 _SPACING = 0.2  # m; distance of the seeds of overlapping facets
 _MANY = 100  # more triangles are merged along edges; for fewer the general union is as quick and allows overlaps
 
@@ -31,12 +32,14 @@ class Facet:
         polygon: Outline in the frame's xy, m; it may have holes.
         triangles: Indices of its triangles in the mesh, (k,) int.
         off: m; how far its triangles' corners lie apart along the normal.
+        curvature: 1/m; the larger principal curvature of the paraboloid nearest to them.
     """
 
     frame: Pose
     polygon: Polygon
     triangles: np.ndarray
     off: float
+    curvature: float
 
 
 def plane_frame(origin: np.ndarray, normal: np.ndarray) -> Pose:
@@ -169,7 +172,18 @@ def facet_of(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
     if not isinstance(shape, Polygon):  # the pieces touch only in points, and the largest is kept
         parts = [part for part in shapely.get_parts(shapely.make_valid(shape)) if isinstance(part, Polygon)]
         shape = max(parts, key=lambda part: part.area, default=Polygon())
-    return Facet(frame, shape, np.sort(group), float(np.ptp(flat[..., 2])))
+    off = float(np.ptp(flat[..., 2]))
+    return Facet(frame, shape, np.sort(group), off, _curvature(flat.reshape(-1, 3)) if off > _FLAT else 0.0)
+
+
+def _curvature(points: np.ndarray) -> float:
+    """The larger principal curvature in 1/m, without its sign, of the paraboloid z(x, y) nearest to points (n, 3)."""
+    points = points - points.mean(axis=0)
+    size = np.abs(points[:, :2]).max()
+    x, y = points[:, :2].T / size  # few points leave some terms open: the least of such terms is taken
+    terms = np.column_stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2])
+    xx, xy, yy = np.linalg.lstsq(terms, points[:, 2], rcond=0.01)[0][3:] / size**2
+    return float(abs(xx + yy) / 2 + np.hypot((xx - yy) / 2, xy))
 
 
 def _union(triangles: np.ndarray) -> shapely.Geometry:

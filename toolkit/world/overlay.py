@@ -42,9 +42,17 @@ def overlap(shapes: np.ndarray, others: np.ndarray) -> np.ndarray:
     result = np.asarray(shapely.area(shapely.intersection(shapes, others)) > _AREA)
     doubtful = np.flatnonzero(~result)
     shapes, others = shapes[doubtful], others[doubtful]
-    for points, owner in (_inner_points(group) for group in (shapes, others)):
-        common = np.logical_and(*(shapely.contains_xy(group[owner], *points.T) for group in (shapes, others)))
-        result[doubtful[owner[common]]] = True
+    points, owner = _inner_points(others)
+    common = np.logical_and(*(shapely.contains_xy(group[owner], *points.T) for group in (shapes, others)))
+    result[doubtful[owner[common]]] = True
+    _, first, shape = np.unique([id(shape) for shape in shapes], return_index=True, return_inverse=True)
+    for index in range(len(first)):  # the same shape may stand beside many
+        with_it = np.flatnonzero(shape == index)
+        points, _ = _inner_points(shapes[first[index : index + 1]])
+        points = points[shapely.contains_xy(shapes[first[index]], *points.T)]
+        point, other = shapely.STRtree(others[with_it]).query(shapely.points(points))
+        common = shapely.contains_xy(others[with_it[other]], *points[point].T)
+        result[doubtful[with_it[other[common]]]] = True
     return result
 
 

@@ -60,8 +60,8 @@ class Solids:
         plane, solid = plane[near], solid[near]
         edges, pair = _ranges(self.edge_first, solid)
         inverse = np.array([frame.inverse().position for frame in frames])
-        ends = self.points[self.edges[edges]] @ turn[plane[pair]] + inverse[plane[pair], None]
-        height = ends[:, :, 2]
+        ends, on = self.edges[edges], plane[pair]
+        height = np.stack([(self.points[end] * turn[on, :, 2]).sum(1) + inverse[on, 2] for end in ends.T], axis=1)
         rise = height[:, 1] - height[:, 0]
         with np.errstate(divide="ignore", invalid="ignore"):
             at_low, at_high = (low - height[:, 0]) / rise, (high - height[:, 0]) / rise
@@ -69,11 +69,12 @@ class Solids:
         enter = np.where(level, 0.0, np.clip(np.minimum(at_low, at_high), 0.0, 1.0))
         leave = np.where(level, 1.0, np.clip(np.maximum(at_low, at_high), 0.0, 1.0))
         inside = np.where(level, (height[:, 0] > low) & (height[:, 0] < high), leave > enter)
-        enter, leave, ends, pair = enter[inside], leave[inside], ends[inside], pair[inside]
+        enter, leave, ends, pair, on = enter[inside], leave[inside], ends[inside], pair[inside], on[inside]
         if len(pair) == 0:
             return np.empty(0, int), np.empty(0, object)
-        along = ends[:, 1, :2] - ends[:, 0, :2]
-        cut = ends[:, :1, :2] + np.stack([enter, leave], axis=1)[:, :, None] * along[:, None]
+        ends = self.points[ends] @ turn[on, :, :2] + inverse[on, None, :2]
+        along = ends[:, 1] - ends[:, 0]
+        cut = ends[:, :1] + np.stack([enter, leave], axis=1)[:, :, None] * along[:, None]
         kept, rank = np.unique(pair, return_inverse=True)
         hulls = np.asarray(shapely.convex_hull(shapely.linestrings(cut.reshape(-1, 2), indices=np.repeat(rank, 2))))
         filled = (shapely.get_type_id(hulls) == 3) & (shapely.area(hulls) > 1e-10)

@@ -26,7 +26,7 @@ class Surface:
         pieces: Convex polygons (k, 2), counterclockwise, m, that cover the region; they may overlap.
         friction: Sliding coefficient.
         serves_foot, serves_palm: Whether the angle of the normal allows feet and palms.
-        bearing: Share of a patch's half extents that bears on it, in (0, 1]; below 1 where the ground is curved.
+        bearing: m; how far from the middle of a patch the ground bears it, above 0; infinite where the ground is flat.
     """
 
     index: int
@@ -37,7 +37,7 @@ class Surface:
     friction: float
     serves_foot: bool
     serves_palm: bool
-    bearing: float = 1.0
+    bearing: float = np.inf
 
     @property
     def normal(self) -> np.ndarray:

@@ -20,7 +20,7 @@ class ContactTable:
     Args:
         friction: (S,) coefficient of each surface of the world.
         scale: Factor on the rounding, for bodies of other sizes (`toolkit.robot.scale`).
-        bearing: (S,) share of a patch that bears on each surface; None for all of it.
+        bearing: (S,) m; how far from the middle of a patch each surface bears; None where all are flat.
 
     Attributes:
         position: (capacity, 3) m; world.
@@ -32,7 +32,7 @@ class ContactTable:
 
     def __init__(self, friction: np.ndarray, scale: float = 1.0, bearing: np.ndarray | None = None):
         self._friction, self._per_metre = friction, 1000 / scale
-        self._bearing = np.ones(len(friction)) if bearing is None else bearing
+        self._bearing = np.full(len(friction), np.inf) if bearing is None else bearing
         self._number: dict[bytes, int] = {}
         self._objects: dict[int, Contact] = {}
         self.position = np.zeros((256, 3))
