@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.search.worlds import FLOOR, box, make_world
-from toolkit.contacts.projection import Projected
+from toolkit.contacts.projected import Projected
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig

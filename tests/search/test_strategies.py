@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.search.worlds import FLOOR, make_world
-from toolkit.contacts.projection import Projected
+from toolkit.contacts.projected import Projected
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from toolkit.contacts.projection import Projected
+from toolkit.contacts.projected import Projected
+from toolkit.contacts.seats import Seats
 from toolkit.geometry.heading import wrapped
 from toolkit.geometry.plane import along_plane, plane_height
 from toolkit.world.surface import Surface
@@ -38,6 +39,7 @@ class Footholds:
         self._origins = np.array([surface.pose.position for surface in surfaces]).reshape(-1, 3)
         self._regions: dict[tuple[int, int], shapely.Geometry] = {}
         self._edges: dict[int, float] = {}
+        self._seats = Seats(surfaces)
 
     def headings(self, index: int, yaw: float) -> list[float]:
         """Headings in rad to try on a surface: the wanted one, and those along and across its longest edge."""
@@ -85,7 +87,7 @@ class Footholds:
         found.surface[rows] = np.repeat(chosen, count)
         found.position[rows] = (origin[:, None] + flat @ turn[:, :, :2].transpose(0, 2, 1)).reshape(-1, 3)
         found.rotation[rows] = np.repeat(frame, count, axis=0)
-        return found
+        return self._seats.lay(found, self._half)
 
     def _longest_edge(self, index: int) -> float:
         """Heading in rad of the longest edge of a surface."""

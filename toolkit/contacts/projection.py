@@ -18,7 +18,9 @@ from dataclasses import astuple, dataclass
 import mujoco
 import numpy as np
 
+from toolkit.contacts.projected import Projected
 from toolkit.contacts.projection_kernels import project_palms, project_soles
+from toolkit.contacts.seats import Seats
 from toolkit.contacts.surface_table import surface_table
 from toolkit.geometry.limb import PALMS, Limb
 from toolkit.robot.model import RobotModel
@@ -47,40 +49,6 @@ class ProjectionConfig:
     def scaled(self, factor: float) -> ProjectionConfig:
         """The same with all lengths multiplied by a factor."""
         return ProjectionConfig(*(factor * length for length in astuple(self)))
-
-
-@dataclass(frozen=True)
-class Projected:
-    """Patches of n candidates.
-
-    Attributes:
-        surface: (n,) int Index of the surface, -1 where the patch fits on none.
-        position: (n, 3) Centre of the patch in the world, in m.
-        rotation: (n, 3, 3) world_from_contact.
-    """
-
-    surface: np.ndarray
-    position: np.ndarray
-    rotation: np.ndarray
-
-    @property
-    def found(self) -> np.ndarray:
-        """(n,) bool; whether the patch fits on a surface."""
-        return self.surface >= 0
-
-    @classmethod
-    def none(cls, count: int) -> Projected:
-        """Candidates whose patches fit nowhere yet."""
-        return cls(np.full(count, -1), np.zeros((count, 3)), np.zeros((count, 3, 3)))
-
-    @classmethod
-    def joined(cls, parts: Sequence[Projected]) -> Projected:
-        """The candidates of all parts, at least one, in their order."""
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__))
-
-    def select(self, rows: np.ndarray) -> Projected:
-        """The candidates of these rows, by index or by mask."""
-        return Projected(self.surface[rows], self.position[rows], self.rotation[rows])
 
 
 def shifts(reach: float, step: float) -> np.ndarray:
@@ -113,11 +81,13 @@ class Projector:
         config: ProjectionConfig | None = None,
     ):
         self.config = (config or ProjectionConfig()).scaled(robot.scale.length)
+        self._patches = robot.half_sizes
         self.half_sizes = robot.half_sizes + self.config.margin
         self.room = robot.foot_room(self.config.margin)
         self.half_sizes[list(PALMS)] = robot.half_sizes[list(PALMS)] + self.config.palm_margin
         self.bearing = np.array([surface.bearing for surface in surfaces])
         self.table = surface_table(surfaces, reach=float(np.linalg.norm(self.room)))
+        self._seats = Seats(surfaces)
         self.offsets = shifts(self.config.shift, self.config.shift_step)
         self._model = model
         self._data = mujoco.MjData(model)
@@ -150,7 +120,7 @@ class Projector:
             found = self._soles(pose[missing], low, high, sole, offsets)
             for name in Projected.__dataclass_fields__:
                 getattr(soles, name)[missing] = getattr(found, name)
-        return soles
+        return self._seats.lay(soles, self._patches[limb])
 
     def _soles(self, pose: np.ndarray, low: float, high: float, half: np.ndarray, offsets: np.ndarray) -> Projected:
         """The soles of `project_soles` with the half extents (2,) m of their room, at poses (n, 3)."""
@@ -180,7 +150,7 @@ class Projector:
         project_palms(shoulder, rays, float(yaw), float(reach), half, chosen, table, *found)
         if palms.found.any():
             palms.surface[self._blocked(shoulder, rays, distance, reach)] = -1
-        return palms
+        return self._seats.lay(palms, self._patches[limb])
 
     def _blocked(self, origin: np.ndarray, rays: np.ndarray, distance: np.ndarray, reach: float) -> np.ndarray:
         """(n,) bool; whether anything that collides lies before `distance` (n,) m on each ray."""

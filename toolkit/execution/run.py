@@ -43,8 +43,9 @@ def execute(
 ) -> Execution:
     """Simulate a plan under the controller.
 
-    The robot starts in the trajectory's first state, settled where the ground under it is curved. Only joint torques within its limits drive it, apart from a push
-    that `config.disturbance` asks for. The run ends `EXTRA_REST` after the plan, or with a fall.
+    The robot starts in the trajectory's first state, settled where the ground under it is curved. Only joint torques
+    within its limits drive it, apart from a push that `config.disturbance` asks for. The run ends `EXTRA_REST` after
+    the plan, or with a fall.
 
     Args:
         plan: The plan. Its robot is the robot as the controller knows it, and its scene stays unchanged.

@@ -10,7 +10,8 @@ import numpy as np
 from toolkit.centroidal.program import LEAST
 from toolkit.contacts.arm_map import ArmMap
 from toolkit.contacts.footholds import Footholds
-from toolkit.contacts.projection import Projected, Projector
+from toolkit.contacts.projected import Projected
+from toolkit.contacts.projection import Projector
 from toolkit.contacts.stance import Stance
 from toolkit.contacts.transition_model import TransitionModel, running_steps, steps_38, steps_60
 from toolkit.errors import InputError, PlanningError

@@ -14,6 +14,7 @@ from toolkit.geometry.pose import Pose
 from toolkit.world.convex import convex_partition
 from toolkit.world.faces import Face, faces_of
 from toolkit.world.overlay import cut, overlap, united
+from toolkit.world.relief import crest, moved_relief
 from toolkit.world.solids import Solids
 from toolkit.world.source import Source
 from toolkit.world.surface import Surface
@@ -36,8 +37,8 @@ class SurfaceConfig:
         flush_angle: Largest angle between the normals of merged faces, rad.
         foot_area, palm_area: Smaller regions are dropped, m^2.
         foot_width, palm_width: Regions in which no circle of this diameter fits are dropped, m.
-        bed: Ground up to this far below the highest point under a patch bears, m: on ground of curvature c as far as
-            sqrt(2 bed / c) from there.
+        bed: Ground up to this far below the highest point under a patch bears, m: on a crest of curvature c as far as
+            sqrt(2 bed / c) from there. A patch in a hollow rests on its edges.
         simplify: Covering shapes are widened by this, and corners that stand out less are left out, m.
         plane_margin: Infinite planes end this far beyond start and goal, m.
     """
@@ -100,7 +101,8 @@ def extract_surfaces(
                 friction=face.friction,
                 serves_foot=foot,
                 serves_palm=palm,
-                bearing=float(np.sqrt(2.0 * config.bed / face.curvature)) if face.curvature > 0.0 else np.inf,
+                relief=moved_relief(face.relief, centre),
+                bearing=float(np.sqrt(2.0 * config.bed / curved)) if (curved := crest(face.relief)) > 0.0 else np.inf,
             )
         )
     return tuple(surfaces)
@@ -165,8 +167,8 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
         for batch in [[other] for other in others] if len(others) < _MANY else [others]:
             polygon = _sealed([polygon, *batch], config.flush)
         names = dict.fromkeys(faces[member].geom for member in members)
-        curvature = max(faces[member].curvature for member in members)
-        result[min(members)] = Face("+".join(names), faces[seed].friction, frame, polygon, curvature)
+        flush = Face("+".join(names), faces[seed].friction, frame, polygon)
+        result[min(members)] = flush if others else faces[seed]
     return [result[first] for first in sorted(result)]
 
 
@@ -211,7 +213,9 @@ def _open_regions(faces: list[Face], solids: Solids, config: SurfaceConfig) -> l
     regions = shapely.simplify([face.polygon for face in faces], 1e-6)
     shapely.prepare(regions)
     frames = [face.frame for face in faces]
-    owner, shadows = solids.shadows(frames, shapely.bounds(regions), config.flush, config.clearance)
+    owner, shadows = solids.shadows(
+        frames, shapely.bounds(regions), config.flush, config.clearance, [face.own for face in faces]
+    )
     covers = shapely.intersects(regions[owner], shadows)
     owner, shadows = owner[covers], shadows[covers]
     rest, large = _without_largest(regions, owner, shadows, least := min(config.foot_area, config.palm_area) / 2)

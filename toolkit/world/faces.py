@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -12,11 +12,11 @@ from shapely.geometry import Polygon
 from toolkit.geometry.pose import Pose
 from toolkit.geometry.triangles import height_field_triangles
 from toolkit.world.decomposition import FACET_ANGLE, FACET_DISTANCE
-from toolkit.world.facets import find_facets, overlapping_facets
+from toolkit.world.facets import find_facets, with_overlapping
+from toolkit.world.relief import FLAT
 from toolkit.world.solids import plane_rectangle
 from toolkit.world.source import Source, mesh_of_geom
 
-_OVERLAP_ANGLE, _OVERLAP_DISTANCE = np.radians(6.0), 2e-3  # rad, m; tolerances of facets that overlap others
 _OVERLAP_AREA = 0.01  # m^2; smaller ones are no use to a sole
 _CURVED = 1e-4  # m; facets that are off their plane by more are overlapped
 _CAP_SIDES = 64  # corners of a cylinder's cap; they lie on the circle
@@ -31,14 +31,16 @@ class Face:
         friction: Sliding coefficient.
         frame: World_from_face pose; z is the outward normal.
         polygon: Outline in the frame's xy, m; it may have holes.
-        curvature: 1/m; of the geom's surface there; 0 where it is flat.
+        relief: How the geom's surface curves there; see `toolkit.world.relief`.
+        own: Which of the scene's solids (`Solids`) the face is on: the geom's number, and the places among its solids.
     """
 
     geom: str
     friction: float
     frame: Pose
     polygon: Polygon
-    curvature: float = 0.0
+    relief: np.ndarray = field(default_factory=lambda: FLAT)
+    own: tuple[int, np.ndarray] | None = None
 
 
 def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) -> list[Face]:
@@ -56,36 +58,38 @@ def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) ->
         pose = Pose(data.geom_xmat[index].reshape(3, 3).copy(), data.geom_xpos[index].copy())
         if label in source.facets:  # the facets of a mesh that consists of parts are added once
             # They are as flat as the parts that collide, however curved the mesh was.
-            found = [(facet.frame, facet.polygon, 0.0) for facet in source.facets[label]] if label not in done else []
+            found = [Face(label, friction, facet.frame, facet.polygon) for facet in source.facets[label]]
+            found = found if label not in done else []
             done.add(label)
         else:
-            found = _local_faces(model, data, index, pose, square, least_area)
-        for frame, polygon, curvature in found:
-            if polygon.area > least_area:
-                faces.append(Face(label, friction, frame, polygon, curvature))
+            found = _local_faces(Face(label, friction, pose, Polygon()), model, data, index, square, least_area)
+        faces += [face for face in found if face.polygon.area > least_area]
     return faces
 
 
-def _local_faces(
-    model, data, index: int, pose: Pose, square: tuple[float, ...], least_area: float
-) -> list[tuple[Pose, Polygon, float]]:
-    """(world_from_face, outline, curvature in 1/m) of a geom's faces."""
+def _local_faces(body: Face, model, data, index: int, square: tuple[float, ...], least_area: float) -> list[Face]:
+    """The faces of a geom, which are like `body` but for frame, outline and relief; its frame is the geom's."""
+    pose = body.frame
+
+    def face(frame: Pose, polygon: Polygon) -> Face:
+        return replace(body, frame=frame, polygon=polygon)
+
     types, size = mujoco.mjtGeom, model.geom_size[index]
     kind = model.geom_type[index]
     if kind == types.mjGEOM_PLANE:
         rectangle = plane_rectangle(pose, square)
         drawn = np.where(size[:2] > 0, size[:2], np.inf)
         low, high = np.maximum(rectangle.min(axis=0), -drawn), np.minimum(rectangle.max(axis=0), drawn)
-        return [(pose, shapely.box(*low, *high), 0.0)] if (high > low).all() else []
+        return [face(pose, shapely.box(*low, *high))] if (high > low).all() else []
     if kind == types.mjGEOM_BOX:
         halves = [np.abs(turn[:, :2].T @ size) for turn in _BOX_TURNS]
         shapes = [shapely.box(*-half, *half) for half in halves]
-        return [(pose @ Pose(turn, turn[:, 2] * size), box, 0.0) for turn, box in zip(_BOX_TURNS, shapes, strict=True)]
+        return [face(pose @ Pose(turn, turn[:, 2] * size), box) for turn, box in zip(_BOX_TURNS, shapes, strict=True)]
     if kind == types.mjGEOM_CYLINDER:
         angle = 2 * np.pi * np.arange(_CAP_SIDES) / _CAP_SIDES
         cap = Polygon(size[0] * np.column_stack([np.cos(angle), np.sin(angle)]))
         down = np.diag([1.0, -1.0, -1.0])
-        return [(pose @ Pose(turn, turn[:, 2] * size[1]), cap, 0.0) for turn in (np.eye(3), down)]
+        return [face(pose @ Pose(turn, turn[:, 2] * size[1]), cap) for turn in (np.eye(3), down)]
     import trimesh  # here, since it takes long to import
 
     if kind == types.mjGEOM_MESH:
@@ -97,15 +101,16 @@ def _local_faces(
     else:
         return []
     facets = find_facets(hull, angle=FACET_ANGLE, distance=FACET_DISTANCE, least_area=least_area)
-    facets += overlapping_facets(
-        hull,
-        facets,
-        angle=_OVERLAP_ANGLE,
-        distance=_OVERLAP_DISTANCE,
-        flat=_CURVED,
-        least_area=max(_OVERLAP_AREA, least_area),
-    )
-    return [(facet.frame, facet.polygon, facet.curvature) for facet in facets]
+    facets = with_overlapping(hull, facets, flat=_CURVED, least_area=max(_OVERLAP_AREA, least_area))
+    whole = np.zeros(1, int)  # a convex mesh is one solid, and a height field one for each triangle
+    return [
+        replace(
+            face(facet.frame, facet.polygon),
+            relief=facet.relief,
+            own=(index, facet.triangles if kind == types.mjGEOM_HFIELD else whole),
+        )
+        for facet in facets
+    ]
 
 
 def _box_turns() -> list[np.ndarray]:

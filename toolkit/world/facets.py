@@ -12,14 +12,18 @@ from shapely.geometry import Polygon
 from toolkit.compiled import compiled
 from toolkit.geometry.pose import Pose
 from toolkit.world.overlay import united
+from toolkit.world.relief import FLAT, off_relief, relief_of
 
 if TYPE_CHECKING:
     import trimesh
 
 _STRICT = 0.07  # part of the tolerances within which the seed of a facet is flat
 _DEGENERATE = 1e-10  # m^2; smaller triangles belong to no facet
-_FLAT = 1e-6  # m; corners that lie less apart are in a plane
+_PLANE = 1e-6  # m; corners that lie less apart are in a plane
 _SPACING = 0.2  # m; distance of the seeds of overlapping facets
+_DISCS, _DISC_ANGLE, _DISC_DISTANCE = (0.25, 0.2, 0.16), np.radians(10.0), 0.02  # m, rad, m; of those that are smooth
+_ROUGH = 1.5e-3  # m; where the mesh is further off its relief, a disc is not smooth
+_ANGLE, _DISTANCE = np.radians(6.0), 2e-3  # rad, m; tolerances of overlapping facets that are not
 _MANY = 100  # more triangles are merged along edges; for fewer the general union is as quick and allows overlaps
 
 
@@ -32,14 +36,14 @@ class Facet:
         polygon: Outline in the frame's xy, m; it may have holes.
         triangles: Indices of its triangles in the mesh, (k,) int.
         off: m; how far its triangles' corners lie apart along the normal.
-        curvature: 1/m; the larger principal curvature of the paraboloid nearest to them.
+        relief: The paraboloid nearest to them; see `toolkit.world.relief`.
     """
 
     frame: Pose
     polygon: Polygon
     triangles: np.ndarray
     off: float
-    curvature: float
+    relief: np.ndarray
 
 
 def plane_frame(origin: np.ndarray, normal: np.ndarray) -> Pose:
@@ -72,17 +76,17 @@ def flat_groups(mesh: trimesh.Trimesh, *, angle: float, distance: float, least_a
     return [group for group in groups if area[group].sum() >= least_area]
 
 
-def overlapping_facets(
-    mesh: trimesh.Trimesh, facets: list[Facet], *, angle: float, distance: float, flat: float, least_area: float
-) -> list[Facet]:
-    """More facets of the curved parts of a mesh, which overlap each other: a sole finds its place between others, too.
+def with_overlapping(mesh: trimesh.Trimesh, facets: list[Facet], *, flat: float, least_area: float) -> list[Facet]:
+    """Facets of a mesh, and more of its curved parts, which overlap each other: a sole finds its place between others.
 
-    They grow as in `find_facets`, but over all triangles, around seeds that are `_SPACING` apart seen from above. None
-    is in one of the `facets` that are off their plane by at most `flat` m and at least as large as a square of that.
+    Around seeds that are `_SPACING` apart seen from above, these are the largest of the `_DISCS` in which the mesh is
+    within `_ROUGH` m of a relief, or, where it is rough, what grows there as in `find_facets`. No seed is in one of the
+    `facets` that are off their plane by at most `flat` m and at least as large as a square of that. Other `facets` are
+    left out where a disc holds them whole.
     """
     table, area = _Triangles.of(mesh), mesh.area_faces
     free = area > _DEGENERATE
-    curved = free.copy()
+    curved, smooth = free.copy(), np.zeros(len(free), bool)
     for facet in facets:
         curved[facet.triangles] &= facet.off > flat or facet.polygon.area < _SPACING**2
     place = mesh.triangles_center[:, :2] / _SPACING
@@ -91,12 +95,27 @@ def overlapping_facets(
     _, first = np.unique(np.floor(place[near]), axis=0, return_index=True)
     known, found = {facet.triangles.tobytes() for facet in facets}, []
     for seed in near[first].tolist():
-        group = np.sort(table.grown(np.array([seed]), free, angle, distance)[0])
-        free[group] = True  # for the facets of the seeds to come
-        if area[group].sum() >= least_area and (key := group.tobytes()) not in known:
+        facet = _disc(mesh, table, free, seed)
+        if facet is not None:
+            smooth[facet.triangles] = True
+        else:
+            facet = facet_of(mesh, table.around(seed, free, _ANGLE, _DISTANCE))
+        if area[facet.triangles].sum() >= least_area and (key := facet.triangles.tobytes()) not in known:
             known.add(key)
-            found.append(facet_of(mesh, group))
-    return found
+            found.append(facet)
+    return [facet for facet in facets if facet.off <= flat or not smooth[facet.triangles].all()] + found
+
+
+def _disc(mesh: trimesh.Trimesh, table: _Triangles, free: np.ndarray, seed: int) -> Facet | None:
+    """The largest smooth facet around a triangle whose triangles are `free`; None where the mesh is rough."""
+    group = table.around(seed, free, _DISC_ANGLE, _DISC_DISTANCE)
+    away = np.linalg.norm(mesh.triangles_center[group] - mesh.triangles_center[seed], axis=1)
+    for radius in _DISCS:
+        facet = facet_of(mesh, group[away <= radius])
+        corners = facet.frame.inverse() @ mesh.triangles[facet.triangles].reshape(-1, 3)
+        if np.abs(off_relief(facet.relief, corners)).max() <= _ROUGH:
+            return facet
+    return None
 
 
 class _Triangles(NamedTuple):
@@ -122,6 +141,12 @@ class _Triangles(NamedTuple):
         members, last = np.empty(len(free), np.int64), np.empty(len(seeds), np.int64)
         count = _grow(seeds, free, *self, float(np.cos(angle)), distance, members, last)
         return np.split(members[: last[count - 1]], last[: count - 1]) if count else []
+
+    def around(self, seed: int, free: np.ndarray, angle: float, distance: float) -> np.ndarray:
+        """The group (k,) around one triangle, in order of the triangles; they stay free."""
+        (group,) = self.grown(np.array([seed]), free, angle, distance)
+        free[group] = True
+        return np.sort(group)
 
 
 @compiled(kept=True, allocates=True)
@@ -173,17 +198,8 @@ def facet_of(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
         parts = [part for part in shapely.get_parts(shapely.make_valid(shape)) if isinstance(part, Polygon)]
         shape = max(parts, key=lambda part: part.area, default=Polygon())
     off = float(np.ptp(flat[..., 2]))
-    return Facet(frame, shape, np.sort(group), off, _curvature(flat.reshape(-1, 3)) if off > _FLAT else 0.0)
-
-
-def _curvature(points: np.ndarray) -> float:
-    """The larger principal curvature in 1/m, without its sign, of the paraboloid z(x, y) nearest to points (n, 3)."""
-    points = points - points.mean(axis=0)
-    size = np.abs(points[:, :2]).max()
-    x, y = points[:, :2].T / size  # few points leave some terms open: the least of such terms is taken
-    terms = np.column_stack([np.ones_like(x), x, y, x * x / 2, x * y, y * y / 2])
-    xx, xy, yy = np.linalg.lstsq(terms, points[:, 2], rcond=0.01)[0][3:] / size**2
-    return float(abs(xx + yy) / 2 + np.hypot((xx - yy) / 2, xy))
+    relief = relief_of(flat.reshape(-1, 3)) if off > _PLANE else FLAT
+    return Facet(frame, shape, np.sort(group), off, relief)
 
 
 def _union(triangles: np.ndarray) -> shapely.Geometry:

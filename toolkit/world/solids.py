@@ -26,6 +26,7 @@ class Solids:
         low, high: Boxes around the solids along the axes of the world, (s, 3) float, m.
         edges: Pairs of vertices, (k, 2) int, with all convex edges of the solids among them.
         edge_first: Solid i has the edges from edge_first[i] to edge_first[i + 1]; (s + 1,) int.
+        first: The first solid of each geom, by the geom's number.
     """
 
     points: np.ndarray
@@ -33,9 +34,15 @@ class Solids:
     high: np.ndarray
     edges: np.ndarray
     edge_first: np.ndarray
+    first: dict[int, int]
 
     def shadows(
-        self, frames: Sequence[Pose], bounds: np.ndarray, low: float, high: float
+        self,
+        frames: Sequence[Pose],
+        bounds: np.ndarray,
+        low: float,
+        high: float,
+        own: Sequence[tuple[int, np.ndarray] | None] = (),
     ) -> tuple[np.ndarray, np.ndarray]:
         """Project the parts of the solids between two heights above each plane on that plane.
 
@@ -44,6 +51,7 @@ class Solids:
             bounds: Bounds xmin, ymin, xmax, ymax in each plane, (n, 4) float, m; solids outside are left out.
             low: The lower height, m.
             high: The upper height, m.
+            own: By plane, the solids that cast no shadow on it: the number of a geom, and the places among its solids.
 
         Returns:
             Ascending indices of planes (k,) int, and polygons (k,) in their xy, one per solid that covers an area.
@@ -58,6 +66,10 @@ class Solids:
         plane, solid = pairs[:, np.lexsort(pairs[::-1])]
         near = (self.high[solid] > least[plane]).all(axis=1) & (self.low[solid] < most[plane]).all(axis=1)
         plane, solid = plane[near], solid[near]
+        skipped = [len(self.low) * k + self.first[part[0]] + part[1] for k, part in enumerate(own) if part is not None]
+        if skipped:
+            others = ~np.isin(len(self.low) * plane + solid, np.concatenate(skipped))
+            plane, solid = plane[others], solid[others]
         edges, pair = _ranges(self.edge_first, solid)
         inverse = np.array([frame.inverse().position for frame in frames])
         ends, on = self.edges[edges], plane[pair]
@@ -96,8 +108,10 @@ def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     points, edges, counts, total = [np.zeros((0, 3))], [np.zeros((0, 2), int)], [], 0
+    starts: dict[int, int] = {}
     for index in np.flatnonzero((model.geom_contype | model.geom_conaffinity) != 0).tolist():
         pose = Pose(data.geom_xmat[index].reshape(3, 3), data.geom_xpos[index])
+        starts[index] = sum(len(each) for each in counts)
         for corners, sides in _local_solids(model, index, pose, square):
             many, each = corners.shape[:2]
             first = total + each * np.arange(many)[:, None, None]
@@ -113,6 +127,7 @@ def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
         np.maximum.reduceat(points, point_first[:-1]) if len(points) else points,
         np.concatenate(edges),
         edge_first,
+        starts,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
@@ -11,6 +11,7 @@ from shapely.ops import nearest_points
 
 from toolkit.geometry.plane import plane_height
 from toolkit.geometry.pose import Pose
+from toolkit.world.relief import FLAT
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,8 @@ class Surface:
         pieces: Convex polygons (k, 2), counterclockwise, m, that cover the region; they may overlap.
         friction: Sliding coefficient.
         serves_foot, serves_palm: Whether the angle of the normal allows feet and palms.
-        bearing: m; how far from the middle of a patch the ground bears it, above 0; infinite where the ground is flat.
+        relief: (6,) How its ground curves about its plane; see `toolkit.world.relief`.
+        bearing: m; how far from the middle of a patch the ground bears it, above 0; infinite but on crests.
     """
 
     index: int
@@ -37,6 +39,7 @@ class Surface:
     friction: float
     serves_foot: bool
     serves_palm: bool
+    relief: np.ndarray = field(default_factory=lambda: FLAT)
     bearing: float = np.inf
 
     @property

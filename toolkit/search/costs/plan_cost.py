@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.centroidal.plan import MotionPlan
-from toolkit.contacts.projection import Projected
+from toolkit.contacts.projected import Projected
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from toolkit.contacts.footholds import Footholds
-from toolkit.contacts.projection import Projected
+from toolkit.contacts.projected import Projected
 from toolkit.contacts.surface_table import SurfaceTable
 from toolkit.contacts.transition_model import soles_apart
 from toolkit.geometry.limb import Limb

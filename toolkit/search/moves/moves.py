@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.contacts.arm_map import ArmMap
-from toolkit.contacts.projection import Projected, Projector
+from toolkit.contacts.projected import Projected
+from toolkit.contacts.projection import Projector
 from toolkit.contacts.transition_model import TransitionModel
 from toolkit.geometry.heading import mean_heading
 from toolkit.geometry.limb import Limb

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.centroidal.problem import GRAVITY
-from toolkit.contacts.projection import Projected
+from toolkit.contacts.projected import Projected
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose, steepness, yaw_of
