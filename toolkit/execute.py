@@ -84,7 +84,7 @@ def main(argv: list[str] | None = None) -> int:
     world = load_world(args.world, progress=lambda share: display.progress("surfaces", share))
     surface_seconds = time.perf_counter() - began
     robot = load_robot(args.robot or robot_name, args.robots)
-    display.warn(robot)
+    display.warn(robot, world)
     with RunFolder(args.out, world.name, robot.name) as folder:  # one that cannot be written is noticed here
         if args.pictures or args.video:
             require_rendering()

@@ -57,7 +57,7 @@ def main(argv: list[str] | None = None) -> int:
         surface_seconds = time.perf_counter() - began
         robot = load_robot(args.robot, args.robots)
         run_folder = RunFolder(args.out, world.name, robot.name)  # one that is not fit for it is noticed here
-    display.warn(robot)
+    display.warn(robot, world)
     with run_folder as folder:
         display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
         planner = make_planner(robot, world, options.planner, options.planner_config())

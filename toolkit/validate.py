@@ -67,7 +67,7 @@ def main(argv: list[str] | None = None) -> int:
         run_folder = RunFolder(args.out, world.name, robot.name)  # one that is not fit for it is noticed here
         if args.pictures or args.video:
             require_rendering()
-    display.warn(robot)
+    display.warn(robot, world)
     with run_folder as folder:
         display.finished("surfaces", True, surface_seconds, f"{len(world.surfaces)} surfaces")
         planner = make_planner(robot, world, options.planner, options.planner_config())

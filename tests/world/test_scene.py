@@ -9,7 +9,7 @@ import pytest
 from tests.world.conftest import mjcf_of
 from toolkit.errors import RobotError
 from toolkit.world.loader import load_world
-from toolkit.world.scene import compose_scene
+from toolkit.world.scene import compose_scene, doubts
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 FLOORS = """
@@ -137,3 +137,16 @@ def test_robot_with_meshes_in_a_world_without(stool, make_world):
     robot = replace(stool, mjcf=own, assets={"shell.obj": OBJ.encode()})
     # Warnings are errors here: MuJoCo warns where only one side of an attachment has files.
     assert compose_scene(robot, make_world(FLOORS, assets=ASSETS, more=MORE)).nmesh == 1
+
+
+def test_a_field_too_fine_for_a_sole_is_doubtful(stool, make_world):
+    """A sole on many triangles of a height field makes more contacts with it than MuJoCo keeps."""
+
+    def lines(points: int) -> list[str]:
+        heights = " ".join(["0"] * (points * points))
+        field = f'<hfield name="rough" nrow="{points}" ncol="{points}" size="1 1 0.1 0.1" elevation="{heights}"/>'
+        return doubts(stool, make_world('<geom type="hfield" hfield="rough"/>', assets=field))
+
+    assert lines(21) == []
+    (line,) = lines(201)
+    assert "'rough'" in line and "MuJoCo keeps 50" in line and "cm apart" in line

@@ -32,6 +32,8 @@ from toolkit.pipeline.observer import Observer
 from toolkit.report.run_report import RunReport
 from toolkit.report.summary import sequence_rows
 from toolkit.robot.model import RobotModel
+from toolkit.world.scene import doubts
+from toolkit.world.world import World
 
 STYLES = {Result.PASS: "bold green", Result.FAIL: "bold red", Result.NOT_CHECKED: "yellow"}
 PLAIN_WIDTH = 160  # columns assumed where the output is no terminal
@@ -62,7 +64,12 @@ def make_console() -> Console:
 def print_warnings(console: Console, robot: RobotModel) -> None:
     """Print what is doubtful about a robot, a line each."""
     for warning in robot.warnings:
-        console.print(f"warning: {robot.name}: {warning}", style="yellow", soft_wrap=True, markup=False)
+        _warn(console, robot.name, warning)
+
+
+def _warn(console: Console, name: str, warning: str) -> None:
+    """Print a warning about something with a name."""
+    console.print(f"warning: {name}: {warning}", style="yellow", soft_wrap=True, markup=False)
 
 
 def progress_bar(console: Console) -> Progress:
@@ -128,10 +135,12 @@ class StageConsole(Observer):
         row = Text(f"{stage:<11}").append(f"{result.value:<8}", style=STYLES[result]).append(f"{seconds:>7.2f} s  ")
         self._line(row.append(" ".join(detail.split())))
 
-    def warn(self, robot: RobotModel) -> None:
-        """Print what is doubtful about a robot."""
+    def warn(self, robot: RobotModel, world: World) -> None:
+        """Print what is doubtful about a robot, and about it in a world."""
         self._clear()
         print_warnings(self.console, robot)
+        for line in doubts(robot, world):
+            _warn(self.console, world.name, line)
 
     def verdict(self, checks: Sequence[Check], passed: bool, reason: str, folder: Path, seconds: float) -> None:
         """Print the checks, then `PASS` or `FAIL: reason` on its own line, then the folder of the run's files.

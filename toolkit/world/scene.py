@@ -12,6 +12,7 @@ from toolkit.world.options import set_options
 from toolkit.world.world import PALM_SITES, World
 
 WORLD_PREFIX = "world/"  # prefix of every name in the scene that comes from the world
+_CONTACTS = 2.0  # that a sole makes with each triangle of a height field under it, at most, as measured
 
 
 def compose_scene(robot: RobotModel, world: World) -> mujoco.MjModel:
@@ -61,6 +62,29 @@ def compose_scene(robot: RobotModel, world: World) -> mujoco.MjModel:
         raise RobotError(f"{robot.folder}: cannot be put into {world.path}: {one_line(error)}") from error
     _check_composed(model, robot, world)
     return model
+
+
+def doubts(robot: RobotModel, world: World) -> list[str]:
+    """What is doubtful about a robot in a world: a line for each height field too fine for the robot's soles.
+
+    MuJoCo keeps `mjMAXCONPAIR` contacts of two geoms, so that part of a sole on more triangles than that is left in the
+    air.
+    """
+    model, lines = world.mujoco_model, []
+    sole = max(float(4.0 * foot.half_size.prod()) for limb, foot in robot.limbs.items() if limb.is_foot)
+    for geom in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD).tolist():
+        field = int(model.geom_dataid[geom])
+        points = np.array([model.hfield_ncol[field], model.hfield_nrow[field]])
+        cell = float((2.0 * model.hfield_size[field, :2] / (points - 1)).prod())
+        contacts = 2.0 * _CONTACTS * sole / cell
+        if contacts > mujoco.mjMAXCONPAIR and model.geom_contype[geom] | model.geom_conaffinity[geom]:
+            apart = np.sqrt(2.0 * _CONTACTS * sole / mujoco.mjMAXCONPAIR)
+            lines.append(
+                f"height field {model.hfield(field).name!r}: a sole makes some {contacts:.0f} contacts with it, and "
+                f"MuJoCo keeps {mujoco.mjMAXCONPAIR}: part of it hangs in the air, and it may slide; put the field's "
+                f"points at least {100 * apart:.1f} cm apart"
+            )
+    return lines
 
 
 def _share_assets(spec: mujoco.MjSpec, scenery: mujoco.MjSpec) -> None:
