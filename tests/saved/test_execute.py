@@ -127,6 +127,13 @@ def test_a_robot_without_the_limb_is_refused(copy, robot):
         carry_out(replace(robot, limbs=limbs), world, read_proposal(copy / "plan.json"), PipelineConfig())
 
 
+def test_a_plan_that_counts_on_more_ground_than_bears_is_refused(copy, robot):
+    world = load_world(read_json(copy / "report.json")["options"]["world"])
+    crests = tuple(replace(surface, bearing=0.05) for surface in world.surfaces)
+    with pytest.raises(InputError, match=r"start counts on ground that bears left_foot inf mm .* does so for 50 mm"):
+        carry_out(robot, replace(world, surfaces=crests), read_proposal(copy / "plan.json"), PipelineConfig())
+
+
 def test_an_unknown_robot_gets_one_line(walk_folder):
     code, line = called(execute.main, walk_folder, "--robot", "nobody")
     assert code == 2 and "nobody" in line

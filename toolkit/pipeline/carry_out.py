@@ -89,3 +89,8 @@ def _check_contact(contact: Contact, where: str, robot: RobotModel, world: World
             f"{where} counts on friction {contact.friction:g} where surface {contact.surface} has "
             f"{surface.friction:g}: {remedy}"
         )
+    if contact.bearing > surface.bearing + 1e-9:
+        raise InputError(
+            f"{where} counts on ground that bears {label} {1e3 * contact.bearing:.3g} mm from its middle where surface "
+            f"{contact.surface} does so for {1e3 * surface.bearing:.3g} mm: {remedy}"
+        )
