@@ -14,6 +14,7 @@ from toolkit.geometry.triangles import mesh_triangles, mesh_vertices
 from toolkit.mjcf import SIZES, compile_spec, one_line, read_spec
 from toolkit.world.decomposition import Decomposition, decompose_mesh
 from toolkit.world.facets import Facet
+from toolkit.world.mesh_field import MeshField, field_of, is_splintered
 from toolkit.world.options import check_options
 
 VISUAL_GROUP = 2  # geoms that do not collide
@@ -46,8 +47,8 @@ def read_source(path: Path, mjcf: str | None = None, progress: Callable[[float],
     """Read and check a world's MJCF file, or its text if it exists in memory only.
 
     MuJoCo collides a mesh geom as its convex hull. A mesh that is not convex is therefore replaced by convex parts,
-    one or more per flat facet, and kept for drawing only. So drawing, rays and contacts agree. `progress` is called
-    with the share of the meshes that is done, in [0, 1].
+    one or more per flat facet, or, where it is curved terrain, by a height field, and kept for drawing only. So
+    drawing, rays and contacts agree. `progress` is called with the share of the meshes that is done, in [0, 1].
 
     Raises:
         WorldError: The file is missing or broken, or has moving parts, NaN, unusable friction or unsupported geoms.
@@ -60,14 +61,16 @@ def read_source(path: Path, mjcf: str | None = None, progress: Callable[[float],
     labels = [model.geom(i).name or _unused(_kind(model, i), names) for i in range(model.ngeom)]
     _check_geoms(path, model, colliding, labels)
 
-    parts = _decompositions(path, model, colliding, labels, progress)
+    parts, fields = _decompositions(path, model, colliding, labels, progress)
     for geom in list(spec.geoms):
         index = geom.id
         geom.name = labels[index]
-        _normalise(geom, model, index, bool(colliding[index]) and index not in parts)
+        _normalise(geom, model, index, bool(colliding[index]) and index not in parts and index not in fields)
     owner = {}
     for index, decomposition in parts.items():
         owner.update(_add_parts(spec, model, index, labels[index], decomposition, names))
+    for index, field in fields.items():
+        owner.update(_add_field(spec, model, index, labels[index], field, names))
     try:
         final = compile_spec(spec)
     except (ValueError, InputError) as error:
@@ -152,22 +155,31 @@ def _check_geoms(path: Path, model: mujoco.MjModel, colliding: np.ndarray, label
 
 def _decompositions(
     path: Path, model: mujoco.MjModel, colliding: np.ndarray, labels: list[str], progress: Callable[[float], None]
-) -> dict[int, Decomposition]:
-    """Decompositions by geom id of the colliding mesh geoms that are not convex."""
+) -> tuple[dict[int, Decomposition], dict[int, MeshField]]:
+    """What the colliding mesh geoms that are not convex are replaced with, by geom id: parts, or a height field."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    result = {}
+    parts: dict[int, Decomposition] = {}
+    fields: dict[int, MeshField] = {}
     meshes = np.flatnonzero(colliding & (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)).tolist()
     for done, index in enumerate(meshes):
         progress(done / len(meshes))
         vertices, triangles = mesh_of_geom(model, data, index)
+        decomposition, problem = None, None
         try:
             decomposition = decompose_mesh(vertices, triangles)
         except ValueError as error:
-            raise WorldError(f"{path}: mesh geom '{labels[index]}': {error}") from error
+            problem = error
+        if problem is not None or (decomposition is not None and is_splintered(decomposition.facets)):
+            field = field_of(model, data, index, vertices, triangles)
+            if field is not None:
+                fields[index] = field
+                continue
+        if problem is not None:
+            raise WorldError(f"{path}: mesh geom '{labels[index]}': {problem}") from problem
         if decomposition is not None:
-            result[index] = decomposition
-    return result
+            parts[index] = decomposition
+    return parts, fields
 
 
 def mesh_of_geom(model: mujoco.MjModel, data: mujoco.MjData, index: int) -> tuple[np.ndarray, np.ndarray]:
@@ -190,6 +202,34 @@ def _normalise(geom, model: mujoco.MjModel, index: int, collides: bool) -> None:
     if model.geom_rgba[index, 3] == 0.0 or (material >= 0 and model.mat_rgba[material, 3] == 0.0):
         geom.material = ""  # MuJoCo's rays pass through invisible geoms
         geom.rgba = [0.5, 0.5, 0.5, 1e-3]
+
+
+def _add_field(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, index: int, label: str, field: MeshField, taken: set[str]
+) -> dict[str, str]:
+    """Add the height field of a mesh geom to the world body; return the label by its name."""
+    name = _unused(f"{label}/field", taken)
+    rows, columns = field.heights.shape
+    top = float(field.heights.max())
+    spec.add_hfield(
+        name=name,
+        nrow=rows,
+        ncol=columns,
+        size=[*field.half, top, field.base],
+        userdata=(field.heights / top).ravel(),
+    )
+    spec.worldbody.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_HFIELD,
+        hfieldname=name,
+        pos=field.pose.position,
+        quat=field.pose.quaternion_wxyz,
+        friction=model.geom_friction[index],
+        group=PART_GROUP,
+        contype=_ALL_BITS,
+        conaffinity=_ALL_BITS,
+    )
+    return {name: label}
 
 
 def _add_parts(
