@@ -15,7 +15,7 @@ from toolkit.world.world import World
 from validation import map_worlds
 from validation.map_worlds import BELOW, FRICTION
 
-QUICK = 60  # worlds of a quick sweep
+QUICK = 63  # worlds of a quick sweep
 SEEDS = 3  # of each value of a whole sweep
 
 _EVEN, _DRAWN = 21, 30  # values of a family with one parameter, and with two

@@ -6,6 +6,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from toolkit.world.clearance import free_boxes
+from toolkit.world.relief import height_and_slopes
 from toolkit.world.source import RAY_GROUPS
 
 
@@ -24,7 +25,7 @@ def random_points(surface, rng, count, inset=0.0):
 
 
 def ray_gap(model, surface, points, height=0.05):
-    """(n,) signed distance along the normal from the plane to what a ray from `height` above meets first."""
+    """(n,) signed distance along the normal from the surface to what a ray from `height` above meets first."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     gaps = []
@@ -33,7 +34,7 @@ def ray_gap(model, surface, points, height=0.05):
         geom = np.zeros(1, np.int32)
         distance = mujoco.mj_ray(model, data, start, -surface.normal, RAY_GROUPS, True, -1, geom)
         gaps.append(height - distance if distance >= 0 else -np.inf)
-    return np.array(gaps)
+    return np.array(gaps) - height_and_slopes(np.tile(surface.relief, (len(points), 1)), np.reshape(points, (-1, 2)))[0]
 
 
 def ball_gap(model, surface, points, radius=0.005):

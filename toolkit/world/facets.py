@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _STRICT = 0.07  # part of the tolerances within which the seed of a facet is flat
 _DEGENERATE = 1e-10  # m^2; smaller triangles belong to no facet
-_PLANE = 1e-6  # m; corners that lie less apart are in a plane
+_PLANE = 1e-4  # m; corners that lie less apart are in a plane
 _SPACING = 0.2  # m; distance of the seeds of overlapping facets
 _DISCS, _DISC_ANGLE, _DISC_DISTANCE = (0.25, 0.2, 0.16), np.radians(10.0), 0.02  # m, rad, m; of those that are smooth
 _ROUGH = 1.5e-3  # m; where the mesh is further off its relief, a disc is not smooth
@@ -112,8 +112,8 @@ def _disc(mesh: trimesh.Trimesh, table: _Triangles, free: np.ndarray, seed: int)
     away = np.linalg.norm(mesh.triangles_center[group] - mesh.triangles_center[seed], axis=1)
     for radius in _DISCS:
         facet = facet_of(mesh, group[away <= radius])
-        corners = facet.frame.inverse() @ mesh.triangles[facet.triangles].reshape(-1, 3)
-        if np.abs(off_relief(facet.relief, corners)).max() <= _ROUGH:
+        points = facet.frame.inverse() @ _samples(mesh.triangles[facet.triangles])
+        if np.abs(off_relief(facet.relief, points)).max() <= _ROUGH:
             return facet
     return None
 
@@ -198,8 +198,19 @@ def facet_of(mesh: trimesh.Trimesh, group: np.ndarray) -> Facet:
         parts = [part for part in shapely.get_parts(shapely.make_valid(shape)) if isinstance(part, Polygon)]
         shape = max(parts, key=lambda part: part.area, default=Polygon())
     off = float(np.ptp(flat[..., 2]))
-    relief = relief_of(flat.reshape(-1, 3)) if off > _PLANE else FLAT
-    return Facet(frame, shape, np.sort(group), off, relief)
+    return Facet(frame, shape, np.sort(group), off, _relief(flat) if off > _PLANE else FLAT)
+
+
+def _relief(triangles: np.ndarray) -> np.ndarray:
+    """The relief of triangles (k, 3, 3) m in the frame of a facet; none where the plane is as near to them."""
+    points = _samples(triangles)
+    relief = relief_of(points)
+    return relief if np.abs(off_relief(relief, points)).max() < np.abs(points[:, 2]).max() else FLAT
+
+
+def _samples(triangles: np.ndarray) -> np.ndarray:
+    """Points (6 k, 3) of triangles (k, 3, 3): the corners, and the middles of the sides."""
+    return np.concatenate([triangles, (triangles + np.roll(triangles, 1, axis=1)) / 2]).reshape(-1, 3)
 
 
 def _union(triangles: np.ndarray) -> shapely.Geometry:

@@ -11,7 +11,7 @@ from shapely.ops import nearest_points
 
 from toolkit.geometry.plane import plane_height
 from toolkit.geometry.pose import Pose
-from toolkit.world.relief import FLAT
+from toolkit.world.relief import FLAT, height_and_slopes
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,10 @@ class Surface:
         """World z (n,) in m of a surface that is not vertical at points (n, 2) of the world's xy, NaN outside it."""
         normal, origin = self.normal, self.pose.position
         height = plane_height(origin, normal, *points.T)
-        local = self.pose.inverse() @ np.column_stack([points, height])
-        inside = shapely.intersects_xy(self.region, local[:, 0], local[:, 1])
-        return np.where(inside, height, np.nan)
+        local = (self.pose.inverse() @ np.column_stack([points, height]))[:, :2]
+        inside = shapely.intersects_xy(self.region, *local.T)
+        above = height_and_slopes(np.tile(self.relief, (len(points), 1)), local)[0]
+        return np.where(inside, height + above / normal[2], np.nan)
 
     def nearest_point(self, point: np.ndarray) -> np.ndarray:
         """The point (3,) of the surface nearest to a point (3,) of the world, m."""
