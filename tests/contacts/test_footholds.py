@@ -1,13 +1,18 @@
 """Footholds: exact regions for whole soles, on surfaces of any shape."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import shapely
 
 from tests.search.worlds import box, make_world
 from toolkit.contacts.footholds import Footholds
+from toolkit.geometry.pose import Pose
+from toolkit.world.surface import Surface
 
 HALF = np.array([0.11, 0.065])
+CORNERS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
 
 
 def footholds(*geoms, margin=0.01):
@@ -56,3 +61,19 @@ def test_samples_leave_no_wide_gaps_on_a_beam(length):
     along = np.sort(holds.samples(top, 0.1)[:, :2] @ [np.cos(np.radians(20)), np.sin(np.radians(20))])
     assert along[0] < -length + 0.15 and along[-1] > length - 0.15
     assert np.diff(along).max() < 0.11
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.3, 1.2])
+def test_a_round_surface_holds_soles_wherever_they_fit(yaw):
+    angle = 2 * np.pi * np.arange(16) / 16
+    ring = 0.26 * np.column_stack([np.cos(angle), np.sin(angle)])
+    world = SimpleNamespace(surfaces=(Surface(0, "disc", Pose.identity(), (ring,), (ring,), 0.5, True, False),))
+    margin = 0.01
+    wishes = np.random.default_rng(0).uniform(-0.25, 0.25, (200, 2))
+    found = Footholds(world.surfaces, HALF, margin).nearest([(0, yaw)], wishes)
+    region, turn = shapely.Polygon(ring), np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    for row, wish in enumerate(wishes):
+        assert covered(world, found, row)
+        fits = region.covers(shapely.Polygon(wish + CORNERS * (HALF + margin) @ turn))
+        at_wish = np.hypot(*(found.position[row, :2] - wish)) < 1e-9
+        assert at_wish == fits

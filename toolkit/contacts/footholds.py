@@ -15,9 +15,11 @@ from toolkit.contacts.projected import Projected
 from toolkit.contacts.seats import Seats
 from toolkit.geometry.heading import wrapped
 from toolkit.geometry.plane import along_plane, plane_height
+from toolkit.world.convex import is_convex
 from toolkit.world.surface import Surface
 
 _SHARES = (1.0, 0.5, 0.05)  # of the margin around a sole, tried in turn: a stone may be hardly larger than a sole
+_MANY = 12  # sides from which on a convex surface is shrunk by its moved copies, and not side by side
 _KEPT = 20_000  # regions that are remembered
 _TURN = np.radians(50.0)  # largest angle between a heading along a surface's edges and the wanted one
 _SAME = np.radians(3.0)  # headings that differ by less are one
@@ -132,6 +134,10 @@ def _eroded(surface: Surface, along: np.ndarray, half: np.ndarray) -> shapely.Ge
     """The part of a surface in which a rectangle with this x axis (2,) and half extents (2,) m may be centred."""
     across = np.array([-along[1], along[0]])
     corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half @ np.stack([along, across])
+    outer, *holes = surface.boundary
+    if not holes and len(outer) > _MANY and is_convex(outer):
+        moved = np.asarray(shapely.polygons(outer + corners[:, None]))
+        return shapely.intersection(shapely.intersection(*moved[:2]), shapely.intersection(*moved[2:]))
     swept = []
     for ring in surface.boundary:
         ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)  # (edges, 2, 2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -21,7 +21,12 @@ _STRICT = 0.07  # part of the tolerances within which the seed of a facet is fla
 _DEGENERATE = 1e-10  # m^2; smaller triangles belong to no facet
 _PLANE = 1e-4  # m; corners that lie less apart are in a plane
 _SPACING = 0.2  # m; distance of the seeds of overlapping facets
-_DISCS, _DISC_ANGLE, _DISC_DISTANCE = (0.25, 0.2, 0.16), np.radians(10.0), 0.02  # m, rad, m; of those that are smooth
+_DISCS, _DISC_ANGLE, _DISC_DISTANCE = (
+    (0.26, 0.23, 0.2, 0.17),
+    np.radians(10.0),
+    0.02,
+)  # m, rad, m; of those that are smooth
+_SIDES, _ROUNDING = 16, (1.0, 0.9, 0.8)  # sides of a disc, and parts of its radius that are tried
 _ROUGH = 1.5e-3  # m; where the mesh is further off its relief, a disc is not smooth
 _ANGLE, _DISTANCE = np.radians(6.0), 2e-3  # rad, m; tolerances of overlapping facets that are not
 _MANY = 100  # more triangles are merged along edges; for fewer the general union is as quick and allows overlaps
@@ -97,7 +102,9 @@ def with_overlapping(mesh: trimesh.Trimesh, facets: list[Facet], *, flat: float,
     for seed in near[first].tolist():
         facet = _disc(mesh, table, free, seed)
         if facet is not None:
-            smooth[facet.triangles] = True
+            corners = facet.frame.inverse() @ mesh.triangles[facet.triangles].reshape(-1, 3)
+            held = shapely.intersects_xy(facet.polygon, corners[:, 0], corners[:, 1]).reshape(-1, 3)
+            smooth[facet.triangles[held.all(axis=1)]] = True
         else:
             facet = facet_of(mesh, table.around(seed, free, _ANGLE, _DISTANCE))
         if area[facet.triangles].sum() >= least_area and (key := facet.triangles.tobytes()) not in known:
@@ -109,13 +116,29 @@ def with_overlapping(mesh: trimesh.Trimesh, facets: list[Facet], *, flat: float,
 def _disc(mesh: trimesh.Trimesh, table: _Triangles, free: np.ndarray, seed: int) -> Facet | None:
     """The largest smooth facet around a triangle whose triangles are `free`; None where the mesh is rough."""
     group = table.around(seed, free, _DISC_ANGLE, _DISC_DISTANCE)
-    away = np.linalg.norm(mesh.triangles_center[group] - mesh.triangles_center[seed], axis=1)
+    centre = mesh.triangles_center[seed]
+    away = np.linalg.norm(mesh.triangles[group] - centre, axis=2).min(axis=1)
     for radius in _DISCS:
-        facet = facet_of(mesh, group[away <= radius])
-        points = facet.frame.inverse() @ _samples(mesh.triangles[facet.triangles])
-        if np.abs(off_relief(facet.relief, points)).max() <= _ROUGH:
-            return facet
+        facet = facet_of(mesh, group[(away <= radius) | (group == seed)])
+        middle, *points = facet.frame.inverse() @ np.concatenate(
+            [centre[None], _samples(mesh.triangles[facet.triangles])]
+        )
+        points = np.array(points)
+        inside = np.linalg.norm(points - middle, axis=1) <= radius
+        if np.abs(off_relief(facet.relief, points[inside])).max() <= _ROUGH:
+            return replace(facet, polygon=_rounded(facet.polygon, middle[:2], radius))
     return None
+
+
+def _rounded(polygon: Polygon, centre: np.ndarray, radius: float) -> Polygon:
+    """A regular polygon of nearly that radius in m around a centre (2,) where it fits in a ragged one, or that."""
+    shapely.prepare(polygon)
+    turns = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    for share in _ROUNDING:
+        inner = Polygon(centre + share * radius * np.column_stack([np.cos(turns), np.sin(turns)]))
+        if polygon.covers(inner):
+            return inner
+    return polygon
 
 
 class _Triangles(NamedTuple):
