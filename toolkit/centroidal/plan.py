@@ -12,6 +12,7 @@ from toolkit.centroidal.sequence import SequenceConfig, optimise
 from toolkit.centroidal.surroundings import Surroundings
 from toolkit.contacts.room import RoomConfig, landing_room, moved_sequence
 from toolkit.contacts.schedule import ContactSchedule
+from toolkit.contacts.seats import laid
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.robot.model import RobotModel
 from toolkit.world.world import World
@@ -122,7 +123,11 @@ def slid(
     given = robot, schedule, problem.com, problem.com_velocity
     moved = optimise(*given, config=config, room=room, surroundings=surroundings)
     sequence = moved_sequence(plan.sequence, schedule, moved.problem.times, moved.solved.position)
-    return MotionPlan(robot, world, sequence, schedule.through(sequence), moved)
+    on_ground = laid(sequence, world.surfaces, robot.half_sizes)
+    schedule = schedule.through(on_ground)
+    if on_ground is not sequence:
+        moved = optimise(robot, schedule, *given[2:], config=config, surroundings=surroundings)
+    return MotionPlan(robot, world, on_ground, schedule, moved)
 
 
 def keeps_margins(plan: MotionPlan, other: MotionPlan) -> bool:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from toolkit.contacts.projected import Projected
+from toolkit.contacts.sequence import ContactSequence
+from toolkit.geometry.pose import Pose
 from toolkit.world.relief import height_and_slopes
 from toolkit.world.surface import Surface
 
@@ -38,7 +41,7 @@ class Seats:
         local = np.einsum("nji,nj->ni", turn, patches.position[rows] - self._origin[surface])
         height, slopes = height_and_slopes(self._relief[surface], local[:, :2])
         axis = np.einsum("nji,nj->ni", turn, patches.rotation[rows, :, 0])[:, :2]
-        height += _hollow(self._relief[surface], axis, half_size)
+        height += _hollow(self._relief[surface], axis, half_size) - local[:, 2]
         patches.position[rows] += height[:, None] * turn[:, :, 2]
         normal = turn[:, :, 2] - np.einsum("nij,nj->ni", turn[:, :, :2], slopes)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -47,6 +50,31 @@ class Seats:
         along /= np.linalg.norm(along, axis=1, keepdims=True)
         patches.rotation[rows] = np.stack([along, np.cross(normal, along), normal], axis=-1)
         return patches
+
+
+def laid(sequence: ContactSequence, surfaces: Sequence[Surface], half_sizes: np.ndarray) -> ContactSequence:
+    """A sequence whose new contacts lie on the ground again after they moved in their own planes.
+
+    Args:
+        sequence: The contacts.
+        surfaces: The surfaces of the world.
+        half_sizes: (4, 2) m; half extents of the limbs' patches.
+
+    Returns:
+        The sequence itself where all of it is on flat ground.
+    """
+    transitions = []
+    for transition in sequence.transitions:
+        contact = transition.contact
+        if contact is not None and contact.surface >= 0 and surfaces[contact.surface].relief.any():
+            patch = Projected(np.zeros(1, int), contact.pose.position[None].copy(), contact.pose.rotation[None].copy())
+            Seats([surfaces[contact.surface]]).lay(patch, half_sizes[contact.limb])
+            pose = Pose(patch.rotation[0], patch.position[0])
+            transition = replace(transition, contact=replace(contact, pose=pose))
+        transitions.append(transition)
+    if all(new is old for new, old in zip(transitions, sequence.transitions, strict=True)):
+        return sequence
+    return ContactSequence(sequence.start, tuple(transitions))
 
 
 def _hollow(relief: np.ndarray, axis: np.ndarray, half_size: np.ndarray) -> np.ndarray:

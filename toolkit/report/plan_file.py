@@ -29,7 +29,8 @@ ROUNDING = 1e-9
 def write_plan(path: Path, plan: MotionPlan, solution: Solution) -> None:
     """Write plan.json: the plan's contacts and times, with the cost and the predicted CoM of the search's solution.
 
-    Where the optimiser moved a landing point, `moved_from` (3,) m is where the search had put it.
+    Where the optimiser moved a landing point, `moved_from` (3,) m is where the search had put it, and on curved ground
+    `turned_from` (9,) is the rotation that it had there, row by row.
     """
     entries: list[dict[str, Any]] = []
     stances, transitions = plan.sequence.stances, plan.sequence.transitions
@@ -140,8 +141,11 @@ def _moved_from(transition: ContactTransition, proposed: ContactTransition) -> d
     """Where the search had put a contact that the optimiser moved; nothing where it did not."""
     if transition.contact is None or proposed.contact is None:
         return {}
-    position = proposed.contact.pose.position
-    return {} if np.array_equal(position, transition.contact.pose.position) else {"moved_from": position}
+    pose, moved = proposed.contact.pose, transition.contact.pose
+    if np.array_equal(pose.position, moved.position):
+        return {}
+    turned = {} if np.array_equal(pose.rotation, moved.rotation) else {"turned_from": pose.rotation.ravel()}
+    return {"moved_from": pose.position, **turned}
 
 
 def _contact_entry(contact: Contact) -> dict[str, Any]:
@@ -194,5 +198,8 @@ def _read_transition(entry: dict[str, Any], position: str) -> ContactTransition:
     if entry["action"] not in ("make", "break"):
         raise ValueError(f'action is "{entry["action"]}", must be "make" or "break"')
     place = {"position": entry[position]} if entry.get(position) is not None else {}
+    if position == "moved_from" and entry.get("turned_from") is not None:
+        turn = np.array(entry["turned_from"], float)
+        place |= {"rotation": turn, "quaternion_wxyz": Pose(turn.reshape(3, 3), np.zeros(3)).quaternion_wxyz}
     contact = _read_contact({**entry, **place}) if entry["action"] == "make" else None
     return ContactTransition(Limb.from_label(entry["limb"]), contact, timing)
