@@ -19,9 +19,10 @@ from toolkit.contacts.failure import Failure
 from toolkit.drafts import clear_drafts, draft_in, write_whole
 from toolkit.errors import InputError
 from toolkit.execution.check import Result
+from toolkit.geometry.pose import Pose
 from toolkit.report.arrays import write_execution, write_motion
 from toolkit.report.files import REPORT, RunFolder, read_json, write_json, write_scene
-from toolkit.report.plan_file import read_plan, write_plan
+from toolkit.report.plan_file import read_plan, read_proposal, write_plan
 from toolkit.report.run_report import STAGES, RunReport, write_report
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -290,6 +291,20 @@ def test_a_report_of_a_run_without_a_search_has_every_figure(run):
     assert report.stages["surfaces"]["count"] == 3 and report.verdict == "FAIL"
     assert report.stages["planning"]["found"] is False and report.stages["execution"]["completed"] is False
     assert report.stages["execution"]["max_slip"] is None
+
+
+def test_a_proposal_has_its_contacts_where_the_search_had_put_them(run, tmp_path):
+    """The optimiser moved the first one, and the ground turned it."""
+    first, *others = run.plan.sequence.transitions
+    pose = first.contact.pose @ Pose.from_yaw(np.array([0.02, 0.01, 0.003]), 0.1)
+    moved = replace(first, contact=replace(first.contact, pose=pose))
+    sequence = replace(run.plan.sequence, transitions=(moved, *others))
+    write_plan(tmp_path / "plan.json", replace(run.plan, sequence=sequence), run.solution)
+    read = read_plan(tmp_path / "plan.json"), read_proposal(tmp_path / "plan.json").sequence
+    for found, wanted in zip(read, (sequence, run.solution.sequence), strict=True):
+        ours, theirs = (each.transitions[0].contact.pose for each in (found, wanted))
+        np.testing.assert_array_equal(ours.position, theirs.position)
+        np.testing.assert_allclose(ours.rotation, theirs.rotation, rtol=0, atol=1e-14)
 
 
 def test_the_plan_round_trips(run, tmp_path):
