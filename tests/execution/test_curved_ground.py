@@ -31,4 +31,4 @@ def test_smooth_hills_are_walked(name, tmp_path):
     assert result.passed, result.reason
     assert any(contact.bearing < 0.1 for contact in result.trial.plan.sequence.contacts)
     weight = robot.mass * -GRAVITY[2]
-    assert result.trial.execution.samples.wrench[0, :, 2].sum() == pytest.approx(weight, rel=0.15)  # it begins settled
+    assert result.trial.execution.samples.wrench[2, :, 2].sum() == pytest.approx(weight, rel=0.1)  # it begins settled

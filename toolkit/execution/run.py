@@ -66,7 +66,8 @@ def execute(
     index = SceneIndex(scene, robot)
     _check_plan(plan)
     qpos0, qvel0 = trajectory.qpos[0].copy(), trajectory.qvel[0].copy()
-    if any(np.isfinite(contact.bearing) for contact in plan.sequence.start.contacts):
+    grounds = {contact.surface for contact in plan.sequence.start.contacts if contact.surface >= 0}
+    if any(plan.world.surfaces[ground].relief.any() for ground in grounds):
         qpos0 = _settled(scene, qpos0)
     config.disturbance.disturb_model(
         scene, index.robot_geom, _touched(scene, index, qpos0, robot.scale.length * _UNDERFOOT), rng
