@@ -334,3 +334,10 @@ def test_geoms_that_do_not_collide_offer_and_cover_nothing(make_world):
 def test_nothing_to_stand_on(make_world):
     with pytest.raises(WorldError, match="no usable surface for feet"):
         make_world('<geom type="sphere" size="1"/>')
+
+
+def test_splinters_of_a_curved_field_are_no_trouble(make_world):
+    """Triangles of 2 m by 2 cm: no corner and no middle of a side is near the middle of one."""
+    heights = " ".join(f"{0.5 + 0.5 * np.sin(k / 3):.4f}" for k in range(100) for _ in range(3))
+    asset = f'<hfield name="h" nrow="100" ncol="3" size="2 1 0.02 0.2" elevation="{heights}"/>'
+    assert len(make_world('<geom type="hfield" hfield="h"/>', assets=asset, start="0 0 0.02").surfaces) >= 1

@@ -21,11 +21,8 @@ _STRICT = 0.07  # part of the tolerances within which the seed of a facet is fla
 _DEGENERATE = 1e-10  # m^2; smaller triangles belong to no facet
 _PLANE = 1e-4  # m; corners that lie less apart are in a plane
 _SPACING = 0.2  # m; distance of the seeds of overlapping facets
-_DISCS, _DISC_ANGLE, _DISC_DISTANCE = (
-    (0.26, 0.23, 0.2, 0.17),
-    np.radians(10.0),
-    0.02,
-)  # m, rad, m; of those that are smooth
+_DISCS = (0.26, 0.23, 0.2, 0.17)  # m; radii of those in which the mesh is smooth
+_DISC_ANGLE, _DISC_DISTANCE = np.radians(10.0), 0.02  # rad, m; within which their triangles are grown
 _SIDES, _ROUNDING = 16, (1.0, 0.9, 0.8)  # sides of a disc, and parts of its radius that are tried
 _ROUGH = 1.5e-3  # m; where the mesh is further off its relief, a disc is not smooth
 _ANGLE, _DISTANCE = np.radians(6.0), 2e-3  # rad, m; tolerances of overlapping facets that are not
@@ -120,12 +117,10 @@ def _disc(mesh: trimesh.Trimesh, table: _Triangles, free: np.ndarray, seed: int)
     away = np.linalg.norm(mesh.triangles[group] - centre, axis=2).min(axis=1)
     for radius in _DISCS:
         facet = facet_of(mesh, group[(away <= radius) | (group == seed)])
-        middle, *points = facet.frame.inverse() @ np.concatenate(
-            [centre[None], _samples(mesh.triangles[facet.triangles])]
-        )
-        points = np.array(points)
-        inside = np.linalg.norm(points - middle, axis=1) <= radius
-        if np.abs(off_relief(facet.relief, points[inside])).max() <= _ROUGH:
+        middle = facet.frame.inverse() @ centre
+        points = facet.frame.inverse() @ _samples(mesh.triangles[facet.triangles])
+        inside = np.linalg.norm(points - middle, axis=1) <= radius  # no point may be: a splinter is longer
+        if np.abs(off_relief(facet.relief, points[inside])).max(initial=0.0) <= _ROUGH:
             return replace(facet, polygon=_rounded(facet.polygon, middle[:2], radius))
     return None
 

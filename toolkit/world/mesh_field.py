@@ -66,7 +66,10 @@ def field_of(
     if not up.any() or (down.any() and corners[down][..., 2].max() > low + _LEVEL):
         return None
     ground = corners[up]
-    around = np.asarray(shapely.oriented_envelope(shapely.multipoints(ground[..., :2].reshape(-1, 2))).exterior.coords)
+    envelope = shapely.oriented_envelope(shapely.multipoints(ground[..., :2].reshape(-1, 2)))
+    if not isinstance(envelope, shapely.Polygon):
+        return None
+    around = np.asarray(envelope.exterior.coords)
     sides = np.diff(around[:3], axis=0)
     half = np.linalg.norm(sides, axis=1) / 2
     if abs(cross[up, 2].sum() / 2 - 4 * half.prod()) > _AREA * 4 * half.prod():

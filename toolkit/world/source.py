@@ -210,7 +210,7 @@ def _add_field(
     """Add the height field of a mesh geom to the world body; return the label by its name."""
     name = _unused(f"{label}/field", taken)
     rows, columns = field.heights.shape
-    top = float(field.heights.max())
+    top = max(float(field.heights.max()), _LEAST)
     spec.add_hfield(
         name=name,
         nrow=rows,
