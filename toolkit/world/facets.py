@@ -88,7 +88,7 @@ def with_overlapping(mesh: trimesh.Trimesh, facets: list[Facet], *, flat: float,
     """
     table, area = _Triangles.of(mesh), mesh.area_faces
     free = area > _DEGENERATE
-    curved, smooth = free.copy(), np.zeros(len(free), bool)
+    curved, smooth = free & (mesh.face_normals[:, 2] > 0.0), np.zeros(len(free), bool)  # what faces down bears nothing
     for facet in facets:
         curved[facet.triangles] &= facet.off > flat or facet.polygon.area < _SPACING**2
     place = mesh.triangles_center[:, :2] / _SPACING
