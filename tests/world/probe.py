@@ -34,7 +34,7 @@ def ray_gap(model, surface, points, height=0.05):
         geom = np.zeros(1, np.int32)
         distance = mujoco.mj_ray(model, data, start, -surface.normal, RAY_GROUPS, True, -1, geom)
         gaps.append(height - distance if distance >= 0 else -np.inf)
-    return np.array(gaps) - height_and_slopes(np.tile(surface.relief, (len(points), 1)), np.reshape(points, (-1, 2)))[0]
+    return np.array(gaps) - height_and_slopes(surface.relief, np.reshape(points, (-1, 2)))[0]
 
 
 def ball_gap(model, surface, points, radius=0.005):

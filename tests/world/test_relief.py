@@ -8,7 +8,7 @@ RELIEF = np.array([0.002, 0.01, -0.02, 0.3, -0.1, 0.2])
 
 def on(relief, places):
     """Points (n, 3) of a relief."""
-    return np.column_stack([places, height_and_slopes(np.tile(relief, (len(places), 1)), places)[0]])
+    return np.column_stack([places, height_and_slopes(relief, places)[0]])
 
 
 def test_the_relief_of_points_is_the_paraboloid_that_they_lie_on():
@@ -35,7 +35,7 @@ def test_slopes_are_those_of_the_heights():
     place, step = np.array([[0.1, -0.05]]), 1e-6
     for axis in range(2):
         ahead, behind = (on(RELIEF, place + sign * step * np.eye(2)[axis])[0, 2] for sign in (1, -1))
-        slope = height_and_slopes(RELIEF[None], place)[1][0, axis]
+        slope = height_and_slopes(RELIEF, place)[1][0, axis]
         assert slope == pytest.approx((ahead - behind) / (2 * step), abs=1e-9)
 
 

@@ -58,8 +58,8 @@ def faces_of(source: Source, *, square: tuple[float, ...], least_area: float) ->
         pose = Pose(data.geom_xmat[index].reshape(3, 3).copy(), data.geom_xpos[index].copy())
         if label in source.facets:  # the facets of a mesh that consists of parts are added once
             # They are as flat as the parts that collide, however curved the mesh was.
-            found = [Face(label, friction, facet.frame, facet.polygon) for facet in source.facets[label]]
-            found = found if label not in done else []
+            facets = source.facets[label] if label not in done else []
+            found = [Face(label, friction, facet.frame, facet.polygon) for facet in facets]
             done.add(label)
         else:
             found = _local_faces(Face(label, friction, pose, Polygon()), model, data, index, square, least_area)

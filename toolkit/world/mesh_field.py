@@ -82,16 +82,18 @@ def field_of(
         """(len(y), len(x)) m; NaN where nothing is."""
         inset = 1.0 - 1e-6
         places = np.stack([*np.meshgrid(inset * x, inset * y), np.full((len(y), len(x)), above)], axis=-1)
-        down = np.array([0.0, 0.0, -1.0])
-        hits = np.array([mujoco.mj_rayMesh(model, data, geom, p, down) for p in (frame @ places.reshape(-1, 3))])
+        ray = np.array([0.0, 0.0, -1.0])
+        hits = np.array([mujoco.mj_rayMesh(model, data, geom, p, ray) for p in (frame @ places.reshape(-1, 3))])
         return np.where(hits < 0.0, np.nan, above - hits).reshape(len(y), len(x))
 
     grid = heights(*points)
     middles = [(line[1:] + line[:-1]) / 2 for line in points]
     seen = np.stack([*np.meshgrid(*middles), heights(*middles)], axis=-1).reshape(-1, 3)
-    checked = frame.inverse() @ np.concatenate([ground.reshape(-1, 3), ground.mean(axis=1)])
-    off = np.abs(_height(grid, half, np.concatenate([checked, seen])) - np.concatenate([checked, seen])[:, 2])
-    if not (off <= FACET_DISTANCE).all():  # where nothing was hit it is NaN
+    known = frame.inverse() @ np.concatenate([ground.reshape(-1, 3), ground.mean(axis=1)])
+    checked = np.concatenate([known, seen])
+    if not (
+        np.abs(_height(grid, half, checked) - checked[:, 2]) <= FACET_DISTANCE
+    ).all():  # where nothing was hit it is NaN
         return None
     lowest = float(grid.min())
     pose = Pose(frame.rotation, np.array([*frame.position[:2], lowest]))

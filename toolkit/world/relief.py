@@ -26,12 +26,12 @@ def off_relief(relief: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def moved_relief(relief: np.ndarray, origin: np.ndarray) -> np.ndarray:
     """The relief of the same ground in the frame moved by `origin` (2,) m in its plane."""
-    height, slopes = height_and_slopes(relief[None], origin[None])
+    height, slopes = height_and_slopes(relief, origin[None])
     return np.array([height[0], *slopes[0], *relief[3:]])
 
 
 def height_and_slopes(relief: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heights (n,) in m and slopes (n, 2) of reliefs (n, 6), each at its place of `places` (n, 2) m."""
+    """Heights (n,) in m and slopes (n, 2) at places (n, 2) m of a relief (6,), or of reliefs (n, 6) at one each."""
     x, y = places.T
     _, along_x, along_y, xx, xy, yy = relief.T
     slopes = np.column_stack([along_x + xx * x + xy * y, along_y + xy * x + yy * y])

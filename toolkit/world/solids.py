@@ -108,10 +108,10 @@ def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     points, edges, counts, total = [np.zeros((0, 3))], [np.zeros((0, 2), int)], [], 0
-    starts: dict[int, int] = {}
+    starts, solids = {}, 0
     for index in np.flatnonzero((model.geom_contype | model.geom_conaffinity) != 0).tolist():
         pose = Pose(data.geom_xmat[index].reshape(3, 3), data.geom_xpos[index])
-        starts[index] = sum(len(each) for each in counts)
+        starts[index] = solids
         for corners, sides in _local_solids(model, index, pose, square):
             many, each = corners.shape[:2]
             first = total + each * np.arange(many)[:, None, None]
@@ -119,6 +119,7 @@ def solids_of(model: mujoco.MjModel, *, square: tuple[float, ...]) -> Solids:
             edges.append((first + sides).reshape(-1, 2))
             counts.append(np.tile([each, len(sides)], (many, 1)))
             total += many * each
+            solids += many
     numbers = np.concatenate([np.zeros((1, 2), int), *counts])
     points, (point_first, edge_first) = np.concatenate(points), np.cumsum(numbers, axis=0).T
     return Solids(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -165,21 +166,31 @@ def _decompositions(
     for done, index in enumerate(meshes):
         progress(done / len(meshes))
         vertices, triangles = mesh_of_geom(model, data, index)
-        decomposition, problem = None, None
         try:
-            decomposition = decompose_mesh(vertices, triangles)
+            found = _replacement(model, data, index, vertices, triangles)
         except ValueError as error:
-            problem = error
-        if problem is not None or (decomposition is not None and is_splintered(decomposition.facets)):
-            field = field_of(model, data, index, vertices, triangles)
-            if field is not None:
-                fields[index] = field
-                continue
-        if problem is not None:
-            raise WorldError(f"{path}: mesh geom '{labels[index]}': {problem}") from problem
-        if decomposition is not None:
-            parts[index] = decomposition
+            raise WorldError(f"{path}: mesh geom '{labels[index]}': {error}") from error
+        if isinstance(found, MeshField):
+            fields[index] = found
+        elif found is not None:
+            parts[index] = found
     return parts, fields
+
+
+def _replacement(
+    model: mujoco.MjModel, data: mujoco.MjData, index: int, vertices: np.ndarray, triangles: np.ndarray
+) -> Decomposition | MeshField | None:
+    """What a mesh geom is replaced with, None where it is convex; raises ValueError as `decompose_mesh` does."""
+    try:
+        parts = decompose_mesh(vertices, triangles)
+    except ValueError:
+        field = field_of(model, data, index, vertices, triangles)
+        if field is None:
+            raise
+        return field
+    if parts is None or not is_splintered(parts.facets):
+        return parts
+    return field_of(model, data, index, vertices, triangles) or parts
 
 
 def mesh_of_geom(model: mujoco.MjModel, data: mujoco.MjData, index: int) -> tuple[np.ndarray, np.ndarray]:
@@ -204,6 +215,16 @@ def _normalise(geom, model: mujoco.MjModel, index: int, collides: bool) -> None:
         geom.rgba = [0.5, 0.5, 0.5, 1e-3]
 
 
+def _colliding(model: mujoco.MjModel, index: int) -> dict[str, Any]:
+    """What geoms that collide in the place of a mesh geom have in common."""
+    return {
+        "friction": model.geom_friction[index],
+        "group": PART_GROUP,
+        "contype": _ALL_BITS,
+        "conaffinity": _ALL_BITS,
+    }
+
+
 def _add_field(
     spec: mujoco.MjSpec, model: mujoco.MjModel, index: int, label: str, field: MeshField, taken: set[str]
 ) -> dict[str, str]:
@@ -224,10 +245,7 @@ def _add_field(
         hfieldname=name,
         pos=field.pose.position,
         quat=field.pose.quaternion_wxyz,
-        friction=model.geom_friction[index],
-        group=PART_GROUP,
-        contype=_ALL_BITS,
-        conaffinity=_ALL_BITS,
+        **_colliding(model, index),
     )
     return {name: label}
 
@@ -246,10 +264,7 @@ def _add_parts(
             type=mujoco.mjtGeom.mjGEOM_MESH,
             meshname=name,
             pos=centre,
-            friction=model.geom_friction[index],
-            group=PART_GROUP,
-            contype=_ALL_BITS,
-            conaffinity=_ALL_BITS,
+            **_colliding(model, index),
         )
         names[name] = label
     return names

@@ -58,7 +58,7 @@ class Surface:
         height = plane_height(origin, normal, *points.T)
         local = (self.pose.inverse() @ np.column_stack([points, height]))[:, :2]
         inside = shapely.intersects_xy(self.region, *local.T)
-        above = height_and_slopes(np.tile(self.relief, (len(points), 1)), local)[0]
+        above = height_and_slopes(self.relief, local)[0]
         return np.where(inside, height + above / normal[2], np.nan)
 
     def nearest_point(self, point: np.ndarray) -> np.ndarray:
