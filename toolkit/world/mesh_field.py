@@ -66,7 +66,7 @@ def field_of(
     if not up.any() or (down.any() and corners[down][..., 2].max() > low + _LEVEL):
         return None
     ground = corners[up]
-    envelope = shapely.oriented_envelope(shapely.multipoints(ground[..., :2].reshape(-1, 2)))
+    envelope = shapely.oriented_envelope(shapely.multipoints(vertices[np.unique(triangles[up]), :2]))
     if not isinstance(envelope, shapely.Polygon):
         return None
     around = np.asarray(envelope.exterior.coords)
