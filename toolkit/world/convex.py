@@ -34,22 +34,23 @@ def convex_partition(region: Polygon) -> list[np.ndarray]:
     except shapely.errors.GEOSException:  # the region has a spike thinner than rounding, which is cut off
         opened = region.buffer(-1e-7, join_style="mitre").buffer(1e-7, join_style="mitre")
         found = shapely.constrained_delaunay_triangles(opened)
-    triangles = [ring_points(part) for part in shapely.get_parts(found) if part.area > 1e-12]
-    points, corner = np.unique(np.concatenate(triangles), axis=0, return_inverse=True)
-    rings: dict[int, list[int]] = {i: list(corner.reshape(-1)[3 * i : 3 * i + 3]) for i in range(len(triangles))}
+    triangles = _triangles(found)
+    points, corner = np.unique(triangles.reshape(-1, 2), axis=0, return_inverse=True)
+    places: list[list[float]] = points.tolist()
+    rings: dict[int, list[int]] = dict(enumerate(corner.reshape(-1, 3).tolist()))
     owner = {(a, b): i for i, ring in rings.items() for a, b in zip(ring, ring[1:] + ring[:1], strict=True)}
     inner = [(a, b) for a, b in owner if a < b and (b, a) in owner]
-    inner.sort(key=lambda edge: -float(np.sum((points[edge[0]] - points[edge[1]]) ** 2)))
+    inner.sort(key=lambda edge: -_square_of(places[edge[0]], places[edge[1]]))
     for a, b in inner:
         first, second = owner[a, b], owner[b, a]
         merged = _joined(rings[first], rings[second], a, b)
-        if merged is None or not is_convex(points[merged]):
-            continue
+        if merged is None or min(_turn(places, merged, index) for index in (0, len(rings[first]) - 1)) <= -_FLAT:
+            continue  # the corners between those of the common edge turn as they did
         rings[first] = merged
         for edge in zip(rings[second], rings[second][1:] + rings[second][:1], strict=True):
             owner[edge] = first
         del rings[second], owner[a, b], owner[b, a]
-    return [_without_straight_corners(points[ring]) for ring in rings.values()]
+    return [points[_without_straight_corners(places, ring)] for ring in rings.values()]
 
 
 def simplified(ring: np.ndarray, tolerance: float = STRAIGHT) -> np.ndarray:
@@ -63,6 +64,28 @@ def simplified(ring: np.ndarray, tolerance: float = STRAIGHT) -> np.ndarray:
     return kept[1:] if height <= tolerance and len(kept) > 3 else kept
 
 
+def _triangles(found: shapely.Geometry) -> np.ndarray:
+    """(n, 3, 2) corners of the triangles of a collection that have an area, counterclockwise."""
+    parts = shapely.get_parts(found)
+    corners = shapely.get_coordinates(parts[shapely.area(parts) > 1e-12]).reshape(-1, 4, 2)[:, :3]
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    clockwise = first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]
+    corners[clockwise] = corners[clockwise][:, [0, 2, 1]]
+    return corners
+
+
+def _square_of(first: list[float], second: list[float]) -> float:
+    """Squared distance of two points, m^2."""
+    x, y = first[0] - second[0], first[1] - second[1]
+    return x * x + y * y
+
+
+def _turn(points: list[list[float]], ring: list[int], index: int) -> float:
+    """Cross product of the edges before and after a corner of a ring, m^2, positive to the left."""
+    here, before, after = (points[ring[place % len(ring)]] for place in (index, index - 1, index + 1))
+    return (here[0] - before[0]) * (after[1] - here[1]) - (here[1] - before[1]) * (after[0] - here[0])
+
+
 def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int] | None:
     """The ring of two rings without their common edge a-b; None if they share more than that edge."""
     i, j = first.index(b), second.index(a)
@@ -71,13 +94,15 @@ def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int] | 
     return ring if len(set(ring)) == len(ring) else None
 
 
-def _without_straight_corners(points: np.ndarray) -> np.ndarray:
-    """The ring (k, 2) without the corners that do not turn."""
-    turns = np.abs(_turns(points)) > _FLAT
-    return points[turns] if turns.sum() >= 3 else points
+def _without_straight_corners(points: list[list[float]], ring: list[int]) -> list[int]:
+    """The ring without the corners that do not turn."""
+    kept = [corner for index, corner in enumerate(ring) if abs(_turn(points, ring, index)) > _FLAT]
+    return kept if len(kept) >= 3 else ring
 
 
 def _turns(ring: np.ndarray) -> np.ndarray:
     """(k,) m^2; cross products of the edges before and after each corner of a ring (k, 2), positive to the left."""
-    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    closed = np.concatenate([ring[-1:], ring, ring[:1]])
+    edges = closed[1:] - closed[:-1]
+    before, after = edges[:-1], edges[1:]
     return before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]

@@ -13,13 +13,13 @@ from shapely.geometry.polygon import orient
 from toolkit.geometry.pose import Pose
 from toolkit.world.convex import convex_partition
 from toolkit.world.faces import Face, faces_of
-from toolkit.world.overlay import cut, overlap, united
+from toolkit.world.overlay import cut, overlap, unions, united
 from toolkit.world.relief import crest, moved_relief
 from toolkit.world.solids import Solids
 from toolkit.world.source import Source
 from toolkit.world.surface import Surface
 
-_BATCH = 64  # faces that are processed together
+_BATCH = 256  # faces that are processed together
 _LARGEST = 12  # shadows that are subtracted one after the other
 _MANY = 50  # groups of at least this many faces are joined at once, others face by face
 
@@ -228,8 +228,7 @@ def _open_regions(faces: list[Face], solids: Solids, config: SurfaceConfig) -> l
     covered = np.unique(owner)
     if len(covered):
         # The covers are widened by the distance that simplifying may move the outline, so that the result stays free.
-        unions = [united(group) for group in np.split(shadows, np.searchsorted(owner, covered[1:]))]
-        covers = shapely.buffer(unions, config.simplify, join_style="mitre", quad_segs=16)
+        covers = shapely.buffer(unions(shadows, owner), config.simplify, join_style="mitre", quad_segs=16)
         regions[covered] = shapely.simplify(cut(regions[covered], covers), config.simplify)
     parts, whole = shapely.get_parts(shapely.make_valid(regions), return_index=True)
     pieces, part = shapely.get_parts(parts, return_index=True)

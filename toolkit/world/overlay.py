@@ -16,12 +16,23 @@ _GRID = 1e-9  # m
 _HOLE = 1e-9  # m^2; smaller holes are rounding
 _COLLECTION = 7  # shapely's number of this type
 _AREA = 1e-7  # m^2; areas that differ by less are equal
+_PAIRS = 1_000_000  # of points and shapes that are looked at together
 
 
 def united(shapes: Any) -> shapely.Geometry:
     """Union of one polygon or more."""
-    union = shapely.union_all(shapes)
-    return union if _is_union(union, np.asarray(shapes)) else _cleared(shapely.union_all(shapes, grid_size=_GRID))
+    return unions(np.asarray(shapes), np.zeros(len(shapes), int))[0]
+
+
+def unions(shapes: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Unions of groups of polygons: of all (n,) shapes with equal numbers in `group` (n,), which do not decrease."""
+    begins = np.flatnonzero(np.diff(group, prepend=group[0] - 1))
+    groups = np.split(shapes, begins[1:])
+    found = np.array([shapely.union_all(members) for members in groups], object)
+    counts = np.diff(begins, append=len(group))
+    for index in np.flatnonzero(~_are_unions(found, shapes, np.repeat(np.arange(len(begins)), counts))).tolist():
+        found[index] = _cleared(shapely.union_all(groups[index], grid_size=_GRID))
+    return found
 
 
 def cut(shapes: np.ndarray, cutters: np.ndarray) -> np.ndarray:
@@ -56,21 +67,36 @@ def overlap(shapes: np.ndarray, others: np.ndarray) -> np.ndarray:
     return result
 
 
-def _is_union(union: shapely.Geometry, shapes: np.ndarray) -> bool:
-    """Whether a union has the inner points of every shape and no others."""
-    if abs(union.area - shapely.area(shapes).sum()) < _AREA:  # all of them, side by side
-        return True
-    shapely.prepare(union)
-    if not shapely.dwithin(union, shapely.points(_inner_points(shapes)[0]), _GRID).all():
-        return False
-    points = _inner_points(np.array([union]))[0]
-    points = np.asarray(shapely.points(points[shapely.contains_xy(union, *points.T)]))
-    return len(np.unique(shapely.STRtree(shapes).query(points, "dwithin", _GRID)[0])) == len(points)
+def _are_unions(found: np.ndarray, shapes: np.ndarray, owner: np.ndarray) -> np.ndarray:
+    """Whether unions (n,) have the inner points of the shapes that they are of, (k,) with owners, and no others."""
+    good = np.abs(shapely.area(found) - np.bincount(owner, shapely.area(shapes))) < _AREA  # all of them, side by side
+    open_ = np.flatnonzero(~good)
+    shapely.prepare(found[open_])
+    points, of = _inner_points(shapes[held := ~good[owner]])
+    of = owner[held][of]
+    good[open_] = True
+    good[of[~shapely.dwithin(found[of], shapely.points(points), _GRID)]] = False
+    points, of = _inner_points(found[open_])
+    of = open_[of]
+    inside = shapely.contains_xy(found[of], *points.T)
+    points, of = np.asarray(shapely.points(points[inside])), of[inside]
+    counts = np.bincount(owner, minlength=len(found))
+    begins, pairs = np.cumsum(counts) - counts, np.cumsum(counts[of])
+    for some in np.split(np.arange(len(of)), np.flatnonzero(np.diff(pairs // _PAIRS)) + 1):
+        many = counts[of[some]]
+        point = np.repeat(some, many)
+        shape = np.arange(many.sum()) + np.repeat(begins[of[some]] - (np.cumsum(many) - many), many)
+        covered = np.zeros(len(of), bool)
+        covered[point[shapely.dwithin(shapes[shape], points[point], _GRID)]] = True
+        good[of[some[~covered[some]]]] = False
+    return good
 
 
 def _are_differences(left: np.ndarray, shapes: np.ndarray, cutters: np.ndarray) -> np.ndarray:
     """Whether differences (n,) have the inner points of the shapes that are outside the cutters, and no others."""
     good = np.ones(len(left), bool)
+    for group in (left, shapes, cutters):
+        shapely.prepare(group)
     for points, owner in (_inner_points(group) for group in (left, shapes, cutters)):
         inside, wanted, unwanted = (shapely.contains_xy(group[owner], *points.T) for group in (left, shapes, cutters))
         wrong = np.flatnonzero(inside != (wanted & ~unwanted))

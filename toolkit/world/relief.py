@@ -26,6 +26,8 @@ def off_relief(relief: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def moved_relief(relief: np.ndarray, origin: np.ndarray) -> np.ndarray:
     """The relief of the same ground in the frame moved by `origin` (2,) m in its plane."""
+    if not relief.any():
+        return relief
     height, slopes = height_and_slopes(relief, origin[None])
     return np.array([height[0], *slopes[0], *relief[3:]])
 
