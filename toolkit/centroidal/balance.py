@@ -109,7 +109,7 @@ def statically_balanced(
 
 def _generators(robot: RobotModel, contact: Contact, margins: Margins) -> tuple[np.ndarray, np.ndarray]:
     """Unit-normal corner forces along the edges of the friction polygon, and where they act, in the world."""
-    half_size = margins.within(np.minimum(contact.bearing, robot.limbs[contact.limb].bearing))
+    half_size = margins.within(robot.limbs[contact.limb].borne(contact.bearing))
     force, point = corner_rays(contact.friction * margins.friction, half_size, SIDES)
     return force @ contact.pose.rotation.T, contact.pose @ point
 

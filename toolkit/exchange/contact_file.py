@@ -62,7 +62,7 @@ def contact_sequence(record: RunRecord, robot: RobotModel) -> dict[str, Any]:
 
 def _patch(contact: Contact, robot: RobotModel) -> dict[str, Any]:
     """A contact patch as JSON holds it."""
-    x, y = np.minimum(contact.bearing, robot.limbs[contact.limb].bearing)
+    x, y = robot.limbs[contact.limb].borne(contact.bearing)
     w, *vector = contact.pose.quaternion_wxyz
     return {
         "placement": {"translation": contact.pose.position, "quaternion_xyzw": [*vector, w]},

@@ -51,6 +51,10 @@ class LimbModel:
         """Half extents (2,) float of the part of the patch on which the centre of pressure can be, m."""
         return np.array([self.half_size[0], LINE]) if self.rolls else self.half_size
 
+    def borne(self, within: float) -> np.ndarray:
+        """The half extents `bearing` (2,) m on ground that bears the patch up to `within` m from its middle."""
+        return np.minimum(within, self.bearing)
+
 
 class HipJoints(NamedTuple):
     """How the three joints of a hip follow each other.

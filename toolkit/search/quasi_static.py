@@ -89,7 +89,7 @@ class QuasiStaticEvaluator(TransitionEvaluator):
         middle, target = centres.mean(0), touched.mean_feet.position[:2]
         if len(feet) == 2:
             return np.stack([middle, centres[0], centres[1]])
-        pose, bearing = feet[0].pose, np.minimum(feet[0].bearing, self._robot.limbs[feet[0].limb].bearing)
+        pose, bearing = feet[0].pose, self._robot.limbs[feet[0].limb].borne(feet[0].bearing)
         axes = pose.rotation[:2, :2]  # of the patch, seen from above
         inner = np.clip(np.linalg.solve(axes, target - middle), -_PATCH * bearing, _PATCH * bearing)
         return middle + _PARTS[:, None] * (axes @ inner)
