@@ -72,7 +72,7 @@ def scan_trial(settings: TrialSettings, scanning: ScanSettings, case: Case) -> d
         result, _ = run_pipeline(settings, case, made.world, config)
     except ToolkitError as error:
         return record | {"stage": "planning", "reason": reason_of(error)}
-    record |= {"planned": result.passed, "tested": result.tested, "reason": result.reason}
+    record |= {"planned": result.passed, "tested": len(result.trials), "reason": result.reason}
     if not result.passed or result.trial is None or not isinstance(result.trial.plan, WholeBodyPlan):
         return record | {"stage": "planning"}
     robot = robot_of(settings.robot, settings.robots)
