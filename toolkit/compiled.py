@@ -12,6 +12,9 @@ can be compiled ahead of its first use, by several processes (see `toolkit.warmu
 A formula that Python, NumPy arrays, CasADi's symbols and compiled functions share is decorated with `@law`.
 """
 
+# pyright: reportAttributeAccessIssue=false
+# numba makes its settings and the fields of its types at run time.
+
 from __future__ import annotations
 
 import contextlib

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from toolkit.errors import ToolkitError
 from toolkit.execution.run import execute
@@ -143,7 +144,7 @@ def _lies_on(real: Surface, found: Surface) -> bool:
     return own >= LEAST_OVERLAP and angle <= 2 * MOST_ANGLE and offset <= MOST_OFFSET
 
 
-def _in_frame(real: Surface, found: Surface) -> shapely.Geometry:
+def _in_frame(real: Surface, found: Surface) -> BaseGeometry:
     """The region of a found surface in the frame of a real one."""
     local = real.pose.inverse() @ found.pose
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from toolkit.scanning.samples import Scan
 from toolkit.world.source import RAY_GROUPS
@@ -61,7 +61,7 @@ def _holes(points: np.ndarray, met: np.ndarray, rng: np.random.Generator, share:
     """Whether grid points (nx, ny) lie in holes that are about `share` of those that were met."""
     lost = np.zeros(met.shape, bool)
     flat, places = lost.reshape(-1), np.flatnonzero(met)
-    tree = cKDTree(points.reshape(-1, 3)[places][:, :2])
+    tree = KDTree(points.reshape(-1, 3)[places][:, :2])
     while flat[places].mean() < share:
         centre = points.reshape(-1, 3)[rng.choice(places), :2]
         flat[places[tree.query_ball_point(centre, rng.uniform(0.03, 0.08))]] = True

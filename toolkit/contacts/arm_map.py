@@ -19,7 +19,7 @@ from toolkit.robot.chain import arm_joints
 from toolkit.robot.model import RobotModel
 
 if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
 SAMPLES = 2**17  # joint angles of a map
 MARGIN = 0.15  # rad; distance from both ends of each joint's range, at most a fifth of the range
@@ -85,15 +85,15 @@ class ArmMap:
     def posture(self, position: np.ndarray, normal: np.ndarray, near: np.ndarray) -> np.ndarray:
         """(k,) rad; among 64 samples around a palm, the joint angles that are nearest to `near` (k,)."""
         scaled = self._scaled(position[None], normal[None])[0]
-        distance, rows = self._tree.query(scaled, 64)
+        distance, rows = map(np.asarray, self._tree.query(scaled, 64))
         rows = rows[distance < max(1.0, 1.5 * distance[0])]
         return self.angles[rows[np.argmin(np.square(self.angles[rows] - near).sum(1))]]
 
     @cached_property
-    def _tree(self) -> cKDTree:
-        from scipy.spatial import cKDTree
+    def _tree(self) -> KDTree:
+        from scipy.spatial import KDTree
 
-        return cKDTree(self._scaled(self.positions, self.normals))
+        return KDTree(self._scaled(self.positions, self.normals))
 
     def _scaled(self, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
         return np.hstack([positions / self.near, normals / NEAR[1]])

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from toolkit.contacts.projected import Projected
 from toolkit.contacts.seats import Seats
@@ -39,7 +40,7 @@ class Footholds:
         self._surfaces, self._half, self._margin = surfaces, half_size, margin
         self._turns = np.array([surface.pose.rotation for surface in surfaces]).reshape(-1, 3, 3)
         self._origins = np.array([surface.pose.position for surface in surfaces]).reshape(-1, 3)
-        self._regions: dict[tuple[int, int], shapely.Geometry] = {}
+        self._regions: dict[tuple[int, int], BaseGeometry] = {}
         self._edges: dict[int, float] = {}
         self._seats = Seats(surfaces)
 
@@ -101,7 +102,7 @@ class Footholds:
             self._edges[index] = float(np.arctan2(side[1], side[0]))
         return self._edges[index]
 
-    def _region(self, index: int, axis: np.ndarray) -> shapely.Geometry:
+    def _region(self, index: int, axis: np.ndarray) -> BaseGeometry:
         """Where, in the frame of a surface, the centre of a sole with this x axis may be; prepared for queries."""
         surface = self._surfaces[index]
         along = axis @ surface.pose.rotation[:, :2]
@@ -124,13 +125,13 @@ def _sole_axis(normal: np.ndarray, yaw: float) -> np.ndarray:
     return np.array(along_plane(normal, np.cos(yaw), np.sin(yaw)))
 
 
-def _nearest(region: shapely.Geometry | np.ndarray, points: np.ndarray) -> np.ndarray:
+def _nearest(region: BaseGeometry | np.ndarray, points: np.ndarray) -> np.ndarray:
     """The points (n, 2) of a region, or of n regions, nearest to points (n, 2)."""
     lines = shapely.shortest_line(shapely.points(points), region)
     return shapely.get_coordinates(lines).reshape(-1, 2, 2)[:, 1]
 
 
-def _eroded(surface: Surface, along: np.ndarray, half: np.ndarray) -> shapely.Geometry:
+def _eroded(surface: Surface, along: np.ndarray, half: np.ndarray) -> BaseGeometry:
     """The part of a surface in which a rectangle with this x axis (2,) and half extents (2,) m may be centred."""
     across = np.array([-along[1], along[0]])
     corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half @ np.stack([along, across])

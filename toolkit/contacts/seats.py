@@ -23,7 +23,7 @@ class Seats:
 
     def __init__(self, surfaces: Sequence[Surface]):
         self._relief = np.array([surface.relief for surface in surfaces]).reshape(-1, 6)
-        self._curved: np.ndarray = self._relief.any(axis=1)
+        self._curved = np.asarray(self._relief.any(axis=1))
         self._origin = np.array([surface.pose.position for surface in surfaces]).reshape(-1, 3)
         self._turn = np.array([surface.pose.rotation for surface in surfaces]).reshape(-1, 3, 3)
         self._any = bool(self._curved.any())

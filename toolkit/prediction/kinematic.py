@@ -67,7 +67,7 @@ class KinematicEvaluator(TransitionEvaluator):
         foot = moved, rows.limb[moved]
         position[foot], rotation[foot] = rows.position[moved], rows.rotation[moved]
         friction[foot] = rows.friction[moved]
-        heading = yaw_of(rotation).T
+        heading = np.transpose(yaw_of(rotation))
         yaw = mean_heading(*heading)
 
         normal_z = np.clip(rotation[:, :, 2, 2], 1e-6, 1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
@@ -54,7 +55,7 @@ def take_exact(scan: Scan) -> Exact:
     solids, left = [], np.ones(len(mesh.faces), bool)
     parts = range(labels.max() + 1) if labels.max() < _MOST_SOLIDS else range(0)
     for number in parts:
-        part = mesh.submesh([np.flatnonzero(labels == number)], append=True, repair=False)
+        part: Any = mesh.submesh([np.flatnonzero(labels == number)], append=True, repair=False)
         if part.is_watertight and part.is_winding_consistent and abs(part.volume) > 1e-6:
             solids.append(part)
             left[labels == number] = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from toolkit.scanning.samples import Samples, cells_of
 
@@ -46,10 +46,10 @@ def local_planes(samples: Samples, radius: float) -> LocalPlanes:
     )
     owner, count = cells_of(thin, radius / 2)
     places = _sums(owner, thin, count) / np.bincount(owner, minlength=count)[:, None]
-    tree, found = cKDTree(thin), []
+    tree, found = KDTree(thin), []
     for begin in range(0, count, _BLOCK):
         block = places[begin : begin + _BLOCK]
-        pairs = cKDTree(block).sparse_distance_matrix(tree, radius, output_type="ndarray")
+        pairs = KDTree(block).sparse_distance_matrix(tree, radius, output_type="ndarray")
         found.append(_fitted(block, thin, weight, turned, pairs["i"], pairs["j"]))
     joined = [np.concatenate(column) for column in zip(*found, strict=True)]
     enough = joined.pop() >= _LEAST_NEIGHBOURS

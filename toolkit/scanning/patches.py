@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from shapely.geometry import Polygon
 
 from toolkit.geometry.pose import Pose
@@ -94,7 +94,7 @@ def read_samples(samples: Samples) -> Reading:
 def _facing(samples: Samples, planes: list[Plane]) -> list[Plane]:
     """The planes with outward normals: as the scan says, else up, and walls towards the ground beside them."""
     ground = [i for plane in planes if abs(plane.normal[2]) > 0.7 for i in plane.points[::10].tolist()]
-    tree = cKDTree(samples.thin[ground]) if ground else None
+    tree = KDTree(samples.thin[ground]) if ground else None
     result = []
     for plane in planes:
         towards = plane.normal
@@ -113,7 +113,7 @@ def _from_patches(points: np.ndarray, patches: list[Patch], config: PlaneConfig)
     Both are inf for points that are not near a patch.
     """
     height, beside = np.full(len(points), np.inf), np.full(len(points), np.inf)
-    tree = cKDTree(points)
+    tree = KDTree(points)
     for patch in patches:
         shapely.prepare(patch.polygon)
         ring = shapely.get_coordinates(patch.polygon)

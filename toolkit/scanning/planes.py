@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from toolkit.geometry.pose import Pose
 from toolkit.scanning.local_planes import LocalPlanes
@@ -110,7 +110,7 @@ def _cores(samples: Samples, local: LocalPlanes, config: PlaneConfig) -> list[Pl
         column[flat] for column in (local.places, local.normals, local.weight, local.sided)
     )
     graph = _neighbours(places, 0.8 * config.radius)
-    tree = cKDTree(samples.thin)
+    tree = KDTree(samples.thin)
     free, tried = np.ones(len(flat), bool), np.zeros(len(flat), bool)
     planes = []
     for seed in np.argsort(local.spread[flat], kind="stable").tolist():
@@ -155,7 +155,7 @@ def _fit(points: np.ndarray, weight: np.ndarray, towards: np.ndarray) -> tuple[n
 
 def _neighbours(points: np.ndarray, radius: float) -> csr_array:
     """Matrix (t, t) that sums over the points within `radius` m, the point itself included."""
-    pairs = cKDTree(points).query_pairs(radius, output_type="ndarray")
+    pairs = KDTree(points).query_pairs(radius, output_type="ndarray")
     own = np.arange(len(points))
     rows = np.concatenate([pairs[:, 0], pairs[:, 1], own])
     columns = np.concatenate([pairs[:, 1], pairs[:, 0], own])
@@ -167,15 +167,15 @@ def _assigned(samples: Samples, planes: list[Plane], around: csr_array, config: 
     thin, weight = samples.thin, samples.weight
     total = around @ weight
     best = np.full(len(thin), (1.7 * config.noise + 0.5 * config.tolerance) ** 2)
-    label = np.full(len(thin), -1)
+    label, squares = np.full(len(thin), -1), np.zeros(len(thin))
     for number, plane in enumerate(planes):
         off = np.abs((thin[plane.reach] - plane.centre) @ plane.normal)
         close = plane.reach[off < config.near]
         rows = around[close]
-        used, inverse = np.unique(rows.indices, return_inverse=True)
-        squares = ((thin[used] - plane.centre) @ plane.normal) ** 2
-        squares = np.minimum(squares, config.near**2) * weight[used]
-        rows = csr_array((rows.data, inverse.reshape(-1), rows.indptr), shape=(len(close), len(used)))
+        used = np.zeros(len(thin), bool)
+        used[rows.indices] = True
+        squares[used] = ((thin[used] - plane.centre) @ plane.normal) ** 2
+        squares[used] = np.minimum(squares[used], config.near**2) * weight[used]
         cost = (rows @ squares) / total[close]
         better = cost < best[close]
         best[close[better]], label[close[better]] = cost[better], number
@@ -220,7 +220,7 @@ def _joint(samples: Samples, larger: Plane, plane: Plane, config: PlaneConfig) -
     between = plane.centre - larger.centre
     if min(abs(between @ larger.normal), abs(between @ plane.normal)) > config.near:
         return None
-    tree = cKDTree(samples.thin[larger.points])
+    tree = KDTree(samples.thin[larger.points])
     distance, _ = tree.query(samples.thin[plane.points], distance_upper_bound=3 * samples.spacing)
     if not np.isfinite(distance).any():
         return None

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from toolkit.errors import InputError
 
@@ -141,7 +141,7 @@ def _outward(corners: np.ndarray, turned: np.ndarray) -> float:
 def _distance(points: np.ndarray) -> float:
     """Usual distance of a point of a cloud from the fourth nearest, m: on a grid, the distance of its lines."""
     some = points[:: len(points) // _MOST_ASKED + 1]
-    distance, _ = cKDTree(points).query(some, min(5, len(points)))
+    distance, _ = KDTree(points).query(some, min(5, len(points)))
     return float(np.median(distance[:, -1]))
 
 

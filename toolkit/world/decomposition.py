@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -107,7 +107,7 @@ def _components(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
     _check_count(len(members))
     components = []
     for group in members:
-        component = mesh.submesh([group], append=True, repair=False)
+        component: Any = mesh.submesh([group], append=True, repair=False)
         closed = component.is_watertight and component.is_winding_consistent
         upside_down = component.volume < 0 if closed else component.area_faces @ component.face_normals[:, 2] < 0
         if upside_down:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
 _GRID = 1e-9  # m
 _HOLE = 1e-9  # m^2; smaller holes are rounding
@@ -19,7 +20,7 @@ _AREA = 1e-7  # m^2; areas that differ by less are equal
 _PAIRS = 1_000_000  # of points and shapes that are looked at together
 
 
-def united(shapes: Any) -> shapely.Geometry:
+def united(shapes: Any) -> BaseGeometry:
     """Union of one polygon or more."""
     return unions(np.asarray(shapes), np.zeros(len(shapes), int))[0]
 
@@ -70,6 +71,8 @@ def overlap(shapes: np.ndarray, others: np.ndarray) -> np.ndarray:
 def _are_unions(found: np.ndarray, shapes: np.ndarray, owner: np.ndarray) -> np.ndarray:
     """Whether unions (n,) have the inner points of the shapes that they are of, (k,) with owners, and no others."""
     good = np.abs(shapely.area(found) - np.bincount(owner, shapely.area(shapes))) < _AREA  # all of them, side by side
+    if good.all():
+        return good
     open_ = np.flatnonzero(~good)
     shapely.prepare(found[open_])
     points, of = _inner_points(shapes[held := ~good[owner]])

@@ -82,7 +82,7 @@ def solve_highs(program: LinearProgram, time_limit: float, gap: float = GAP) -> 
 def _highs_model(program: LinearProgram) -> Any:
     import highspy
 
-    lp = highspy.HighsLp()
+    lp: Any = highspy.HighsLp()
     lp.num_row_, lp.num_col_ = len(program.row_low), len(program.cost)
     lp.col_cost_, lp.col_lower_, lp.col_upper_ = program.cost, program.low, program.high
     lp.row_lower_, lp.row_upper_ = program.row_low, program.row_high

@@ -185,9 +185,9 @@ class Proof:
         ends = [np.argwhere(reached.any(2)) for reached in (from_goal, from_start)]
         if not all(len(end) for end in ends):  # start or goal themselves are blocked
             return (start.position if len(ends[0]) else self._world.goal.position)[:2]
-        from scipy.spatial import cKDTree  # here, since it takes long to import
+        from scipy.spatial import KDTree  # here, since it takes long to import
 
-        apart, nearest = cKDTree(ends[0]).query(ends[1])
+        apart, nearest = map(np.asarray, KDTree(ends[0]).query(ends[1]))
         ties = np.flatnonzero(apart == apart.min())
         places = (ends[1][ties] + ends[0][nearest[ties]]) / 2
         middle = places[np.argmin(np.hypot(*(places - places.mean(0)).T))]

@@ -68,7 +68,9 @@ def mark_between(ground: np.ndarray, stride: float, border: np.ndarray) -> np.nd
     if ground.any() and not border.any():  # feet stand around the cells between them, and one of them near by
         from scipy.ndimage import distance_transform_edt  # here, since it takes long to import
 
-        hull = shapely.convex_hull(shapely.multipoints(np.argwhere(ground).astype(float))).buffer(2.0)
+        hull = shapely.buffer(
+            shapely.convex_hull(shapely.multipoints(np.argwhere(ground).astype(float))), 2.0, quad_segs=16
+        )
         shapely.prepare(hull)
         asked = shapely.contains_xy(hull, *np.indices(ground.shape))
         asked &= np.asarray(distance_transform_edt(np.logical_not(ground))) <= stride / 2 + 1.0
