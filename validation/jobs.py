@@ -19,6 +19,7 @@ from toolkit.report.console import progress_bar
 Record = dict[str, Any]
 _BATCH = 16  # trials of a process before a fresh one takes over: what it has freed stays with it, and looks like need
 _FOLDERS = re.compile(r"(?<![\w.])/(?:[^\s/:']+/)+")  # before the name of a file
+_ERROR = "error"  # stage of a trial that ended in an error of the program
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -85,7 +86,7 @@ def reason_of(error: Exception) -> str:
 
 def failed_record(reason: str, trace: str = "") -> Record:
     """What is left of a trial that ended in an error of the program."""
-    return {"stage": "error", "passed": False, "reason": reason, "traceback": trace}
+    return {"stage": _ERROR, "passed": False, "reason": reason, "traceback": trace}
 
 
 def run_jobs(
@@ -96,7 +97,7 @@ def run_jobs(
     title: str,
     minutes: float | None = None,
 ) -> list[Record]:
-    """Run the jobs that have no record yet.
+    """Run the jobs that have no record yet, and again those that ended in an error of the program.
 
     Args:
         jobs: to run, in order.
@@ -110,7 +111,7 @@ def run_jobs(
         Records of the jobs that have one, in order: of all of them where there was time.
     """
     end = time.monotonic() + (float("inf") if minutes is None else 60.0 * minutes)
-    waiting = [job for job in jobs if job.name not in store.records]
+    waiting = [job for job in jobs if store.records.get(job.name, {"stage": _ERROR}).get("stage") == _ERROR]
     known = len(jobs) - len(waiting)
     if known or store.others:
         console.print(f"{known} of {len(jobs)} trials known from before, {store.others} records of other settings left")

@@ -57,6 +57,14 @@ def test_an_interrupted_experiment_goes_on_where_it_stopped(tmp_path):
     assert len(path.read_text().splitlines()) == 3
 
 
+def test_a_trial_that_ended_in_an_error_is_run_again(tmp_path):
+    path, here = tmp_path / "trials.jsonl", PoolOptions(workers=0)
+    (record,) = run_jobs([job("a", broken)], TrialFile(path, {"x": 1}), here, quiet(), "")
+    assert record["stage"] == "error" and not record["passed"]
+    (record,) = run_jobs([job("a")], TrialFile(path, {"x": 1}), here, quiet(), "")
+    assert record["passed"] and TrialFile(path, {"x": 1}).records["a"]["passed"]
+
+
 @pytest.mark.parametrize("workers", [0, 1])
 def test_no_trial_starts_when_the_time_is_up(tmp_path, workers):
     store = TrialFile(tmp_path / "trials.jsonl", {"x": 1})
