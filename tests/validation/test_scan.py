@@ -42,3 +42,11 @@ def test_a_small_run_counts_surfaces(tmp_path):
     assert scan.main(["--surfaces-only", "--trials", "1", *folders]) == 0
     (row,) = result(folders, "scan")["table"]
     assert row["surfaces"] == 14 and row["found"] >= 13
+
+
+@pytest.mark.slow
+def test_a_plan_made_in_a_scanned_world_is_carried_out_in_the_real_one(tmp_path):
+    folders = ["--workers", "0", "--out", str(tmp_path / "out"), "--results", str(tmp_path / "results")]
+    scan.main(["--trials", "1", *folders])
+    (row,) = result(folders, "scan")["table"]
+    assert row["planned"] == 1 and row["max_slip"] < 0.02
