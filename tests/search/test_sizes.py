@@ -117,8 +117,16 @@ def ceiling(height):
     return text(ground, box([1.0, 0, height + 0.05], [0.3, 0.6, 0.05]), goal=(2, 0, 0))
 
 
+def stones(length):
+    """A gap with turned stones, which hold soles of 22 by 13 cm turned as they are themselves, if at all."""
+    tops = [box([0.7 + 0.25 * i, 0.1 * (-1) ** i, -0.5], [length / 2, 0.095, 0.5], euler=(0, 0, 37)) for i in range(6)]
+    ends = (box([x, 0, -0.5], [0.5, 0.4, 0.5]) for x in (0.0, 2.65))
+    return text(*ends, *tops, goal=(2.65, 0, 0))
+
+
 OBSTACLES = {  # with the words of the proof, and two sizes: the first may leave a way, the second leaves none
     "gap": (gap, "the ground", (0.46, 0.54)),
+    "stones": (stones, "too small for a sole", (0.223, 0.195)),
     "rise": (rise, "the ground", (0.45, 0.51)),
     "slot": (slot, "the body", (0.28, 0.22)),
     "ceiling": (ceiling, "the body", (1.32, 1.24)),

@@ -112,7 +112,7 @@ class Footholds:
                 self._regions.clear()
             region = shapely.Polygon()
             for share in _SHARES:
-                region = _eroded(surface, along, self._half + share * self._margin)
+                region = eroded(surface, along, self._half + share * self._margin)
                 if not region.is_empty:
                     break
             shapely.prepare(region)
@@ -131,7 +131,7 @@ def _nearest(region: BaseGeometry | np.ndarray, points: np.ndarray) -> np.ndarra
     return shapely.get_coordinates(lines).reshape(-1, 2, 2)[:, 1]
 
 
-def _eroded(surface: Surface, along: np.ndarray, half: np.ndarray) -> BaseGeometry:
+def eroded(surface: Surface, along: np.ndarray, half: np.ndarray) -> BaseGeometry:
     """The part of a surface in which a rectangle with this x axis (2,) and half extents (2,) m may be centred."""
     across = np.array([-along[1], along[0]])
     corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * half @ np.stack([along, across])

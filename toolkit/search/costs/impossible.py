@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
+from toolkit.contacts.footholds import eroded
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.plane import plane_height
 from toolkit.geometry.pose import Pose
@@ -38,7 +40,8 @@ from toolkit.world.world import World
 _CELL, _MAX_CELLS = 0.03, 60_000  # m; larger where the world would need more cells in XY
 _LEVELS = 14  # heights of a cell
 _MERGE = 0.02, 0.1  # m; heights that differ by less are not told apart; tried in turn where there are too many
-_INSIDE = 0.005  # m; the centre of a sole may be so much nearer to an edge than half the sole's width
+_INSIDE = 0.005  # m; a sole may be so far beyond an edge
+_HEADINGS = 24  # of soles on surfaces too narrow for some heading, over half a turn
 _PART = 0.75  # of half the body's depth: what is surely filled by some part of the trunk in any heading
 _BESIDE = 0.05  # m; the trunk may be so far beside the line from one foot to the other
 _SINK = 0.35  # part of its height at home by which the CoM may be lower; plans keep 0.7 of it
@@ -107,10 +110,11 @@ class Proof:
         self._corner, self._shape = low, np.ceil((high - low) / self._cell).astype(int) + 1
         stride = longest / self._cell + 2 * np.sqrt(2.0)
         around = np.insert(disc(stride / 2), 0, 0, axis=0)
-        half, between = float(robot.half_sizes[Limb.LEFT_FOOT].min()), None
+        between = None
+        rooms = [(surface, room) for surface in surfaces if (room := self._room(robot, surface)) is not None]
         for merge in _MERGE:
             self._merge = self._scale * merge
-            ground = self._ground(surfaces, half)
+            ground = self._ground(rooms)
             if between is None:
                 between = mark_between(ground.max(2) > -np.inf, stride, self._beyond)
                 between = binary_dilation(between, iterations=int(np.ceil(self._scale * _BESIDE / self._cell)))
@@ -127,17 +131,26 @@ class Proof:
         if self._goal.any():
             self._mark(robot)
 
-    def _ground(self, surfaces: Sequence[Surface], half: float) -> np.ndarray:
+    def _room(self, robot: RobotModel, surface: Surface) -> BaseGeometry | None:
+        """Where the centre of a sole may be on a surface, with what the grid may err; None where nowhere."""
+        if not surface.serves_foot or surface.normal[2] < _STEEP:
+            return None
+        half, inside_by = robot.half_sizes[Limb.LEFT_FOOT], self._scale * _INSIDE
+        room = surface.region.buffer(inside_by - half.min())
+        if surface.region.buffer(inside_by - np.hypot(*half)).is_empty:  # too narrow for some heading
+            # Within half the spacing of the headings, a sole contains one that is so much smaller.
+            within = np.maximum(half - np.sin(np.pi / 2 / _HEADINGS) * half[::-1] - inside_by, 1e-4)
+            turns = np.pi * np.arange(_HEADINGS) / _HEADINGS
+            axes = np.column_stack([np.cos(turns), np.sin(turns)])
+            room = room.intersection(shapely.union_all([eroded(surface, axis, within) for axis in axes]))
+        room = room.buffer(inside_by + np.sqrt(0.5) * self._cell / surface.normal[2])
+        return None if room.is_empty else room
+
+    def _ground(self, rooms: Sequence[tuple[Surface, BaseGeometry]]) -> np.ndarray:
         """(nx, ny, L) m; heights at which the centre of a sole may be in a cell, -inf where there is none."""
-        levels, inside_by = np.full((*self._shape, _LEVELS), -np.inf), self._scale * _INSIDE
-        for surface in surfaces:
+        levels = np.full((*self._shape, _LEVELS), -np.inf)
+        for surface, near in rooms:
             normal, origin = surface.normal, surface.pose.position
-            if not surface.serves_foot or normal[2] < _STEEP:
-                continue
-            near = surface.region.buffer(inside_by - half)
-            near = near.buffer(inside_by + np.sqrt(0.5) * self._cell / normal[2])
-            if near.is_empty:
-                continue
             flat = shapely.get_coordinates(near)
             corners = surface.pose @ np.column_stack([flat, np.zeros(len(flat))])
             first = np.clip(np.floor((corners[:, :2].min(0) - self._corner) / self._cell), 0, self._shape).astype(int)

@@ -149,8 +149,9 @@ class TerrainDistance:
             room = f"{deep:.2g} m wide even sideways, {high:.2g} m high crouched"
             return f"{head}: walls or a ceiling leave no room for the body ({room}) {place}; make more room there"
         return (
-            f"{head}: the ground is interrupted {place} by a gap wider than the longest step ({longest:.2g} m) or a "
-            f"rise higher than {self._climb:.2g} m; bring the surfaces closer together"
+            f"{head}: the ground is interrupted {place} by a gap wider than the longest step ({longest:.2g} m), "
+            f"surfaces too small for a sole, or a rise higher than {self._climb:.2g} m; "
+            "bring larger surfaces closer together"
         )
 
     def _proof(self, start: Pose, longest: float, surfaces: Sequence[Surface]) -> tuple[str, np.ndarray] | None:
