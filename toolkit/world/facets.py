@@ -84,15 +84,14 @@ def with_overlapping(mesh: trimesh.Trimesh, facets: list[Facet], *, flat: float,
 
     Around seeds that are `_SPACING` apart seen from above, these are the largest of the `_DISCS` in which the mesh is
     within `_ROUGH` m of a relief, or, where it is rough, what grows there as in `find_facets`. No seed is in one of the
-    `facets` that are off their plane by at most `flat` m and at least as large as a square of that, or end at edges.
-    Other `facets` are left out where a disc holds them whole.
+    `facets` that are off their plane by at most `flat` m and at least as large as a square of that. Other `facets` are
+    left out where a disc holds them whole.
     """
     table, area = _Triangles.of(mesh), mesh.area_faces
     free = area > _DEGENERATE
     curved, smooth = free & (mesh.face_normals[:, 2] > 0.0), np.zeros(len(free), bool)  # what faces down bears nothing
-    open_ends = _open_ends(mesh, facets)
-    for facet, goes_on in zip(facets, open_ends, strict=True):
-        curved[facet.triangles] &= facet.off > flat or bool(goes_on and facet.polygon.area < _SPACING**2)
+    for facet in facets:
+        curved[facet.triangles] &= facet.off > flat or facet.polygon.area < _SPACING**2
     place = mesh.triangles_center[:, :2] / _SPACING
     near = np.flatnonzero(curved)
     near = near[np.argsort(np.abs(place[near] % 1.0 - 0.5).max(1), kind="stable")]  # to the middle of their cell
@@ -110,18 +109,6 @@ def with_overlapping(mesh: trimesh.Trimesh, facets: list[Facet], *, flat: float,
             known.add(key)
             found.append(facet)
     return [facet for facet in facets if facet.off <= flat or not smooth[facet.triangles].all()] + found
-
-
-def _open_ends(mesh: trimesh.Trimesh, facets: list[Facet]) -> np.ndarray:
-    """(n,) bool; whether the mesh goes on beyond each of its facets at nearly the same angle."""
-    facet_of_triangle = np.full(len(mesh.faces), len(facets))
-    for index, facet in enumerate(facets):
-        facet_of_triangle[facet.triangles] = index
-    sides = facet_of_triangle[mesh.face_adjacency]
-    level = (mesh.face_adjacency_angles < _DISC_ANGLE + _ANGLE) & (sides[:, 0] != sides[:, 1])
-    result = np.zeros(len(facets) + 1, bool)
-    result[sides[level]] = True
-    return result[:-1]
 
 
 def _disc(mesh: trimesh.Trimesh, table: _Triangles, free: np.ndarray, seed: int) -> Facet | None:
