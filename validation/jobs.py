@@ -111,7 +111,8 @@ def run_jobs(
         Records of the jobs that have one, in order: of all of them where there was time.
     """
     end = time.monotonic() + (float("inf") if minutes is None else 60.0 * minutes)
-    waiting = [job for job in jobs if store.records.get(job.name, {"stage": _ERROR}).get("stage") == _ERROR]
+    done = {name for name, record in store.records.items() if record.get("stage") != _ERROR}
+    waiting = [job for job in jobs if job.name not in done]
     known = len(jobs) - len(waiting)
     if known or store.others:
         console.print(f"{known} of {len(jobs)} trials known from before, {store.others} records of other settings left")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
@@ -44,7 +46,7 @@ def convex_partition(region: Polygon) -> list[np.ndarray]:
     for a, b in inner:
         first, second = owner[a, b], owner[b, a]
         merged = _joined(rings[first], rings[second], a, b)
-        if merged is None or min(_turn(places, merged, index) for index in (0, len(rings[first]) - 1)) <= -_FLAT:
+        if merged is None or min(_turn_at(places, merged, index) for index in (0, len(rings[first]) - 1)) <= -_FLAT:
             continue  # the corners between those of the common edge turn as they did
         rings[first] = merged
         for edge in zip(rings[second], rings[second][1:] + rings[second][:1], strict=True):
@@ -68,8 +70,7 @@ def _triangles(found: shapely.Geometry) -> np.ndarray:
     """(n, 3, 2) corners of the triangles of a collection that have an area, counterclockwise."""
     parts = shapely.get_parts(found)
     corners = shapely.get_coordinates(parts[shapely.area(parts) > 1e-12]).reshape(-1, 4, 2)[:, :3]
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    clockwise = first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]
+    clockwise = _turn(*np.moveaxis(corners, 0, -1)) < 0.0
     corners[clockwise] = corners[clockwise][:, [0, 2, 1]]
     return corners
 
@@ -80,10 +81,14 @@ def _square_of(first: list[float], second: list[float]) -> float:
     return x * x + y * y
 
 
-def _turn(points: list[list[float]], ring: list[int], index: int) -> float:
-    """Cross product of the edges before and after a corner of a ring, m^2, positive to the left."""
-    here, before, after = (points[ring[place % len(ring)]] for place in (index, index - 1, index + 1))
+def _turn(before: Any, here: Any, after: Any) -> Any:
+    """m^2; cross product of the edges before and after a corner, positive to the left. Points (2,) or many (2, k)."""
     return (here[0] - before[0]) * (after[1] - here[1]) - (here[1] - before[1]) * (after[0] - here[0])
+
+
+def _turn_at(points: list[list[float]], ring: list[int], index: int) -> float:
+    """The turn of one corner of a ring."""
+    return _turn(*(points[ring[place % len(ring)]] for place in (index - 1, index, index + 1)))
 
 
 def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int] | None:
@@ -96,13 +101,11 @@ def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int] | 
 
 def _without_straight_corners(points: list[list[float]], ring: list[int]) -> list[int]:
     """The ring without the corners that do not turn."""
-    kept = [corner for index, corner in enumerate(ring) if abs(_turn(points, ring, index)) > _FLAT]
+    kept = [corner for index, corner in enumerate(ring) if abs(_turn_at(points, ring, index)) > _FLAT]
     return kept if len(kept) >= 3 else ring
 
 
 def _turns(ring: np.ndarray) -> np.ndarray:
     """(k,) m^2; cross products of the edges before and after each corner of a ring (k, 2), positive to the left."""
-    closed = np.concatenate([ring[-1:], ring, ring[:1]])
-    edges = closed[1:] - closed[:-1]
-    before, after = edges[:-1], edges[1:]
-    return before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    closed = np.concatenate([ring[-1:], ring, ring[:1]]).T
+    return _turn(closed[:, :-2], closed[:, 1:-1], closed[:, 2:])

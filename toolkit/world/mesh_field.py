@@ -91,9 +91,8 @@ def field_of(
     seen = np.stack([*np.meshgrid(*middles), heights(*middles)], axis=-1).reshape(-1, 3)
     known = frame.inverse() @ np.concatenate([ground.reshape(-1, 3), ground.mean(axis=1)])
     checked = np.concatenate([known, seen])
-    if not (
-        np.abs(_height(grid, half, checked) - checked[:, 2]) <= FACET_DISTANCE
-    ).all():  # where nothing was hit it is NaN
+    right = np.abs(_height(grid, half, checked) - checked[:, 2]) <= FACET_DISTANCE  # not where nothing was hit: NaN
+    if not right.all():
         return None
     lowest = float(grid.min())
     pose = Pose(frame.rotation, np.array([*frame.position[:2], lowest]))
