@@ -19,7 +19,7 @@ from toolkit.report.console import progress_bar
 Record = dict[str, Any]
 _BATCH = 16  # trials of a process before a fresh one takes over: what it has freed stays with it, and looks like need
 _FOLDERS = re.compile(r"(?<![\w.])/(?:[^\s/:']+/)+")  # before the name of a file
-_ERROR = "error"  # stage of a trial that ended in an error of the program
+ERROR = "error"  # stage of a trial that ended in an error of the program
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -86,7 +86,7 @@ def reason_of(error: Exception) -> str:
 
 def failed_record(reason: str, trace: str = "") -> Record:
     """What is left of a trial that ended in an error of the program."""
-    return {"stage": _ERROR, "passed": False, "reason": reason, "traceback": trace}
+    return {"stage": ERROR, "passed": False, "reason": reason, "traceback": trace}
 
 
 def run_jobs(
@@ -111,7 +111,7 @@ def run_jobs(
         Records of the jobs that have one, in order: of all of them where there was time.
     """
     end = time.monotonic() + (float("inf") if minutes is None else 60.0 * minutes)
-    done = {name for name, record in store.records.items() if record.get("stage") != _ERROR}
+    done = {name for name, record in store.records.items() if record.get("stage") != ERROR}
     waiting = [job for job in jobs if job.name not in done]
     known = len(jobs) - len(waiting)
     if known or store.others:

@@ -12,7 +12,7 @@ from toolkit.robot.loader import default_robot, load_robot
 from validation import goals, map_families, map_scale, map_worlds, options
 from validation.goals import Goal
 from validation.growing import add_growing_options, growth_note, stamped, state_of, take_over
-from validation.jobs import Job, run_jobs
+from validation.jobs import ERROR, Job, run_jobs
 from validation.machine import source_fingerprint
 from validation.map_families import FAMILIES, QUICK, SEEDS, Cell, cells_of
 from validation.map_picture import draw_map
@@ -63,7 +63,7 @@ def keep_worlds(folder: Path, cells: dict[str, Cell], scale: float, records: lis
         InputError: They cannot be written.
     """
     for record in records:
-        if not record["passed"] and record["stage"] != "error":
+        if not record["passed"] and record["stage"] != ERROR:
             write_whole(folder / f"{record['name']}.xml", mjcf_of(cells[record["name"]], scale).encode())
 
 

@@ -12,9 +12,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from toolkit.drafts import write_whole
-from validation.jobs import Record
+from validation.jobs import ERROR, Record
 from validation.map_families import Axis, Family
-from validation.map_trial import ERROR, FAILURES, IMPOSSIBLE, NO_SEQUENCE, OUTCOMES, PASS
+from validation.map_trial import FAILURES, IMPOSSIBLE, NO_SEQUENCE, OUTCOMES, PASS
 
 _LOOKS = {
     PASS: ("o", "#2a9d4a"),

@@ -9,7 +9,7 @@ from typing import Any
 
 from scipy.stats import binomtest
 
-from validation.jobs import Record
+from validation.jobs import ERROR, Record
 from validation.map_families import FAMILIES, Family
 from validation.map_trial import FAILURES, IMPOSSIBLE, NO_SEQUENCE
 from validation.tables import markdown_table
@@ -87,7 +87,7 @@ def summarise(name: str, records: Sequence[Record]) -> dict[str, Any]:
         "impossible": impossible,
         "no_sequence": outcomes[NO_SEQUENCE],
         "failed": {words: outcomes[words] for words in FAILURES.values()},
-        "errors": sum(record["stage"] == "error" for record in records),
+        "errors": sum(record["stage"] == ERROR for record in records),
         "holes": [
             {"name": hole.record["name"], "reason": hole.record["short"], "harder": list(hole.harder)}
             for hole in holes_of(FAMILIES[name], records)

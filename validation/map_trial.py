@@ -8,13 +8,13 @@ from typing import Any
 
 from toolkit import pipeline
 from toolkit.errors import PlanningError
-from validation.jobs import Record, reason_of
+from validation.jobs import ERROR, Record, reason_of
 from validation.map_families import Cell
 from validation.map_scale import world_of
 from validation.options import TrialSettings
 from validation.run_trial import StageLog, make_planner, robot_of
 
-PASS, NO_SEQUENCE, IMPOSSIBLE, ERROR = "PASS", "no sequence found", "proven impossible", "error"
+PASS, NO_SEQUENCE, IMPOSSIBLE = "PASS", "no sequence found", "proven impossible"
 FAILURES = {stage: f"FAIL {stage}" for stage in ("start", "dynamics", "wholebody", "execution")}
 OUTCOMES = (PASS, *FAILURES.values(), NO_SEQUENCE, IMPOSSIBLE, ERROR)
 CANDIDATES = 6  # sequences that a cell may test after the optimiser

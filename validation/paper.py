@@ -21,7 +21,7 @@ from toolkit.robot.loader import load_robot
 from validation import goals, options
 from validation.cases import Case
 from validation.growing import add_growing_options, growth_note, stamped, state_of, take_over
-from validation.jobs import Job, Record, run_jobs
+from validation.jobs import ERROR, Job, Record, run_jobs
 from validation.machine import ROOT
 from validation.options import TrialSettings
 from validation.page.drawings import draw_models, draw_networks, draw_sums
@@ -124,7 +124,7 @@ def sections_of(records: dict[str, Record], known: dict[str, dict[str, Any]]) ->
 
     def of(prefix: str) -> list[Record]:
         whole = [record for name, record in records.items() if name.startswith(prefix)]
-        return [record for record in whole if record.get("stage") != "error"]
+        return [record for record in whole if record.get("stage") != ERROR]
 
     groups = groups_of(of("plan-"))
     plans, networks = plan_section(groups), network_section(known["prediction"])

@@ -15,12 +15,12 @@ from toolkit.world.loader import load_world
 from validation import map as program
 from validation import map_worlds, options
 from validation.growing import state_of
-from validation.jobs import Job, PoolOptions, run_jobs
+from validation.jobs import ERROR, Job, PoolOptions, run_jobs
 from validation.map_families import FAMILIES, QUICK, SEEDS, Cell, cells_of
 from validation.map_picture import draw_map
 from validation.map_scale import scaled, world_of
 from validation.map_table import hole_table, holes_of, summarise, table, wilson
-from validation.map_trial import ERROR, FAILURES, IMPOSSIBLE, NO_SEQUENCE, PASS, completed, in_short, map_trial
+from validation.map_trial import FAILURES, IMPOSSIBLE, NO_SEQUENCE, PASS, completed, in_short, map_trial
 from validation.trial_file import TrialFolder
 
 
