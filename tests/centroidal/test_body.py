@@ -10,12 +10,7 @@ import pytest
 from tests.centroidal.walks import walk
 from tests.physics.test_leg import random_legs
 from tests.shipped_robots import OWN
-from toolkit.centroidal.body import (
-    BodyMargins,
-    body_residuals,
-    lowest_foot,
-    swing_ankles,
-)
+from toolkit.centroidal.body import BodyMargins, body_residuals
 from toolkit.centroidal.build import initial_com, sequence_problem
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion
 from toolkit.centroidal.program import leg_limits
@@ -174,7 +169,7 @@ def test_contacts_at_knots_and_swings(walker, motion):
     active = problem.active
     expected = {(t + side, limb) for t, limb in zip(*np.nonzero(active), strict=True) for side in (0, 1)}
     assert set(seen) == expected
-    swing_knots, delays, swing_limbs, ankles, tangents = swing_ankles(problem)
+    swing_knots, delays, swing_limbs, ankles, tangents = problem.swing_ankles
     inner = {(t, limb) for limb in (0, 1) for t in range(1, problem.steps) if not active[t - 1 : t + 1, limb].any()}
     at_knots = delays == 0.0
     assert set(zip(swing_knots[at_knots].tolist(), swing_limbs[at_knots].tolist(), strict=True)) == inner
@@ -193,5 +188,5 @@ def test_contacts_at_knots_and_swings(walker, motion):
     share = np.einsum("nij,nij->n", tangents[:, :, :2], tangents[:, :, :2]) / 2
     left = np.einsum("nij,nij->n", tangents[:, :, 2:], tangents[:, :, 2:]) / 2
     np.testing.assert_allclose(np.sqrt(share) + np.sqrt(left), 1.0, atol=1e-12)
-    height, _ = lowest_foot(problem)
+    height, _ = problem.lowest_foot
     np.testing.assert_allclose(height, 0.0, atol=1e-12)

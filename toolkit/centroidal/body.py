@@ -18,8 +18,6 @@ from toolkit.geometry.pose import rotation_about_z
 from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins, leg_clearances, leg_torques
 from toolkit.robot.model import RobotModel
 
-CROSSING = (0.02, 0.95)  # part of a swing in which the foot moves horizontally from contact to contact
-
 
 @dataclass(frozen=True)
 class BodyMargins(ReachMargins):
@@ -70,52 +68,9 @@ class BodyResiduals:
         return name, int(knot), Limb(int(limb))
 
 
-def swing_ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Where the ankle of a foot in the air is, on a smooth path from the contact it left to the one it will make.
-
-    The times are the knots strictly inside swings, and the middle of a swing's first and last step, where legs are
-    stretched the most.
-
-    Returns:
-        (n,) knots, (n,) s from the knot, (n,) limbs, (n, 3) ankles in the world, and (n, 3, 4) how they follow
-        displacements of the contact made (2) and of the contact left (2) along their own axes.
-    """
-    parts = []
-    times = problem.times
-    for limb in FEET:
-        tip = problem.position[:, limb] + problem.rotation[:, limb] @ problem.tip_in_contact[limb]
-        edges = np.flatnonzero(np.diff(np.concatenate([[1], problem.active[:, limb].astype(int), [1]])))
-        for lift, land in edges.reshape(-1, 2):
-            if lift == 0:
-                continue
-            if land < problem.steps:
-                end, turn = tip[land], problem.rotation[land, limb]
-            elif problem.landing_limb == limb and problem.landing_rotation is not None:
-                turn = problem.landing_rotation
-                assert problem.landing_position is not None
-                end = problem.landing_position + turn @ problem.tip_in_contact[limb]
-            else:
-                continue
-            inside = np.concatenate([np.arange(lift + 1, land), [lift, land - 1]])
-            delay = np.zeros(len(inside))
-            delay[-2:] = problem.dt[inside[-2:]] / 2
-            s = ((times[inside] + delay - times[lift]) / (times[land] - times[lift]))[:, None]
-            crossed = np.clip((s - CROSSING[0]) / (CROSSING[1] - CROSSING[0]), 0.0, 1.0)
-            along = crossed * crossed * (3 - 2 * crossed)
-            path = tip[lift - 1] + along * (end - tip[lift - 1])
-            path[:, 2] += problem.swing_lift * (4 * s * (1 - s))[:, 0]
-            share, left = along[..., None], problem.rotation[lift - 1, limb]
-            tangent = np.concatenate([share * turn[:, :2], (1 - share) * left[:, :2]], 2)
-            parts.append((inside, delay, np.full(len(inside), int(limb)), path, tangent))
-    if not parts:
-        return np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros((0, 3)), np.zeros((0, 3, 4))
-    knots, delays, limbs, ankles, tangents = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return knots, delays, limbs, ankles, tangents
-
-
 def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins = BodyMargins()) -> BodyResiduals:
     """How far a motion, feasible or not, exceeds the limits of the robot's legs and arms less the margins."""
-    p, n = motion.solved, motion.problem.steps
+    p, n = motion.placed, motion.problem.steps
     violation = _posture_violations(p, motion, robot, margins)
 
     def enter(name: str, at: np.ndarray, limb: np.ndarray, value: np.ndarray) -> None:
@@ -123,7 +78,7 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
         np.maximum.at(table, (at, limb), value)
 
     knots, limbs, positions, _ = p.knot_contacts
-    swing_knots, swing_delays, swing_limbs, swing_tips, _ = swing_ankles(p)
+    swing_knots, swing_delays, swing_limbs, swing_tips, _ = p.swing_ankles
     base = rotation_about_z(p.yaw)
     com = motion.com[swing_knots] + swing_delays[:, None] * motion.linear_momentum[swing_knots] / p.mass
     hips = np.array([robot.legs[limb].hip_in_com for limb in FEET])
@@ -138,7 +93,7 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
         length = np.linalg.norm(shoulder - positions[here], axis=-1)
         outside = np.maximum(arm.min_reach - length, length - arm.max_reach) + margins.length
         enter("arm reach", knots[here], limbs[here], outside)
-    floor, foot = lowest_foot(p)
+    floor, foot = p.lowest_foot
     enter("CoM height", np.arange(n + 1), foot, floor + p.min_height + margins.height - motion.com[:, 2])
     if p.room is not None:
         enter("room of the body", p.room.knot, foot[p.room.knot], p.room.excess(motion.com))
@@ -177,30 +132,10 @@ def _torque_violations(
     return dict(zip(names, table, strict=True))
 
 
-def lowest_foot(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
-    """(N + 1,) m height of the lowest foot in contact around each knot, and (N + 1,) which foot; -inf without one."""
-    knots, limbs, positions, _ = problem.knot_contacts
-    height = np.full((problem.steps + 1, 2), np.inf)
-    feet = limbs < 2
-    np.minimum.at(height, (knots[feet], limbs[feet]), positions[feet, 2])
-    lowest = height.min(1)
-    return np.where(np.isfinite(lowest), lowest, -np.inf), height.argmin(1)
-
-
-def mean_feet(problem: CentroidalProblem) -> np.ndarray:
-    """(N + 1, 3) m; mean of the feet in contact around each knot; zero without one."""
-    knots, limbs, positions, _ = problem.knot_contacts
-    feet = limbs < 2
-    total, count = np.zeros((problem.steps + 1, 3)), np.zeros(problem.steps + 1)
-    np.add.at(total, knots[feet], positions[feet])
-    np.add.at(count, knots[feet], 1.0)
-    return total / np.maximum(count, 1.0)[:, None]
-
-
 def rough_com(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
     """(N + 1, 3) m and m/s; a CoM at the knots that follows the mean of the feet, and its velocity after them."""
     p = problem
-    com = mean_feet(p)
+    com = p.mean_feet.copy()
     com[:, 2] += p.home_heights
     width = max(p.steps // 20, 3)
     padded = np.concatenate([np.repeat(p.com[None], width, 0), com, np.repeat(com[-1:], width, 0)])

@@ -24,9 +24,11 @@ from functools import cached_property
 import numpy as np
 
 from toolkit.contacts.failure import Failure
+from toolkit.geometry.limb import FEET
 from toolkit.physics.momentum import ballistic
 from toolkit.robot.scale import USUAL, Scale
 
+CROSSING = (0.02, 0.95)  # part of a swing in which the foot moves horizontally from contact to contact
 SWING_LIFT = 0.06  # m for a body of the usual size (`toolkit.robot.scale`); see `CentroidalProblem.swing_lift`
 STANDARD_GRAVITY = 9.81  # m/s^2
 GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
@@ -193,6 +195,66 @@ class CentroidalProblem:
             rotation = np.concatenate([rotation, self.landing_rotation[None]])
         return knot, limb, position, rotation
 
+    @cached_property
+    def lowest_foot(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N + 1,) m height of the lowest foot in contact around each knot, and (N + 1,) which foot; -inf without."""
+        knots, limbs, positions, _ = self.knot_contacts
+        height = np.full((self.steps + 1, 2), np.inf)
+        feet = limbs < 2
+        np.minimum.at(height, (knots[feet], limbs[feet]), positions[feet, 2])
+        lowest = height.min(1)
+        return np.where(np.isfinite(lowest), lowest, -np.inf), height.argmin(1)
+
+    @cached_property
+    def mean_feet(self) -> np.ndarray:
+        """(N + 1, 3) m; mean of the feet in contact around each knot; zero without one."""
+        knots, limbs, positions, _ = self.knot_contacts
+        feet = limbs < 2
+        total, count = np.zeros((self.steps + 1, 3)), np.zeros(self.steps + 1)
+        np.add.at(total, knots[feet], positions[feet])
+        np.add.at(count, knots[feet], 1.0)
+        return total / np.maximum(count, 1.0)[:, None]
+
+    @cached_property
+    def swing_ankles(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Where the ankle of a foot in the air is, on a smooth path from the contact it left to the one it will make.
+
+        The times are the knots strictly inside swings, and the middle of a swing's first and last step, where legs are
+        stretched the most. The parts are (n,) knots, (n,) s from the knot, (n,) limbs, (n, 3) ankles in the world,
+        and (n, 3, 4) how they follow displacements of the contact made (2) and of that left (2) along their own axes.
+        """
+        parts = []
+        times = self.times
+        for limb in FEET:
+            tip = self.position[:, limb] + self.rotation[:, limb] @ self.tip_in_contact[limb]
+            edges = np.flatnonzero(np.diff(np.concatenate([[1], self.active[:, limb].astype(int), [1]])))
+            for lift, land in edges.reshape(-1, 2):
+                if lift == 0:
+                    continue
+                if land < self.steps:
+                    end, turn = tip[land], self.rotation[land, limb]
+                elif self.landing_limb == limb and self.landing_rotation is not None:
+                    turn = self.landing_rotation
+                    assert self.landing_position is not None
+                    end = self.landing_position + turn @ self.tip_in_contact[limb]
+                else:
+                    continue
+                inside = np.concatenate([np.arange(lift + 1, land), [lift, land - 1]])
+                delay = np.zeros(len(inside))
+                delay[-2:] = self.dt[inside[-2:]] / 2
+                s = ((times[inside] + delay - times[lift]) / (times[land] - times[lift]))[:, None]
+                crossed = np.clip((s - CROSSING[0]) / (CROSSING[1] - CROSSING[0]), 0.0, 1.0)
+                along = crossed * crossed * (3 - 2 * crossed)
+                path = tip[lift - 1] + along * (end - tip[lift - 1])
+                path[:, 2] += self.swing_lift * (4 * s * (1 - s))[:, 0]
+                share, left = along[..., None], self.rotation[lift - 1, limb]
+                tangent = np.concatenate([share * turn[:, :2], (1 - share) * left[:, :2]], 2)
+                parts.append((inside, delay, np.full(len(inside), int(limb)), path, tangent))
+        if not parts:
+            return np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros((0, 3)), np.zeros((0, 3, 4))
+        knots, delays, limbs, ankles, tangents = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return knots, delays, limbs, ankles, tangents
+
     @property
     def reduced_half_size(self) -> np.ndarray:
         """(N, 4, 2) m; half extents that bound the CoP and the yaw moment: the CoP margin taken off, at most half."""
@@ -243,13 +305,17 @@ class CentroidalMotion:
     landed: np.ndarray | None = None
 
     @property
+    def placed(self) -> CentroidalProblem:
+        """The problem with contacts where they landed."""
+        if self.landed is None:
+            return self.problem
+        shift = (self.landed[-1, :2] - self.problem.position[-1, :2]).mean(0)
+        return replace(self.problem, position=self.landed, final_center=self.problem.final_center + shift)
+
+    @property
     def solved(self) -> CentroidalProblem:
         """The problem that the motion solves: contacts where they landed, within the margins that it keeps."""
-        solved = self.problem
-        if self.landed is not None:
-            shift = (self.landed[-1, :2] - solved.position[-1, :2]).mean(0)
-            solved = replace(solved, position=self.landed, final_center=solved.final_center + shift)
-        return solved if self.kept is None else replace(solved, margins=self.kept)
+        return self.placed if self.kept is None else replace(self.placed, margins=self.kept)
 
     @property
     def outcome(self) -> str:

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 
-from toolkit.centroidal.body import BodyMargins, lowest_foot, mean_feet, rough_com, swing_ankles
+from toolkit.centroidal.body import BodyMargins, rough_com
 from toolkit.centroidal.leg_momentum import ground_share, leg_spin
 from toolkit.centroidal.problem import STANDARD_GRAVITY, CentroidalProblem, ComRoom, Margins
 from toolkit.centroidal.stages.blocks import Block
@@ -184,25 +185,35 @@ class Layout:
 
     def contacts(self, step: np.ndarray, limb: np.ndarray) -> np.ndarray:
         """(n, 9) variables of the rows of contacts."""
-        return np.column_stack([indices(self.wrench[step, limb], CONTACT), self.slack[step, 0]])
+        return side_by_side(len(step), indices(self.wrench[step, limb], CONTACT), self.slack[step, :1], dtype=int)
 
     def legs(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
         """(n, k) variables of the limits of stance legs."""
-        return np.column_stack([np.tile(np.arange(3), (len(knot), 1)), self.slack[knot, 1:], self.moved(knot, foot)])
+        return side_by_side(len(knot), range(3), self.slack[knot, 1:], self.moved(knot, foot), dtype=int)
 
     def torques(self, step: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
         """(n, k) variables of the joint torques of stance legs."""
-        states, wrench = np.tile(np.arange(6), (len(step), 1)), indices(self.wrench[step, foot], WRENCH)
-        return np.column_stack([states, wrench, self.slack[step, 1:], self.moved(step, foot)])
+        wrench = indices(self.wrench[step, foot], WRENCH)
+        return side_by_side(len(step), range(6), wrench, self.slack[step, 1:], self.moved(step, foot), dtype=int)
 
     def distances(self, knot: np.ndarray, foot: int | np.ndarray) -> np.ndarray:
         """(n, k) variables of the lengths of legs in the air and of arms."""
-        states, moved = np.tile(np.arange(6), (len(knot), 1)), [self.moved(knot, which) for which in (foot, AIR)]
-        return np.column_stack([states, self.slack[knot, 1:], *moved])
+        moved = [self.moved(knot, which) for which in (foot, AIR)]
+        return side_by_side(len(knot), range(6), self.slack[knot, 1:], *moved, dtype=int)
 
     def heights(self, knot: np.ndarray, foot: np.ndarray) -> np.ndarray:
         """(n, k) variables of the height of the CoM above the lowest foot."""
-        return np.column_stack([np.full(len(knot), 2), self.slack[knot, 1:], self.moved(knot, foot)])
+        return side_by_side(len(knot), [2], self.slack[knot, 1:], self.moved(knot, foot), dtype=int)
+
+
+def side_by_side(count: int, *parts: np.ndarray | Sequence[float], dtype: type = float) -> np.ndarray:
+    """(count, k) the columns of parts beside each other; a part of one axis is the same in all rows."""
+    arrays = [np.asarray(part, dtype) for part in parts]
+    ends = list(accumulate(array.shape[-1] for array in arrays))
+    found = np.empty((count, ends[-1]), dtype)
+    for begin, end, array in zip([0, *ends], ends, arrays, strict=False):
+        found[:, begin:end] = array
+    return found
 
 
 def indices(first: np.ndarray, size: int) -> np.ndarray:
@@ -271,7 +282,7 @@ class Program:
         jerk = jerk if resting.any(1).all() else SMOOTH * jerk
         squares = np.stack([*squares, jerk, reg.height * duration], 1)
         squares[0, 4] *= not np.any(p.com_velocity)  # the acceleration before a start in motion is unknown
-        height = mean_feet(p)[:, 2] + p.home_heights
+        height = p.mean_feet[:, 2] + p.home_heights
         return Steps(
             dt=np.ascontiguousarray(p.dt, float),
             first=np.searchsorted(step, np.arange(p.steps + 1)),
@@ -330,16 +341,13 @@ class Program:
         cop = (p.half_size - p.reduced_half_size)[step, limb]
         friction = np.full(len(step), p.margins.friction)
         friction[foot] = wanted_friction(p, step[foot], limb[foot])
-        yaw = np.full(len(step), p.margins.yaw)
-        wanted = np.column_stack([friction, cop, yaw])
-        least = np.tile([LEAST.friction, *LEAST.scaled(self._scale.length).cop, LEAST.yaw], (len(step), 1))
-        least[:, 1:3] = np.minimum(least[:, 1:3], cop)
-        least[:, 0] = np.maximum(LEAST.friction, p.margins.friction)
-        least[:, 3] = np.maximum(LEAST.yaw, yaw)
+        wanted = friction[:, None], cop, [p.margins.yaw]
+        least_cop = np.minimum(LEAST.scaled(self._scale.length).cop, cop)
+        least = [max(LEAST.friction, p.margins.friction)], least_cop, [max(LEAST.yaw, p.margins.yaw)]
         load, price = np.where(foot, 0.0, reg.palm_force), self.slack_price[step]
-        mu = p.friction[step, limb]
-        parameters = np.column_stack([mu, p.half_size[step, limb], wanted, least, weights, load, price])
-        return contact_block(self.layout, p.active, parameters)
+        given = p.friction[step, limb][:, None], p.half_size[step, limb]
+        parts = *given, *wanted, *least, weights, load[:, None], price[:, None]
+        return contact_block(self.layout, p.active, side_by_side(len(step), *parts))
 
     def _legs(self) -> Block:
         """Limits of stance legs at the knots."""
@@ -350,9 +358,9 @@ class Program:
             here = np.flatnonzero(limbs == limb)
             at, rotation = knots[here], rotations[here]
             ankle = positions[here] + rotation @ leg.ankle_in_sole
-            limits = np.tile(leg_limits(leg, self._body), (len(at), 1))
             posture = _posture_parameters(leg, self._heading[at], ankle, rotation)
-            parts.append((at, self.layout.legs(at, limb), np.column_stack([posture, limits])))
+            parameters = side_by_side(len(at), *posture, leg_limits(leg, self._body))
+            parts.append((at, self.layout.legs(at, limb), parameters))
         return _joined(parts, LEG_ROWS)
 
     def _torques(self) -> Block:
@@ -362,20 +370,16 @@ class Program:
             leg, step = self.robot.legs[limb], np.flatnonzero(p.active[:, limb])
             sole, rotation = p.position[step, limb], p.rotation[step, limb]
             limits = [leg.torques[role] / self._weight for role in TORQUE_ROLES]
-            parameters = [
-                p.dt[step] / 2,
-                _posture_parameters(leg, self._middle_heading[step], sole + rotation @ leg.ankle_in_sole, rotation),
-                sole,
-                np.tile(limits, (len(step), 1)),
-                np.tile([self._body.torque, self._body.most_torque], (len(step), 1)),
-            ]
-            parts.append((step, self.layout.torques(step, limb), np.column_stack(parameters)))
+            ankle, used = sole + rotation @ leg.ankle_in_sole, [self._body.torque, self._body.most_torque]
+            posture = _posture_parameters(leg, self._middle_heading[step], ankle, rotation)
+            parameters = side_by_side(len(step), p.dt[step, None] / 2, *posture, sole, limits, used)
+            parts.append((step, self.layout.torques(step, limb), parameters))
         return _joined(parts, TORQUE_ROWS)
 
     def _distances(self) -> Block:
         """Lengths of legs whose foot is in the air, and of arms in contact."""
         parts = []
-        knots, delays, limbs, tips, tangents = swing_ankles(self.problem)
+        knots, delays, limbs, tips, tangents = self.problem.swing_ankles
         for limb in FEET:
             leg, here = self.robot.legs[limb], limbs == limb
             root = (self._heading @ leg.hip_in_com)[knots[here]]
@@ -383,10 +387,12 @@ class Program:
             parts.append(self._distance(knots[here], delays[here], root, tips[here], span, limb, tangents[here]))
         knots, limbs, tips, _ = self.problem.knot_contacts
         for limb, arm in self.robot.arms.items():
-            here = limbs == limb
+            here = np.flatnonzero(limbs == limb)
+            if not len(here):
+                continue
             root, span = (self._heading @ arm.shoulder_in_com)[knots[here]], (arm.min_reach, arm.max_reach)
-            none = np.zeros((here.sum(), 3, 4))
-            parts.append(self._distance(knots[here], np.zeros(here.sum()), root, tips[here], span, FEET[0], none))
+            none = np.zeros((len(here), 3, 4))
+            parts.append(self._distance(knots[here], np.zeros(len(here)), root, tips[here], span, FEET[0], none))
         return _joined(parts, DISTANCE_ROWS)
 
     def _distance(
@@ -400,18 +406,18 @@ class Program:
         tangents: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Stages, variables and parameters of bounds on the distance from roots to tips; see `rows.fill_distances`."""
-        parameters = [delay, root, tip, np.tile([*span, self._body.length], (len(knot), 1))]
+        parts = [delay[:, None], root, tip, [*span, self._body.length]]
         if self.layout.moving:
-            parameters.append(tangents.reshape(len(knot), 12))
-        return knot, self.layout.distances(knot, foot), np.column_stack(parameters)
+            parts.append(tangents.reshape(len(knot), 12))
+        return knot, self.layout.distances(knot, foot), side_by_side(len(knot), *parts)
 
     def _heights(self) -> Block:
         """Least height of the CoM at the knots."""
         p = self.problem
-        floor, lowest = lowest_foot(p)
+        floor, lowest = p.lowest_foot
         at = np.flatnonzero(np.isfinite(floor))
         rises = p.rotation[np.minimum(at, p.steps - 1), lowest[at], 2, :2][:, : 2 * self.layout.moving]
-        parameters = np.column_stack([floor[at] + p.min_height, np.full(len(at), self._body.height), rises])
+        parameters = side_by_side(len(at), floor[at, None] + p.min_height, [self._body.height], rises)
         return Block.of(at, self.layout.heights(at, lowest[at]), parameters, 1)
 
     def _final(self) -> Block:
@@ -505,10 +511,12 @@ def leg_limits(leg: LegGeometry, margins: ReachMargins) -> np.ndarray:
     return np.concatenate([*ranges, [getattr(margins, name) for name in MARGINS]])
 
 
-def _posture_parameters(leg: LegGeometry, base: np.ndarray, ankle: np.ndarray, sole: np.ndarray) -> np.ndarray:
-    """(n, p) parameters of a leg's posture: base and sole (n, 3, 3) in the world, and ankle (n, 3) m."""
-    fixed = np.tile([leg.thigh, leg.shin], (len(base), 1)), np.tile(leg.hips.numbers, (len(base), 1))
-    return np.column_stack([base @ leg.hip_in_com, ankle, sole.reshape(-1, 9), fixed[0], base[:, :2, 0], fixed[1]])
+def _posture_parameters(
+    leg: LegGeometry, base: np.ndarray, ankle: np.ndarray, sole: np.ndarray
+) -> tuple[Sequence[float] | np.ndarray, ...]:
+    """Parts of the parameters of a leg's posture: base and sole (n, 3, 3) in the world, and ankle (n, 3) m."""
+    lengths = leg.thigh, leg.shin
+    return base @ leg.hip_in_com, ankle, sole.reshape(-1, 9), lengths, base[:, :2, 0], leg.hips.numbers
 
 
 def _joined(parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]], rows: int) -> Block:

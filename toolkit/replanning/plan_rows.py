@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolkit.centroidal.body import BodyMargins, lowest_foot
+from toolkit.centroidal.body import BodyMargins
 from toolkit.centroidal.problem import CentroidalProblem
 from toolkit.centroidal.program import Layout, Program, Regularisers
 from toolkit.centroidal.stages.blocks import Block
@@ -52,7 +52,7 @@ class PlanRows:
         standing = Program(_standing(problem), robot, BODY, Regularisers()).blocks
         legs, torques = (block.parameters.reshape(-1, 2, block.parameters.shape[1]) for block in standing[1:3])
         foot = (planned.distances.variables[:, 7] - STATE) // 2
-        return cls(legs, torques, planned.distances, planned.heights, foot, lowest_foot(problem)[1])
+        return cls(legs, torques, planned.distances, planned.heights, foot, problem.lowest_foot[1])
 
     def blocks(
         self, layout: Layout, first: int, dt: np.ndarray, contacts: HorizonContacts
