@@ -137,7 +137,7 @@ def rough_com(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
     p = problem
     com = p.mean_feet.copy()
     com[:, 2] += p.home_heights
-    width = max(p.steps // 20, 3)
+    width = min(max(p.steps // 20, 3), 15)  # a wider window would leave the feet behind where the motion ends
     padded = np.concatenate([np.repeat(p.com[None], width, 0), com, np.repeat(com[-1:], width, 0)])
     window = np.hanning(2 * width + 3)[1:-1]
     com = np.stack([np.convolve(padded[:, i], window / window.sum(), "valid") for i in range(3)], 1)

@@ -137,7 +137,7 @@ class Options(NamedTuple):
     tolerance: float = 1e-4
     feasible: float = 4e-7
     gap: float = GAP
-    least: float = 0.3
+    least: float = 0.1
     small: float = SMALL
     linear: bool = False
 
