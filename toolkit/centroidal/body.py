@@ -48,34 +48,47 @@ class BodyResiduals:
     """By how much a motion exceeds the body's limits.
 
     Attributes:
-        violation: Name of the limit -> (N + 1, 4) by knot and limb in m or rad, torques as a part of the limit;
-            negative or -inf where the limit is kept. What happens during a step is entered at its first knot.
+        names: The K limits.
+        table: (K, N + 1, 4) by limit, knot and limb in m or rad, torques as a part of the limit; negative or -inf where
+            the limit is kept, inf where undefined. What happens during a step is entered at its first knot.
     """
 
-    violation: dict[str, np.ndarray]
+    names: tuple[str, ...]
+    table: np.ndarray
+
+    @property
+    def violation(self) -> dict[str, np.ndarray]:
+        """Name of the limit -> (N + 1, 4), its part of the table."""
+        return dict(zip(self.names, self.table, strict=True))
 
     @property
     def largest(self) -> float:
         """The largest violation of all, 0 where there is none; inf where undefined."""
-        largest = max((float(np.max(value)) for value in self.violation.values()), default=0.0)
-        return max(largest, 0.0) if largest < np.inf else np.inf
+        return float(self.table.max(initial=0.0))
 
     @property
     def worst(self) -> tuple[str, int, Limb]:
         """Name, knot and limb of the largest violation."""
-        name = max(self.violation, key=lambda item: np.max(self.violation[item]))
-        knot, limb = np.unravel_index(int(np.argmax(self.violation[name])), self.violation[name].shape)
-        return name, int(knot), Limb(int(limb))
+        name, knot, limb = np.unravel_index(int(np.argmax(self.table)), self.table.shape)
+        return self.names[name], int(knot), Limb(int(limb))
+
+
+POSTURES = tuple(limit.name for limit in PLANNED)
+TORQUES = tuple(f"{role.replace('_', ' ')} torque" for role in TORQUE_ROLES)
+SWING_LEG, ARM, HEIGHT, ROOM = "swing leg length", "arm reach", "CoM height", "room of the body"
 
 
 def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins = BodyMargins()) -> BodyResiduals:
     """How far a motion, feasible or not, exceeds the limits of the robot's legs and arms less the margins."""
     p, n = motion.placed, motion.problem.steps
-    violation = _posture_violations(p, motion, robot, margins)
+    names = *POSTURES, SWING_LEG, *TORQUES, ARM, HEIGHT, *((ROOM,) if p.room is not None else ())
+    table = np.full((len(names), n + 1, 4), -np.inf)
+    _enter_postures(table[: len(POSTURES)], p, motion, robot, margins)
+    first = names.index(TORQUES[0])
+    _enter_torques(table[first : first + len(TORQUES)], p, motion, robot, margins.torque)
 
     def enter(name: str, at: np.ndarray, limb: np.ndarray, value: np.ndarray) -> None:
-        table = violation.setdefault(name, np.full((n + 1, 4), -np.inf))
-        np.maximum.at(table, (at, limb), value)
+        np.maximum.at(table[names.index(name)], (at, limb), value)
 
     knots, limbs, positions, _ = p.knot_contacts
     swing_knots, swing_delays, swing_limbs, swing_tips, _ = p.swing_ankles
@@ -85,51 +98,50 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
     longest = np.array([robot.legs[limb].max_length for limb in FEET])
     hip = com + (base[swing_knots] @ hips[swing_limbs, :, None])[..., 0]
     length = np.linalg.norm(hip - swing_tips, axis=-1)
-    enter("swing leg length", swing_knots, swing_limbs, length - longest[swing_limbs] + margins.length)
-    violation |= _torque_violations(p, motion, robot, margins.torque)
+    enter(SWING_LEG, swing_knots, swing_limbs, length - longest[swing_limbs] + margins.length)
     for limb, arm in robot.arms.items():
-        here = limbs == limb
-        shoulder = motion.com[knots[here]] + base[knots[here]] @ arm.shoulder_in_com
-        length = np.linalg.norm(shoulder - positions[here], axis=-1)
-        outside = np.maximum(arm.min_reach - length, length - arm.max_reach) + margins.length
-        enter("arm reach", knots[here], limbs[here], outside)
+        here = np.flatnonzero(limbs == limb)
+        if len(here):
+            shoulder = motion.com[knots[here]] + base[knots[here]] @ arm.shoulder_in_com
+            length = np.linalg.norm(shoulder - positions[here], axis=-1)
+            outside = np.maximum(arm.min_reach - length, length - arm.max_reach) + margins.length
+            enter(ARM, knots[here], limbs[here], outside)
     floor, foot = p.lowest_foot
-    enter("CoM height", np.arange(n + 1), foot, floor + p.min_height + margins.height - motion.com[:, 2])
+    enter(HEIGHT, np.arange(n + 1), foot, floor + p.min_height + margins.height - motion.com[:, 2])
     if p.room is not None:
-        enter("room of the body", p.room.knot, foot[p.room.knot], p.room.excess(motion.com))
-    return BodyResiduals({name: np.where(np.isnan(table), np.inf, table) for name, table in violation.items()})
+        enter(ROOM, p.room.knot, foot[p.room.knot], p.room.excess(motion.com))
+    table[np.isnan(table)] = np.inf
+    return BodyResiduals(names, table)
 
 
-def _posture_violations(
-    p: CentroidalProblem, motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins
-) -> dict[str, np.ndarray]:
-    """By how much the postures of the legs in contact exceed their limits, as in `BodyResiduals`; nan if undefined."""
+def _enter_postures(
+    table: np.ndarray, p: CentroidalProblem, motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins
+) -> None:
+    """Enter by how much the postures of the legs in contact exceed their limits; nan if undefined."""
     knots, limbs, positions, rotations = p.knot_contacts
-    table = np.full((len(PLANNED), p.steps + 1, 4), -np.inf)
     for limb in FEET:
-        leg, here = robot.legs[limb], limbs == limb
+        here = limbs == limb
         at = knots[here]
-        clearances = leg_clearances(leg, motion.com[at], p.yaw[at], positions[here], rotations[here], margins)
-        table[:, at, limb] = [-clearances[limit.name] for limit in PLANNED]
-    return dict(zip((limit.name for limit in PLANNED), table, strict=True))
+        given = motion.com[at], p.yaw[at], positions[here], rotations[here]
+        clearances = leg_clearances(robot.legs[limb], *given, margins)
+        table[:, at, limb] = [-clearances[name] for name in POSTURES]
 
 
-def _torque_violations(
-    p: CentroidalProblem, motion: CentroidalMotion, robot: RobotModel, part: float
-) -> dict[str, np.ndarray]:
-    """How far the torques of legs amid each step exceed `part` of their limits, as in `BodyResiduals`; or nan."""
-    table = np.full((len(TORQUE_ROLES), p.steps + 1, 4), -np.inf)
+def _enter_torques(
+    table: np.ndarray, p: CentroidalProblem, motion: CentroidalMotion, robot: RobotModel, part: float
+) -> None:
+    """Enter how far the torques of legs amid each step exceed `part` of their limits; nan if undefined."""
+    feet = len(FEET)
+    rotation, force = p.rotation[:, :feet], motion.force[:, :feet]
+    arm = np.einsum("tlij,tlj->tli", rotation[..., :2], motion.cop[:, :feet])
+    moment = np.cross(arm, force) + motion.yaw_torque[:, :feet, None] * rotation[..., 2]
+    yaw = (p.yaw[:-1] + p.yaw[1:]) / 2
+    middle = motion.com[:-1] + p.dt[:, None] / 2 * motion.linear_momentum[:-1] / p.mass
     for limb in FEET:
         leg, step = robot.legs[limb], np.flatnonzero(p.active[:, limb])
-        sole, rotation, force = p.position[step, limb], p.rotation[step, limb], motion.force[step, limb]
-        arm = np.einsum("nij,nj->ni", rotation[:, :, :2], motion.cop[step, limb])
-        moment = np.cross(arm, force) + motion.yaw_torque[step, limb, None] * rotation[:, :, 2]
-        yaw = (p.yaw[step] + p.yaw[step + 1]) / 2
-        middle = motion.com[step] + p.dt[step, None] / 2 * motion.linear_momentum[step] / p.mass
-        torques = leg_torques(leg, middle, yaw, sole, rotation, force, moment)
+        wrench = rotation[step, limb], force[step, limb], moment[step, limb]
+        torques = leg_torques(leg, middle[step], yaw[step], p.position[step, limb], *wrench)
         table[:, step, limb] = [np.abs(torques[role]) / leg.torques[role] - part for role in TORQUE_ROLES]
-    names = (role.replace("_", " ") + " torque" for role in TORQUE_ROLES)
-    return dict(zip(names, table, strict=True))
 
 
 def rough_com(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
