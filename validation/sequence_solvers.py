@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.centroidal.build import initial_com, sequence_problem
+from toolkit.centroidal.layout import Landing
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
-from toolkit.centroidal.program import Landing, Program
+from toolkit.centroidal.program import Program
 from toolkit.centroidal.sequence import SequenceConfig, guess, optimise
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence

@@ -10,8 +10,9 @@ from tests.centroidal.walks import foot, walk
 from tests.shipped_robots import OWN
 from toolkit.centroidal.body import body_residuals
 from toolkit.centroidal.build import ProblemConfig, initial_com, sequence_problem
+from toolkit.centroidal.layout import Landing
 from toolkit.centroidal.problem import Margins
-from toolkit.centroidal.program import SMOOTH, Landing, Program, Regularisers, wanted_friction
+from toolkit.centroidal.program import SMOOTH, Program, Regularisers, wanted_friction
 from toolkit.centroidal.residual import check, confirmed, cop_margin
 from toolkit.centroidal.sequence import WANTED, WANTED_BODY, SequenceConfig, optimise
 from toolkit.centroidal.stages.method import Squares, Work, evaluate

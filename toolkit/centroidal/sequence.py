@@ -14,6 +14,7 @@ import numpy as np
 
 from toolkit.centroidal.body import BodyMargins, rough_com
 from toolkit.centroidal.build import ProblemConfig, sequence_problem, transition_problem
+from toolkit.centroidal.layout import Landing, indices
 from toolkit.centroidal.problem import (
     STANDARD_GRAVITY,
     CentroidalMotion,
@@ -22,7 +23,7 @@ from toolkit.centroidal.problem import (
     Margins,
     Weights,
 )
-from toolkit.centroidal.program import Landing, Program, Regularisers, indices
+from toolkit.centroidal.program import Program, Regularisers
 from toolkit.centroidal.stages.method import GAP, Options, Squares, Work, minimise
 from toolkit.centroidal.stages.steps import WRENCH
 from toolkit.centroidal.surroundings import Surroundings

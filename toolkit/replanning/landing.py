@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.program import Landing
+from toolkit.centroidal.layout import Landing
 from toolkit.contacts.stance import Contact
 from toolkit.control.sampled_plan import Swing
 from toolkit.geometry.pose import Pose

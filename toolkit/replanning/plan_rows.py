@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolkit.centroidal.body import BodyMargins
+from toolkit.centroidal.layout import Layout
 from toolkit.centroidal.problem import CentroidalProblem
-from toolkit.centroidal.program import Layout, Program, Regularisers
+from toolkit.centroidal.program import Program, Regularisers
 from toolkit.centroidal.stages.blocks import Block
 from toolkit.centroidal.stages.rows import DISTANCE_ROWS, LEG_ROWS, POSTURE, TORQUE_ROWS
 from toolkit.centroidal.stages.steps import STATE

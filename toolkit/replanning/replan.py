@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.program import indices
+from toolkit.centroidal.layout import indices
 from toolkit.centroidal.stages.steps import WRENCH
 from toolkit.control.corrector import PENDULUM_RATE
 from toolkit.replanning.landing import Landings

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.program import Layout, contact_block, indices, single_bounds, slack_prices, start_slacks
+from toolkit.centroidal.layout import Layout, contact_block, indices, single_bounds, slack_prices, start_slacks
 from toolkit.centroidal.stages.blocks import Block
 from toolkit.centroidal.stages.method import Blocks, Options, Prices, Work, minimise
 from toolkit.centroidal.stages.rows import FINAL_ROWS

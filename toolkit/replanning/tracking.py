@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.program import Layout, indices
+from toolkit.centroidal.layout import Layout, indices
 from toolkit.centroidal.stages.method import Prices, Squares
 from toolkit.centroidal.stages.steps import STATE, WRENCH
 from toolkit.control.corrector import PENDULUM_RATE
