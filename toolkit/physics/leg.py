@@ -315,8 +315,23 @@ def posture_between(hip, ankle, rotation, heading, thigh, shin, joints, tiny=0.0
 
 
 @law
-def _torque_about(axis, origin, point, force, moment):
+def joint_lines(posture, rotation, tiny=0.0):
+    """Axis and a point on it in m, in the world, of the joints of a leg in the order of `TORQUE_ROLES`."""
+    heading, hips = posture.heading, _hip_axes(posture.thigh_axes, posture.hips, tiny)
+    return (
+        (posture.pitch_axis, posture.knee_point),
+        (_from_base(hips[0], heading), posture.hip_point),
+        (_from_base(hips[1], heading), posture.hip_point),
+        (_from_base(hips[2], heading), posture.hip_point),
+        (posture.pitch_axis, posture.ankle_point),
+        ((rotation[0, 0], rotation[1, 0], rotation[2, 0]), posture.ankle_point),
+    )
+
+
+@law
+def _torque_about(line, point, force, moment):
     """Torque tau = a . ((p - o) x f + m) about a joint's axis a through o."""
+    axis, origin = line
     x, y, z = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
     return (
         axis[0] * (y * force[2] - z * force[1] + moment[0])
@@ -332,15 +347,14 @@ def joint_torques(posture, sole, rotation, force, moment, tiny=0.0):
     The sole is the position of its centre in m, and the rotation world_from_sole. The force in N acts on the sole, with
     the moment in N m about its centre; all are in the world. `tiny` is as in `posture_between`.
     """
-    heading, hips = posture.heading, _hip_axes(posture.thigh_axes, posture.hips, tiny)
-    ankle_roll = (rotation[0, 0], rotation[1, 0], rotation[2, 0])
+    a, b, c, d, e, f = joint_lines(posture, rotation, tiny)
     return (
-        _torque_about(posture.pitch_axis, posture.knee_point, sole, force, moment),
-        _torque_about(_from_base(hips[0], heading), posture.hip_point, sole, force, moment),
-        _torque_about(_from_base(hips[1], heading), posture.hip_point, sole, force, moment),
-        _torque_about(_from_base(hips[2], heading), posture.hip_point, sole, force, moment),
-        _torque_about(posture.pitch_axis, posture.ankle_point, sole, force, moment),
-        _torque_about(ankle_roll, posture.ankle_point, sole, force, moment),
+        _torque_about(a, sole, force, moment),
+        _torque_about(b, sole, force, moment),
+        _torque_about(c, sole, force, moment),
+        _torque_about(d, sole, force, moment),
+        _torque_about(e, sole, force, moment),
+        _torque_about(f, sole, force, moment),
     )
 
 

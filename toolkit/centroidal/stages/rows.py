@@ -15,7 +15,16 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.compiled import compiled
-from toolkit.physics.leg import PLANNED, TORQUE_ROLES, LegPosture, hip_joints, joint_torques, posture_between, turned
+from toolkit.physics.leg import (
+    PLANNED,
+    TORQUE_ROLES,
+    LegPosture,
+    hip_joints,
+    joint_lines,
+    joint_torques,
+    posture_between,
+    turned,
+)
 from toolkit.physics.wrench import SIGNS, pressure_rows, yaw_row
 
 SHARPNESS, STRETCH = 10.0, 5.0
@@ -355,12 +364,15 @@ def fill_torques(block, y):
             com[a] = y[t, a] + half * y[t, 3 + a]
         hip_of(p, turn, y, t, com, offset, hip)
         now = posture(p, turn, hip[0], hip[1], hip[2])
-        for k in range(3):  # linear in the wrench
-            axis = turn[0, k], turn[1, k], turn[2, k]
-            by_force = joint_torques(now, sole, turn, axis, (0.0, 0.0, 0.0), TINY)
-            by_moment = joint_torques(now, sole, turn, (0.0, 0.0, 0.0), axis, TINY)
-            for q in range(_TORQUES):
-                slopes[q, 3 + k], slopes[q, 6 + k] = by_force[q] / limits[q], by_moment[q] / limits[q]
+        lines = joint_lines(now, turn, TINY)
+        for q in range(_TORQUES):  # linear in the wrench
+            axis, origin = lines[q]
+            dx, dy, dz = sole[0] - origin[0], sole[1] - origin[1], sole[2] - origin[2]
+            lever = axis[1] * dz - axis[2] * dy, axis[2] * dx - axis[0] * dz, axis[0] * dy - axis[1] * dx
+            for k in range(3):
+                by_force = turn[0, k] * lever[0] + turn[1, k] * lever[1] + turn[2, k] * lever[2]
+                by_moment = turn[0, k] * axis[0] + turn[1, k] * axis[1] + turn[2, k] * axis[2]
+                slopes[q, 3 + k], slopes[q, 6 + k] = by_force / limits[q], by_moment / limits[q]
         force, moment = turned(turn, wrench), turned(turn, wrench[3:])
         here = joint_torques(now, sole, turn, force, moment, TINY)
         for a in range(3):
