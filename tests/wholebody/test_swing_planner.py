@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,6 +81,15 @@ def test_great_heights_come_before_no_margin():
 
     path = plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), only_high)
     assert path.clear and path.positions(np.linspace(0, 1, 101))[:, 2].max() > 0.2
+
+
+@pytest.mark.parametrize("duration, clear", [(0.8, True), (0.4, False)])
+def test_only_slow_swings_go_without_a_margin(duration, clear):
+    def close(centers, rotations, halves):
+        return halves[:, 0] > HALF[0]
+
+    task = replace(task_of([0, 0.1, 0], [0.5, 0.1, 0]), duration=duration)
+    assert plan_swing(task, close).clear == clear
 
 
 def test_a_wall_too_high_leaves_no_clear_path():

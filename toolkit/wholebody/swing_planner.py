@@ -63,13 +63,14 @@ def _least_raised(
     """The first of some candidates, with a sideways bump, that is clear; the last one with `clear` False if none is.
 
     Moderate heights are tried first with the whole margin, then with half and a quarter of it. Great heights follow in
-    the same way. No margin at all is the last resort.
+    the same way. No margin at all is the last resort, but not of fast feet: they do not follow their path so closely.
     """
     most = task.rise + task.scale.length * MODERATE_RAISE
     moderate = [item for item in candidates if max(item[:2]) <= most]
     great = [item for item in candidates if max(item[:2]) > most]
-    for shares, groups in ((MARGIN_SHARES, (moderate, great)), ((0.0,), (moderate, great))):
-        for group, share in product(groups, shares):
+    last_resort = () if task.is_foot and _haste(task, task.way) > 0.0 else (0.0,)
+    for shares in (MARGIN_SHARES, last_resort):
+        for group, share in product((moderate, great), shares):
             for before, after, timing in group:
                 path = _within_ankle_range(task, _path(task, before, after, timing, bump))
                 if not collide(*_swept_boxes(task, path, share * task.margin, sides)).any():
