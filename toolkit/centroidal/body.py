@@ -69,8 +69,8 @@ class BodyResiduals:
     @property
     def worst(self) -> tuple[str, int, Limb]:
         """Name, knot and limb of the largest violation."""
-        name, knot, limb = np.unravel_index(int(np.argmax(self.table)), self.table.shape)
-        return self.names[name], int(knot), Limb(int(limb))
+        limit, knot, limb = np.unravel_index(int(np.argmax(self.table)), self.table.shape)
+        return self.names[limit], int(knot), Limb(int(limb))
 
 
 POSTURES = tuple(limit.name for limit in PLANNED)

@@ -24,6 +24,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from toolkit.compiled import compiled, law
+from toolkit.physics.momentum import cross
 from toolkit.robot.model import HipJoints, LegGeometry
 
 _STRAIGHT = 0.9999  # largest |cosine| or |sine| whose angle is taken, so that derivatives stay finite
@@ -201,12 +202,6 @@ def _by_axis(order, items):
 
 
 @law
-def _cross(a, b):
-    """Cross product of two vectors."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@law
 def _in_base(v, heading):
     """A vector of the world in the axes of a base with that heading."""
     c, s = heading[0], heading[1]
@@ -223,7 +218,7 @@ def _from_base(v, heading):
 @law
 def _thigh_axes(across, line, thigh, joints):
     """Axes x, y and z of the frame of the thigh that the last hip joint turns, of its pitch axis and its line in m."""
-    x, y, z = _cross(across, line)
+    x, y, z = cross(across, line)
     k, q = joints.skew[0] / thigh, joints.skew[1] / thigh
     return (
         (k * x - q * line[0], k * y - q * line[1], k * z - q * line[2]),
@@ -259,7 +254,7 @@ def _hip_axes(thigh, joints, tiny):
     The first joint turns with the base, the last one with the thigh, and the one between is normal to both.
     """
     first, last = joints.first, _picked_vector(joints.order[2], thigh)
-    x, y, z = _cross(last, first)
+    x, y, z = cross(last, first)
     scale = _sign(joints.order) / np.sqrt(x * x + y * y + z * z + tiny)
     middle = (scale * x, scale * y, scale * z)
     a = _by_axis(joints.order, (first[0], middle[0], last[0]))
@@ -329,8 +324,8 @@ def joint_lines(posture, rotation, tiny=0.0):
 
 
 @law
-def _torque_about(line, point, force, moment):
-    """Torque tau = a . ((p - o) x f + m) about a joint's axis a through o."""
+def torque_about(line, point, force, moment):
+    """Torque tau = a . ((p - o) x f + m) about a joint's line: its axis a through o (`joint_lines`)."""
     axis, origin = line
     x, y, z = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
     return (
@@ -349,12 +344,12 @@ def joint_torques(posture, sole, rotation, force, moment, tiny=0.0):
     """
     a, b, c, d, e, f = joint_lines(posture, rotation, tiny)
     return (
-        _torque_about(a, sole, force, moment),
-        _torque_about(b, sole, force, moment),
-        _torque_about(c, sole, force, moment),
-        _torque_about(d, sole, force, moment),
-        _torque_about(e, sole, force, moment),
-        _torque_about(f, sole, force, moment),
+        torque_about(a, sole, force, moment),
+        torque_about(b, sole, force, moment),
+        torque_about(c, sole, force, moment),
+        torque_about(d, sole, force, moment),
+        torque_about(e, sole, force, moment),
+        torque_about(f, sole, force, moment),
     )
 
 

@@ -10,7 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolkit.centroidal.layout import Layout, contact_block, indices, single_bounds, slack_prices, start_slacks
+from toolkit.centroidal.layout import (
+    Layout,
+    contact_block,
+    indices,
+    side_by_side,
+    single_bounds,
+    slack_prices,
+    start_slacks,
+)
 from toolkit.centroidal.stages.blocks import Block
 from toolkit.centroidal.stages.method import Blocks, Options, Prices, Work, minimise
 from toolkit.centroidal.stages.rows import FINAL_ROWS
@@ -133,10 +141,10 @@ class ReplanProgram:
         """The controller's cones, which no slack but the excess widens."""
         contacts, cones = self.contacts, self.cones
         step, limb = np.nonzero(contacts.active)
-        margins = np.tile([cones.friction, 0.0, 0.0, cones.yaw], (len(step), 2))
-        mu, unpriced = contacts.friction[step, limb], np.zeros((len(step), 7))
-        parameters = [mu, cones.within(contacts.half_size[step, limb]), margins, unpriced, self._price[step]]
-        return contact_block(self.layout, contacts.active, np.column_stack(parameters))
+        margins, unpriced = [cones.friction, 0.0, 0.0, cones.yaw], np.zeros(7)
+        patch = contacts.friction[step, limb, None], cones.within(contacts.half_size[step, limb])
+        parameters = side_by_side(len(step), *patch, margins, margins, unpriced, self._price[step, None])
+        return contact_block(self.layout, contacts.active, parameters)
 
     def _bounds(self) -> Block:
         """Bounds of single variables, and of landing points."""

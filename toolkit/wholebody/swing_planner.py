@@ -47,7 +47,7 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     sides = _free_sides(task, collide)
     easy = _raised(task, EASY, task.rise + task.scale.length * EASY_RAISE)
     path, timing = _least_raised(task, collide, easy + _raised(task, STEEP), bump, sides)
-    if not task.is_foot or _haste(task, task.way) == 0.0 or timing is EASY:
+    if not _fast_foot(task) or timing is EASY:
         return path
     others = (_least_raised(task, collide, _raised(task, timing), bump, sides)[0] for timing in (LATE, EARLY))
     return min([path, *others], key=lambda each: (not each.clear, each.peak_acceleration))
@@ -68,7 +68,7 @@ def _least_raised(
     most = task.rise + task.scale.length * MODERATE_RAISE
     moderate = [item for item in candidates if max(item[:2]) <= most]
     great = [item for item in candidates if max(item[:2]) > most]
-    last_resort = () if task.is_foot and _haste(task, task.way) > 0.0 else (0.0,)
+    last_resort = () if _fast_foot(task) else (0.0,)
     for shares in (MARGIN_SHARES, last_resort):
         for group, share in product((moderate, great), shares):
             for before, after, timing in group:
@@ -172,6 +172,11 @@ def _outward(task: SwingTask) -> np.ndarray:
     outward += 0.0 if task.free_end else task.end.normal
     length = np.linalg.norm(outward)
     return outward / length if length > 1e-3 else np.array([0.0, 0.0, 1.0])
+
+
+def _fast_foot(task: SwingTask) -> bool:
+    """Whether a foot swings faster than the easy windows are for."""
+    return task.is_foot and _haste(task, task.way) > 0.0
 
 
 def _haste(task: SwingTask, way: float) -> float:

@@ -23,8 +23,10 @@ from toolkit.physics.leg import (
     joint_lines,
     joint_torques,
     posture_between,
+    torque_about,
     turned,
 )
+from toolkit.physics.momentum import cross
 from toolkit.physics.wrench import SIGNS, pressure_rows, yaw_row
 
 SHARPNESS, STRETCH = 10.0, 5.0
@@ -354,7 +356,7 @@ def fill_torques(block, y):
     half of dt; the posture's; sole (3); limits in the order of `TORQUE_ROLES` in weights times 1 m; the parts of
     the limits that are wanted, and allowed, at most.
     """
-    slopes, hip, com = np.empty((_TORQUES, 9)), np.empty(3), np.empty(3)
+    slopes, here, hip, com = np.empty((_TORQUES, 9)), np.empty(_TORQUES), np.empty(3), np.empty(3)
     for i in range(block.stage.shape[0]):
         p, half, t, index = block.parameters[i, 1:], block.parameters[i, 0], block.stage[i], block.variables[i]
         turn, offset, wrench = p[_TURN : _TURN + 9].reshape(3, 3), index[13:], y[t, index[6] :]
@@ -363,18 +365,16 @@ def fill_torques(block, y):
         for a in range(3):
             com[a] = y[t, a] + half * y[t, 3 + a]
         hip_of(p, turn, y, t, com, offset, hip)
-        now = posture(p, turn, hip[0], hip[1], hip[2])
-        lines = joint_lines(now, turn, TINY)
+        force, moment = turned(turn, wrench), turned(turn, wrench[3:])
+        lines = joint_lines(posture(p, turn, hip[0], hip[1], hip[2]), turn, TINY)
         for q in range(_TORQUES):  # linear in the wrench
+            here[q] = torque_about(lines[q], sole, force, moment)
             axis, origin = lines[q]
-            dx, dy, dz = sole[0] - origin[0], sole[1] - origin[1], sole[2] - origin[2]
-            lever = axis[1] * dz - axis[2] * dy, axis[2] * dx - axis[0] * dz, axis[0] * dy - axis[1] * dx
+            lever = cross(axis, (sole[0] - origin[0], sole[1] - origin[1], sole[2] - origin[2]))
             for k in range(3):
                 by_force = turn[0, k] * lever[0] + turn[1, k] * lever[1] + turn[2, k] * lever[2]
                 by_moment = turn[0, k] * axis[0] + turn[1, k] * axis[1] + turn[2, k] * axis[2]
                 slopes[q, 3 + k], slopes[q, 6 + k] = by_force / limits[q], by_moment / limits[q]
-        force, moment = turned(turn, wrench), turned(turn, wrench[3:])
-        here = joint_torques(now, sole, turn, force, moment, TINY)
         for a in range(3):
             hip[a] += NUDGE
             beside = joint_torques(posture(p, turn, hip[0], hip[1], hip[2]), sole, turn, force, moment, TINY)
