@@ -27,7 +27,7 @@ from toolkit.compiled import compiled, law
 from toolkit.physics.momentum import cross
 from toolkit.robot.model import HipJoints, LegGeometry
 
-_STRAIGHT = 0.9999  # largest |cosine| or |sine| whose angle is taken, so that derivatives stay finite
+STRAIGHT = 0.9999  # largest |cosine| or |sine| whose angle is taken, so that derivatives stay finite
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def turned(rotation, v):
 @law
 def hip_at(com, heading, hip_in_com):
     """Hip in m in the world, of a CoM in m, cosine and sine of the base's heading, and the hip in the base's frame."""
-    x, y, z = _from_base(hip_in_com, heading)
+    x, y, z = from_base(hip_in_com, heading)
     return com[0] + x, com[1] + y, com[2] + z
 
 
@@ -156,7 +156,7 @@ def distance(a, b):
 @law
 def _kept(cosine):
     """A sine or cosine, kept away from where its angle's derivative is infinite."""
-    return np.fmin(np.fmax(cosine, -_STRAIGHT), _STRAIGHT)
+    return np.fmin(np.fmax(cosine, -STRAIGHT), STRAIGHT)
 
 
 @law
@@ -174,24 +174,24 @@ def _sign(order):
 
 
 @law
-def _picked(number, items):
+def picked(number, items):
     """One of three items by its number, which may be a symbol."""
     return (number == 0) * items[0] + (number == 1) * items[1] + (number == 2) * items[2]
 
 
 @law
-def _picked_vector(number, vectors):
+def picked_vector(number, vectors):
     """One of three vectors by its number."""
     a, b, c = vectors
     return (
-        _picked(number, (a[0], b[0], c[0])),
-        _picked(number, (a[1], b[1], c[1])),
-        _picked(number, (a[2], b[2], c[2])),
+        picked(number, (a[0], b[0], c[0])),
+        picked(number, (a[1], b[1], c[1])),
+        picked(number, (a[2], b[2], c[2])),
     )
 
 
 @law
-def _by_axis(order, items):
+def by_axis(order, items):
     """What belongs to the joints of a hip from the base down, in the order roll, pitch, yaw."""
     a, b, c = order
     return (
@@ -202,6 +202,16 @@ def _by_axis(order, items):
 
 
 @law
+def vectors_by_axis(order, vectors):
+    """The same of vectors."""
+    a, b, c = vectors
+    x = by_axis(order, (a[0], b[0], c[0]))
+    y = by_axis(order, (a[1], b[1], c[1]))
+    z = by_axis(order, (a[2], b[2], c[2]))
+    return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
+
+
+@law
 def _in_base(v, heading):
     """A vector of the world in the axes of a base with that heading."""
     c, s = heading[0], heading[1]
@@ -209,7 +219,7 @@ def _in_base(v, heading):
 
 
 @law
-def _from_base(v, heading):
+def from_base(v, heading):
     """A vector in the axes of a base with that heading, in the world."""
     c, s = heading[0], heading[1]
     return c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
@@ -235,32 +245,29 @@ def _hip_angles(thigh, joints):
     tan(last) = -s R_ij / R_ii, with s = 1 where i, j, k are cyclic and -1 where they are not.
     """
     i, j, k = joints.order
-    last, s = _picked_vector(k, thigh), _sign(joints.order)
-    by_last, by_middle = _picked(i, last), _picked(i, _picked_vector(j, thigh))
-    return _by_axis(
+    last, s = picked_vector(k, thigh), _sign(joints.order)
+    by_last, by_middle = picked(i, last), picked(i, picked_vector(j, thigh))
+    return by_axis(
         joints.order,
         (
-            np.arctan2(-s * _picked(j, last), _picked(k, last)),
+            np.arctan2(-s * picked(j, last), picked(k, last)),
             np.arcsin(_kept(s * by_last)),
-            np.arctan2(-s * by_middle, _picked(i, _picked_vector(i, thigh))),
+            np.arctan2(-s * by_middle, picked(i, picked_vector(i, thigh))),
         ),
     )
 
 
 @law
-def _hip_axes(thigh, joints, tiny):
+def hip_axes(thigh, joints, tiny):
     """Axes of hip roll, pitch and yaw, of the thigh's axes x, y and z; unit vectors in the axes of the base.
 
     The first joint turns with the base, the last one with the thigh, and the one between is normal to both.
     """
-    first, last = joints.first, _picked_vector(joints.order[2], thigh)
+    first, last = joints.first, picked_vector(joints.order[2], thigh)
     x, y, z = cross(last, first)
     scale = _sign(joints.order) / np.sqrt(x * x + y * y + z * z + tiny)
     middle = (scale * x, scale * y, scale * z)
-    a = _by_axis(joints.order, (first[0], middle[0], last[0]))
-    b = _by_axis(joints.order, (first[1], middle[1], last[1]))
-    c = _by_axis(joints.order, (first[2], middle[2], last[2]))
-    return (a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2])
+    return vectors_by_axis(joints.order, (first, middle, last))
 
 
 @law
@@ -275,15 +282,15 @@ def posture_between(hip, ankle, rotation, heading, thigh, shin, joints, tiny=0.0
     x = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz
     y = r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
     z = r[0, 2] * dx + r[1, 2] * dy + r[2, 2] * dz
-    square = x * x + y * y + z * z + tiny
+    square, beside = x * x + y * y + z * z + tiny, np.sqrt(y * y + z * z + tiny)
     length = np.sqrt(square)
-    roll = np.arctan2(y, z)
-    at_ankle = np.arccos(_kept((square + shin * shin - thigh * thigh) / (2.0 * shin * length)))
+    cosine = _kept((square + shin * shin - thigh * thigh) / (2.0 * shin * length))  # of the angle at the ankle
     at_knee = np.arccos(_kept((thigh * thigh + shin * shin - square) / (2.0 * thigh * shin)))
-    lean = np.arctan2(x, np.sqrt(y * y + z * z + tiny)) + at_ankle  # of the shin, towards the toes
-    across = turned(r, (0.0, np.cos(roll), -np.sin(roll)))
-    ux, uy, uz = turned(r, (np.sin(lean), np.sin(roll) * np.cos(lean), np.cos(roll) * np.cos(lean)))
-    knee = (ankle[0] + shin * ux, ankle[1] + shin * uy, ankle[2] + shin * uz)
+    lean = np.arctan2(x, beside) + np.arccos(cosine)  # of the shin, towards the toes
+    across = turned(r, (0.0, z / beside, -y / beside))
+    along, out = shin * cosine / length, shin * np.sqrt(1.0 - cosine * cosine) / length
+    wx, wy, wz = cross(across, (dx, dy, dz))
+    knee = (ankle[0] + along * dx + out * wx, ankle[1] + along * dy + out * wy, ankle[2] + along * dz + out * wz)
     axes = _thigh_axes(
         _in_base(across, heading),
         _in_base((hip[0] - knee[0], hip[1] - knee[1], hip[2] - knee[2]), heading),
@@ -294,7 +301,7 @@ def posture_between(hip, ankle, rotation, heading, thigh, shin, joints, tiny=0.0
     return LegPosture(
         length,
         -lean,
-        roll,
+        np.arctan2(y, z),
         hip_pitch,
         hip_roll,
         hip_yaw,
@@ -312,12 +319,12 @@ def posture_between(hip, ankle, rotation, heading, thigh, shin, joints, tiny=0.0
 @law
 def joint_lines(posture, rotation, tiny=0.0):
     """Axis and a point on it in m, in the world, of the joints of a leg in the order of `TORQUE_ROLES`."""
-    heading, hips = posture.heading, _hip_axes(posture.thigh_axes, posture.hips, tiny)
+    heading, hips = posture.heading, hip_axes(posture.thigh_axes, posture.hips, tiny)
     return (
         (posture.pitch_axis, posture.knee_point),
-        (_from_base(hips[0], heading), posture.hip_point),
-        (_from_base(hips[1], heading), posture.hip_point),
-        (_from_base(hips[2], heading), posture.hip_point),
+        (from_base(hips[0], heading), posture.hip_point),
+        (from_base(hips[1], heading), posture.hip_point),
+        (from_base(hips[2], heading), posture.hip_point),
         (posture.pitch_axis, posture.ankle_point),
         ((rotation[0, 0], rotation[1, 0], rotation[2, 0]), posture.ankle_point),
     )

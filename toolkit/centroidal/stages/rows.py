@@ -2,8 +2,7 @@
 
 Every `fill_...` fills the rows and slopes of a block at the variables y (T, m), and adds what the block has of the
 objective, and of convex curvature, to Hessians (T, m, m) and gradients (T, m). It returns that part of the objective.
-The laws are those of `toolkit.physics`. The derivatives by the hip's place are differences of the law, exact to about
-six digits.
+The laws are those of `toolkit.physics`.
 
 The wanted margins may be taken back by slacks, at a price and down to the least margins. The excess of a step goes
 beyond those and beyond the physical limit, and costs much more, as does a body's slack above 1. So the program always
@@ -21,18 +20,18 @@ from toolkit.physics.leg import (
     LegPosture,
     hip_joints,
     joint_lines,
-    joint_torques,
     posture_between,
+    quantities,
     torque_about,
     turned,
 )
+from toolkit.physics.leg_slopes import leg_slopes, quantity_slopes, torque_slopes
 from toolkit.physics.momentum import cross
 from toolkit.physics.wrench import SIGNS, pressure_rows, yaw_row
 
 SHARPNESS, STRETCH = 10.0, 5.0
 """Factors on the rows of contacts and of lengths, so that all rows have similar sizes."""
 TINY = 1e-12  # m^2; keeps the derivatives of roots finite
-NUDGE = 1e-7  # m; of the differences
 EVEN = 0.1  # part of a slack's price that is on its square, so that slacks are shared evenly
 UNLOADED = 0.01  # weights added to a normal force under a CoP: an unloaded contact has none
 CONE, FIRST_YAW = 0, 7
@@ -212,10 +211,10 @@ def scatter(local, force, index, hessian, gradient):
 
 
 @compiled(reordered=True)
-def posture(p, turn, x, y, z):
-    """Posture of a leg whose hip is at (x, y, z)."""
+def posture(p, turn, hip):
+    """Posture of a leg with its hip there."""
     ankle, heading = (p[_ANKLE], p[_ANKLE + 1], p[_ANKLE + 2]), (p[_HEADING], p[_HEADING + 1])
-    return posture_between((x, y, z), ankle, turn, heading, p[_LINKS], p[_LINKS + 1], hip_joints(p, _JOINTS), TINY)
+    return posture_between(hip, ankle, turn, heading, p[_LINKS], p[_LINKS + 1], hip_joints(p, _JOINTS), TINY)
 
 
 @compiled(reordered=True)
@@ -246,20 +245,15 @@ def fill_legs(block, y, hessian, gradient):
     Variables: CoM (3), slack of the body, displacement of the sole (2 or none). Parameters: the posture's, lower and
     upper end of each limit, wanted margins (`MARGINS`).
     """
-    slopes = np.empty((len(PLANNED), 3))
     hip, row = np.empty(3), np.zeros(block.variables.shape[1])
     local, force = np.empty((row.shape[0], row.shape[0])), np.zeros(row.shape[0])
     for i in range(block.stage.shape[0]):
         p, t, index = block.parameters[i], block.stage[i], block.variables[i]
         turn, offset = p[_TURN : _TURN + 9].reshape(3, 3), index[4:]
         hip_of(p, turn, y, t, y[t, :3], offset, hip)
-        found, kept = limited(posture(p, turn, hip[0], hip[1], hip[2])), 1.0 - y[t, index[3]]
-        for a in range(3):
-            hip[a] += NUDGE
-            beside = limited(posture(p, turn, hip[0], hip[1], hip[2]))
-            hip[a] -= NUDGE
-            for q in range(len(PLANNED)):
-                slopes[q, a] = (beside[q] - found[q]) / NUDGE
+        here, kept = posture(p, turn, hip), 1.0 - y[t, index[3]]
+        slopes = leg_slopes(here, turn, p[_LINKS], p[_LINKS + 1], TINY)
+        found, moved = limited(quantities(here)), limited(quantity_slopes(here, slopes, TINY))
         for q in range(len(PLANNED)):
             margin, factor = p[POSTURE + 2 * len(PLANNED) + _MARGIN[q]], _FACTOR[q]
             block.value[i, 2 * q] = factor * (found[q] - p[POSTURE + 2 * q] - margin * kept)
@@ -268,12 +262,11 @@ def fill_legs(block, y, hessian, gradient):
                 sign = factor if side == 0 else -factor
                 out = block.slope[i, 2 * q + side]
                 for a in range(3):
-                    out[a] = sign * slopes[q, a]
+                    out[a] = sign * moved[q][a]
                 out[3] = factor * margin
                 for k in range(offset.shape[0]):
-                    out[4 + k] = -sign * (
-                        slopes[q, 0] * turn[0, k] + slopes[q, 1] * turn[1, k] + slopes[q, 2] * turn[2, k]
-                    )
+                    along = moved[q][0] * turn[0, k] + moved[q][1] * turn[1, k] + moved[q][2] * turn[2, k]
+                    out[4 + k] = -sign * along
         bend_length(block, i, 2 * _LENGTH + 1, found[_LENGTH], row, local, force, hessian[t], gradient[t])
     return 0.0
 
@@ -366,21 +359,20 @@ def fill_torques(block, y):
             com[a] = y[t, a] + half * y[t, 3 + a]
         hip_of(p, turn, y, t, com, offset, hip)
         force, moment = turned(turn, wrench), turned(turn, wrench[3:])
-        lines = joint_lines(posture(p, turn, hip[0], hip[1], hip[2]), turn, TINY)
-        for q in range(_TORQUES):  # linear in the wrench
+        posed = posture(p, turn, hip)
+        lines = joint_lines(posed, turn, TINY)
+        by_hip = torque_slopes(
+            posed, leg_slopes(posed, turn, p[_LINKS], p[_LINKS + 1], TINY), lines, sole, force, moment
+        )
+        for q in range(_TORQUES):
             here[q] = torque_about(lines[q], sole, force, moment)
             axis, origin = lines[q]
             lever = cross(axis, (sole[0] - origin[0], sole[1] - origin[1], sole[2] - origin[2]))
             for k in range(3):
+                slopes[q, k] = by_hip[q][k] / limits[q]
                 by_force = turn[0, k] * lever[0] + turn[1, k] * lever[1] + turn[2, k] * lever[2]
                 by_moment = turn[0, k] * axis[0] + turn[1, k] * axis[1] + turn[2, k] * axis[2]
                 slopes[q, 3 + k], slopes[q, 6 + k] = by_force / limits[q], by_moment / limits[q]
-        for a in range(3):
-            hip[a] += NUDGE
-            beside = joint_torques(posture(p, turn, hip[0], hip[1], hip[2]), sole, turn, force, moment, TINY)
-            hip[a] -= NUDGE
-            for q in range(_TORQUES):
-                slopes[q, a] = (beside[q] - here[q]) / NUDGE / limits[q]
         part = wanted + more * y[t, index[12]]
         for q in range(_TORQUES):
             block.value[i, q] = part - here[q] / limits[q]
