@@ -100,3 +100,24 @@ def test_palms_keep_their_own_limit():
     state = tracker([], resting=(0, 1, 2))
     state.update(0.0, PERIOD, np.zeros(4))
     assert state.max_force[2] == 150.0
+
+
+@pytest.mark.parametrize("limb", [Limb.LEFT_FOOT, Limb.LEFT_PALM])
+def test_a_limb_that_bears_what_it_is_asked_for_is_not_loose(limb):
+    """One that is pressed on for it would be asked for less at the next tick, and so on: its force would alternate."""
+    state = tracker([swing(limb)], resting=())
+    follow(state, limb, lambda t: 300.0 if t > 1.9 else 0.0, 2.5)
+    asked, loose = state.min_force[limb], []
+    for share in (1.2, 1.0, 0.6, 0.4, 0.0):
+        follow(state, limb, lambda t, force=share * asked: force, 2.501, start=2.5)
+        loose.append(bool(state.loose[limb]))
+    assert asked > 0.0 and loose == [False, False, False, True, True]
+
+
+def test_a_limb_in_the_air_or_about_to_leave_is_not_loose():
+    state = tracker([swing(Limb.LEFT_FOOT)])
+    follow(state, 0, lambda t: 100.0, 0.9995)
+    state.update(0.9998, PERIOD, np.ones(4))
+    assert state.in_contact[0] and not state.loose[0]
+    follow(state, 0, lambda t: 0.0, 1.5, start=1.0)
+    assert not state.in_contact[0] and not state.loose[0]

@@ -24,7 +24,7 @@ MIN_FOOT_FORCE, MIN_PALM_FORCE = 10.0, 2.0  # N; least forces of settled contact
 FOOT_RAMP, PALM_RAMP = 0.06, 0.4  # s; times in which the bound on the normal force rises after contact is made
 RELEASE_RAMP = 0.06  # s; time in which it falls before contact is broken
 SETTLE_FORCE, RELEASE_FORCE = 30.0, 5.0  # N; where the rising bound starts, and where the falling one ends
-LOOSE_FORCE = 15.0  # N; a limb in contact that bears less has bounced off
+LOOSE = 0.5  # part of its least force; a limb in contact that bears less has bounced off
 
 
 class LimbState(Enum):
@@ -103,8 +103,8 @@ class ContactTracker:
                 self.lead[limb] += (self.pace[limb] - 1.0) * period
                 self._advance(limb, swing, time + self.lead[limb], period, normal_force[limb])
             self.in_contact[limb] = self.state[limb] is LimbState.REST
-            self.loose[limb] = self.in_contact[limb] and normal_force[limb] < self.scale.force * LOOSE_FORCE
             self._bound(limb, time)
+            self.loose[limb] = normal_force[limb] < LOOSE * self.min_force[limb]
 
     def _advance(self, limb: Limb, swing: Swing, time: float, period: float, force: float) -> None:
         """Follow one limb through its swing; the given time includes its lead."""
