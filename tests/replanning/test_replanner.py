@@ -91,6 +91,15 @@ def test_an_undisturbed_state_changes_nothing(walking, nominal, problem):
         assert all(np.linalg.norm(shift) < 2e-3 for shift in replan.landing.values())
 
 
+def test_the_first_step_bears_the_weight_however_short_it_is(walking, nominal, problem):
+    """A wrong force for a few milliseconds hardly shows in the objective."""
+    for knot in range(2, len(nominal.times) - 1 - int(np.sum(nominal.times > nominal.times[-1] - HORIZON)), 3):
+        time = float(nominal.times[knot]) - 0.005
+        replan = problem.solve(situation(walking, nominal, time, com=(0.002, 0.003, 0.002)))
+        planned = nominal.wrench[knot - 1, :2, 2].sum()
+        assert replan.wrench[0, :2, 2].sum() == pytest.approx(planned, abs=0.1)
+
+
 def test_a_replan_obeys_the_dynamics(walking, nominal, problem):
     time = mid_swing(nominal)
     replan = problem.solve(situation(walking, nominal, time, velocity=(0.05, 0.1, 0.0)))
