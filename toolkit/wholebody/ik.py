@@ -27,6 +27,7 @@ from toolkit.wholebody.limb_paths import LimbPaths
 from toolkit.wholebody.swing import Window
 
 OFFSET = Window(0.0, 0.6)  # the part of a palm's swing over which the palm joins its path
+REACHING = Window(0.0, 0.6)  # the part over which its arm's posture goes from where it is to that of the swing's end
 LEAVING, LANDING = Window(0.0, 0.2), Window(0.75, 1.0)  # the parts of a foot's swing near its contacts
 
 
@@ -127,8 +128,9 @@ class WholeBodyIK:
         for palm in self.palms:
             segment = paths.segment(palm, 0.0)
             if segment.pose is not None:  # in contact from the start
-                self.reaching[palm] = segment, self._arm_posture(palm, 0.0, guess[7:], paths, motion)
-                guess[7 + self.arm_joints[palm]] = self.reaching[palm][1]
+                held = self._arm_posture(palm, 0.0, guess[7:], paths, motion)
+                self.reaching[palm] = segment, held, held
+                guess[7 + self.arm_joints[palm]] = held
         guess[7:] = np.clip(guess[7:], self.lower, self.upper)
         self.wrapper.state.q = self.order.q_from_qpos(guess)
         self.wrapper.update_kinematics()
@@ -184,17 +186,27 @@ class WholeBodyIK:
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     def _posture(self, time: float, angles: np.ndarray, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
-        """(n,) rad; posture that joints tend to: home, or what fits the contact that an arm has or reaches."""
+        """(n,) rad; posture that joints tend to: home, or what fits the contact that an arm has; in a swing in between.
+
+        An arm that tended at once to where its swing ends would be there long before its path.
+        """
         posture = self.robot.home[7:].copy()
         for palm in self.palms:
-            segment = paths.segment(palm, time)
-            if (segment.path is None and segment.pose is None) or segment.free_end:
+            segment, joints = paths.segment(palm, time), self.arm_joints[palm]
+            if segment.path is None and segment.pose is None:
                 self.reaching.pop(palm, None)
                 continue
             if segment.path is not None and self.reaching.get(palm, (None,))[0] is not segment:
-                self.reaching[palm] = segment, self._arm_posture(palm, segment.end, angles, paths, motion)
+                end = posture[joints]
+                if not segment.free_end:
+                    end = self._arm_posture(palm, segment.end, angles, paths, motion)
+                self.reaching[palm] = segment, angles[joints], end
             if palm in self.reaching:
-                posture[self.arm_joints[palm]] = self.reaching[palm][1]
+                _, begin, end = self.reaching[palm]
+                share = 1.0
+                if segment.path is not None:
+                    share = REACHING.step((time - segment.begin) / (segment.end - segment.begin))[0]
+                posture[joints] = begin + share * (end - begin)
         return posture
 
     def _arm_posture(
