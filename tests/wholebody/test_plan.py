@@ -62,6 +62,20 @@ def test_posture_stays_natural(robot, planned):
     assert away[-1].max() < 0.25
 
 
+def test_arms_reach_no_faster_than_their_paths(robot, palm_walk):
+    """Also where a palm's path has little authority yet."""
+    trajectory = whole_body(palm_walk, compose_scene(robot, palm_walk.world)).trajectory
+    data, site = mujoco.MjData(robot.mujoco_model), robot.limbs[Limb.LEFT_PALM].site
+    palm = np.empty((len(trajectory.times), 3))
+    for index, qpos in enumerate(trajectory.qpos):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(robot.mujoco_model, data)
+        palm[index] = data.site(site).xpos
+    speed = np.linalg.norm(np.diff(palm, axis=0), axis=1) / trajectory.times[1]
+    path = np.linalg.norm(trajectory.limb_velocity[:, Limb.LEFT_PALM, :3], axis=1)
+    assert speed.max() < 1.5 * np.nanmax(path), (speed.max(), np.nanmax(path))
+
+
 def _carries(robot, name, limbs) -> bool:
     """Whether a joint moves one of the limbs but neither foot nor the other palm."""
     model = robot.mujoco_model
