@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from toolkit.control.sampled_plan import sample_reference
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import whole_body
@@ -74,6 +75,24 @@ def test_arms_reach_no_faster_than_their_paths(robot, palm_walk):
     speed = np.linalg.norm(np.diff(palm, axis=0), axis=1) / trajectory.times[1]
     path = np.linalg.norm(trajectory.limb_velocity[:, Limb.LEFT_PALM, :3], axis=1)
     assert speed.max() < 1.5 * np.nanmax(path), (speed.max(), np.nanmax(path))
+
+
+def test_palms_are_tracked_where_the_postures_have_them(robot, palm_walk):
+    """Their paths have little authority over the arm, which is not there."""
+    plan = whole_body(palm_walk, compose_scene(robot, palm_walk.world))
+    palm, times = Limb.LEFT_PALM, plan.trajectory.times[:-1]
+    reference = sample_reference(times, plan)
+    data, site = mujoco.MjData(robot.mujoco_model), robot.limbs[palm].site
+    rows = np.flatnonzero((reference.authority[:, palm] > 0.0) & ~reference.in_contact[:, palm])
+    for row in rows:
+        data.qpos[:] = plan.trajectory.qpos[row]
+        mujoco.mj_kinematics(robot.mujoco_model, data)
+        np.testing.assert_allclose(reference.limb_position[row, palm], data.site(site).xpos, atol=1e-9)
+        np.testing.assert_allclose(reference.limb_rotation[row, palm].ravel(), data.site(site).xmat, atol=1e-9)
+    steps = np.diff(reference.limb_position[rows, palm], axis=0)
+    mean = (reference.limb_velocity[rows[:-1], palm, :3] + reference.limb_velocity[rows[1:], palm, :3]) / 2
+    within = np.diff(rows) == 1
+    np.testing.assert_allclose(steps[within], times[1] * mean[within], atol=3e-3)
 
 
 def _carries(robot, name, limbs) -> bool:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import PALMS, Limb
 from toolkit.geometry.pose import rotation_from_quaternion
+from toolkit.robot.model import RobotModel
 from toolkit.wholebody.motion_dynamics import planned_wrench, posture_momentum
 from toolkit.wholebody.plan import WholeBodyPlan
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
@@ -83,7 +85,8 @@ class Reference:
 def sample_reference(times: np.ndarray, plan: WholeBodyPlan) -> Reference:
     """Sample a plan at increasing times (C,) in s; beyond its end it rests.
 
-    The angular momentum is that of the postures. They follow the optimiser's only roughly.
+    The angular momentum is that of the postures. They follow the optimiser's only roughly. So are the poses of palms
+    that swing: arms follow the palms' paths only where these have authority, and postures were found clear.
     """
     robot, motion, paths = plan.robot, plan.motion, plan.paths
     moving = times < motion.problem.times[-1]
@@ -95,7 +98,7 @@ def sample_reference(times: np.ndarray, plan: WholeBodyPlan) -> Reference:
     spin = posture_momentum(robot.mujoco_model, grid, trajectory.qpos, trajectory.qvel)
     momentum, rate = (np.column_stack([np.interp(times, grid, part[:, k]) for k in range(3)]) for part in spin)
     momentum, rate = momentum * moving[:, None], rate * moving[:, None]
-    joints, base_rotation, qvel, qacc = _posture(times, trajectory)
+    qpos, qvel, qacc = _posture(times, trajectory)
     position, rotation = np.zeros((len(times), 4, 3)), np.tile(np.eye(3), (len(times), 4, 1, 1))
     velocity, acceleration = np.zeros((2, len(times), 4, 6))
     authority, in_contact = np.zeros((len(times), 4)), np.zeros((len(times), 4), bool)
@@ -106,6 +109,13 @@ def sample_reference(times: np.ndarray, plan: WholeBodyPlan) -> Reference:
                 position[k, limb], rotation[k, limb] = pose.position, pose.rotation
                 velocity[k, limb], acceleration[k, limb] = rates
                 authority[k, limb] = paths.authority(limb, float(time))
+    for palm in PALMS:
+        reaching = np.flatnonzero((authority[:, palm] > 0.0) & ~in_contact[:, palm])
+        for rows in np.split(reaching, 1 + np.flatnonzero(np.diff(reaching) > 1)):
+            if len(rows) > 1:
+                found = _motion_of(robot, palm, times[rows], qpos[rows], qvel[rows])
+                for whole, part in zip((position, rotation, velocity, acceleration), found, strict=True):
+                    whole[rows, palm] = part
     swings = _swings(plan.sequence, plan.schedule)
     friction, bearing = _ground(times, plan.sequence, swings)
     return Reference(
@@ -115,10 +125,10 @@ def sample_reference(times: np.ndarray, plan: WholeBodyPlan) -> Reference:
         com_acceleration=com[:, 2],
         angular_momentum=momentum,
         angular_momentum_rate=rate,
-        joints=joints,
+        joints=qpos[:, 7:],
         joint_velocity=qvel[:, 6:],
         joint_acceleration=qacc[:, 6:],
-        base_rotation=base_rotation,
+        base_rotation=rotation_from_quaternion(qpos[:, 3:7]),
         base_velocity=qvel[:, 3:6],
         base_acceleration=qacc[:, 3:6],
         limb_position=position,
@@ -152,23 +162,42 @@ def _swings(sequence: ContactSequence, schedule: ContactSchedule) -> tuple[Swing
 
 
 def _posture(times: np.ndarray, trajectory: WholeBodyTrajectory) -> tuple[np.ndarray, ...]:
-    """Joints (C, n), base rotation (C, 3, 3), qvel (C, nv) and its derivative, at rest beyond the ends."""
+    """The qpos (C, 7 + n), qvel (C, nv) and its derivative, at rest beyond the ends."""
     grid = trajectory.times
     clamped = np.clip(times, grid[0], grid[-1])
     cell = np.clip(np.searchsorted(grid, clamped, side="right") - 1, 0, len(grid) - 2) if len(grid) > 1 else 0 * clamped
     if len(grid) == 1:
         qpos, qvel = np.repeat(trajectory.qpos, len(times), 0), np.zeros((len(times), trajectory.qvel.shape[1]))
-        return qpos[:, 7:], rotation_from_quaternion(qpos[:, 3:7]), qvel, np.zeros_like(qvel)
+        return qpos, qvel, np.zeros_like(qvel)
     share = ((clamped - grid[cell]) / (grid[cell + 1] - grid[cell]))[:, None]
     first, second = trajectory.qpos[cell], trajectory.qpos[cell + 1]
     # Neighbouring samples are at most a few degrees apart, so normalised interpolation is as good as slerp.
     sign = np.where((first[:, 3:7] * second[:, 3:7]).sum(1, keepdims=True) < 0.0, -1.0, 1.0)
-    quaternion = (1.0 - share) * first[:, 3:7] + share * sign * second[:, 3:7]
-    joints = (1.0 - share) * first[:, 7:] + share * second[:, 7:]
+    qpos = (1.0 - share) * first + share * second
+    qpos[:, 3:7] = (1.0 - share) * first[:, 3:7] + share * sign * second[:, 3:7]
+    qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=1, keepdims=True)
     qvel = (1.0 - share) * trajectory.qvel[cell] + share * trajectory.qvel[cell + 1]
     qacc = (trajectory.qvel[cell + 1] - trajectory.qvel[cell]) / (grid[cell + 1] - grid[cell])[:, None]
     rest = (times > grid[-1])[:, None]
-    return joints, rotation_from_quaternion(quaternion), np.where(rest, 0.0, qvel), np.where(rest, 0.0, qacc)
+    return qpos, np.where(rest, 0.0, qvel), np.where(rest, 0.0, qacc)
+
+
+def _motion_of(
+    robot: RobotModel, limb: Limb, times: np.ndarray, qpos: np.ndarray, qvel: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Position (k, 3), rotation (k, 3, 3), velocity and acceleration, each (k, 6), of a limb's patch in k postures."""
+    model = robot.mujoco_model
+    data, site = mujoco.MjData(model), model.site(robot.limbs[limb].site).id
+    position, rotation = np.empty((len(times), 3)), np.empty((len(times), 3, 3))
+    velocity, jacobian = np.empty((len(times), 6)), np.zeros((6, model.nv))
+    for k in range(len(times)):
+        data.qpos[:] = qpos[k]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], site)
+        position[k], rotation[k] = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
+        velocity[k] = jacobian @ qvel[k]
+    return position, rotation, velocity, np.gradient(velocity, times, axis=0)
 
 
 def _ground(times: np.ndarray, sequence: ContactSequence, swings: tuple[Swing, ...]) -> tuple[np.ndarray, np.ndarray]:
