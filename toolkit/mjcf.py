@@ -23,6 +23,7 @@ _TAG = re.compile(r"""<!--.*?-->|<(/?)([\w.-]+)((?:"[^"]*"|'[^']*'|[^"'>])*)>"""
 _ATTRIBUTE = re.compile(r"""([\w.-]+)\s*=\s*["']([^"']*)["']""")
 _NAN = re.compile(r"""=\s*["'][^"']*(?<![^\s"'])[+-]?nan(?![^\s"'])""", re.IGNORECASE)
 _MOST_CELLS = 4_000_000  # most points of a height field, or pixels of a texture
+_CELLS = {"hfield": ("height field", "nrow", "ncol"), "texture": ("texture", "width", "height")}
 _MOST_COPIES = 10_000  # most elements that copies or patterns make; MuJoCo takes seconds for so many
 _PATTERNS = {"flexcomp": "count", "composite": "count", "contact": "num"}  # elements that stand for many, and how many
 _FINEST = 300  # largest number that shapes a mesh which MuJoCo makes; most are resolutions
@@ -49,7 +50,7 @@ def read_spec(path: Path, text: str | None = None, assets: Mapping[str, bytes] |
         str(path).encode()
     except UnicodeEncodeError:
         raise InputError("the name of the file or of its folder is not UTF-8; rename it") from None
-    _check_copies(path.read_text(encoding="utf-8", errors="replace") if text is None else text, path.parent)
+    _check_amounts(path.read_text(encoding="utf-8", errors="replace") if text is None else text, path.parent)
     with _caught() as found:
         spec = (
             mujoco.MjSpec.from_file(str(path))
@@ -61,14 +62,9 @@ def read_spec(path: Path, text: str | None = None, assets: Mapping[str, bytes] |
         lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), 1) if _NAN.search(line)]
         where = [f"line {n} has a NaN: {line[:80]}" for n, line in lines] or ["a number is NaN"]
         raise InputError(f"{where[0]}; give plain numbers")
-    for kind, items, sides in (
-        ("height field", spec.hfields, ("nrow", "ncol")),
-        ("texture", spec.textures, ("width", "height")),
-    ):
+    for tag, items in (("hfield", spec.hfields), ("texture", spec.textures)):
         for item in items:
-            first, second = (getattr(item, side) for side in sides)
-            if first * second > _MOST_CELLS:
-                raise InputError(f"{kind} '{item.name}' has {first} x {second} cells; at most {_MOST_CELLS} are read")
+            _check_cells(tag, item.name, *(getattr(item, side) for side in _CELLS[tag][1:]))
     for name in [name for name in dir(spec) if name.startswith(("nuser", "nkey"))]:
         if getattr(spec, name) > _MOST_USER_VALUES:
             raise InputError(f"{name} of <size> is {getattr(spec, name)}; at most {_MOST_USER_VALUES} are read")
@@ -102,8 +98,8 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
     return model
 
 
-def _check_copies(text: str, folder: Path) -> None:
-    """Raise an InputError if a text and what it includes ask for more elements than can be made.
+def _check_amounts(text: str, folder: Path) -> None:
+    """Raise an InputError if a text and what it includes ask for more elements or cells than can be made.
 
     MuJoCo makes them while it reads the text. Attributes that are no numbers are left to MuJoCo.
     """
@@ -125,12 +121,22 @@ def _check_copies(text: str, folder: Path) -> None:
                     if file.is_file():
                         waiting.append((file.read_text(encoding="utf-8", errors="replace"), file.parent, factors[-1]))
             elif not end:
+                if tag in _CELLS:
+                    sides = (_product(attributes.get(side, "")) for side in _CELLS[tag][1:])
+                    _check_cells(tag, attributes.get("name", ""), *sides)
                 made += factors[-1] * _product(attributes.get(_PATTERNS.get(tag, ""), "")) - 1
                 finest = max((_product(word) for word in attributes.get("params", "").split()), default=0.0)
                 if not finest <= _FINEST:
                     raise InputError(f"params of <{tag}> has {finest:g}; give numbers of at most {_FINEST}")
             if not made <= _MOST_COPIES:
                 raise InputError(f"<{tag}> asks for {made:g} copies or more; at most {_MOST_COPIES} are made")
+
+
+def _check_cells(tag: str, name: str, first: float, second: float) -> None:
+    """Raise an InputError if a height field or a texture has too many cells."""
+    if not first * second <= _MOST_CELLS:
+        size = f"{first:.0f} x {second:.0f}"
+        raise InputError(f"{_CELLS[tag][0]} '{name}' has {size} cells; at most {_MOST_CELLS} are read")
 
 
 def _product(text: str) -> float:
