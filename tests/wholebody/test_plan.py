@@ -17,6 +17,22 @@ def planned(request, robot):
     return walk, whole_body(walk, compose_scene(robot, walk.world)).trajectory
 
 
+@pytest.fixture(scope="module")
+def palm_plan(robot, palm_walk):
+    return whole_body(palm_walk, compose_scene(robot, palm_walk.world))
+
+
+def palm_poses(robot, trajectory):
+    """(T, 3) and (T, 9) place and rotation of the left palm in the postures of a trajectory."""
+    data, site = mujoco.MjData(robot.mujoco_model), robot.limbs[Limb.LEFT_PALM].site
+    poses = []
+    for qpos in trajectory.qpos:
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(robot.mujoco_model, data)
+        poses.append((data.site(site).xpos.copy(), data.site(site).xmat.copy()))
+    return map(np.array, zip(*poses, strict=True))
+
+
 def test_walks_are_feasible(planned):
     _, trajectory = planned
     assert trajectory.reason == ""
@@ -63,32 +79,22 @@ def test_posture_stays_natural(robot, planned):
     assert away[-1].max() < 0.25
 
 
-def test_arms_reach_no_faster_than_their_paths(robot, palm_walk):
+def test_arms_reach_no_faster_than_their_paths(robot, palm_plan):
     """Also where a palm's path has little authority yet."""
-    trajectory = whole_body(palm_walk, compose_scene(robot, palm_walk.world)).trajectory
-    data, site = mujoco.MjData(robot.mujoco_model), robot.limbs[Limb.LEFT_PALM].site
-    palm = np.empty((len(trajectory.times), 3))
-    for index, qpos in enumerate(trajectory.qpos):
-        data.qpos[:] = qpos
-        mujoco.mj_kinematics(robot.mujoco_model, data)
-        palm[index] = data.site(site).xpos
+    trajectory = palm_plan.trajectory
+    palm, _ = palm_poses(robot, trajectory)
     speed = np.linalg.norm(np.diff(palm, axis=0), axis=1) / trajectory.times[1]
     path = np.linalg.norm(trajectory.limb_velocity[:, Limb.LEFT_PALM, :3], axis=1)
     assert speed.max() < 1.5 * np.nanmax(path), (speed.max(), np.nanmax(path))
 
 
-def test_palms_are_tracked_where_the_postures_have_them(robot, palm_walk):
+def test_palms_are_tracked_where_the_postures_have_them(robot, palm_plan):
     """Their paths have little authority over the arm, which is not there."""
-    plan = whole_body(palm_walk, compose_scene(robot, palm_walk.world))
-    palm, times = Limb.LEFT_PALM, plan.trajectory.times[:-1]
-    reference = sample_reference(times, plan)
-    data, site = mujoco.MjData(robot.mujoco_model), robot.limbs[palm].site
+    palm, times = Limb.LEFT_PALM, palm_plan.trajectory.times[:-1]
+    reference, (place, turn) = sample_reference(times, palm_plan), palm_poses(robot, palm_plan.trajectory)
     rows = np.flatnonzero((reference.authority[:, palm] > 0.0) & ~reference.in_contact[:, palm])
-    for row in rows:
-        data.qpos[:] = plan.trajectory.qpos[row]
-        mujoco.mj_kinematics(robot.mujoco_model, data)
-        np.testing.assert_allclose(reference.limb_position[row, palm], data.site(site).xpos, atol=1e-9)
-        np.testing.assert_allclose(reference.limb_rotation[row, palm].ravel(), data.site(site).xmat, atol=1e-9)
+    np.testing.assert_allclose(reference.limb_position[rows, palm], place[rows], atol=1e-9)
+    np.testing.assert_allclose(reference.limb_rotation[rows, palm].reshape(-1, 9), turn[rows], atol=1e-9)
     steps = np.diff(reference.limb_position[rows, palm], axis=0)
     mean = (reference.limb_velocity[rows[:-1], palm, :3] + reference.limb_velocity[rows[1:], palm, :3]) / 2
     within = np.diff(rows) == 1

@@ -42,7 +42,7 @@ class LimbTargets:
             state, swing = tracker.state[limb], tracker.current[limb]
             self.error[limb] = self.velocity[limb] = self.acceleration[limb] = 0.0
             self.authority[limb] = reference.authority[index, limb]
-            if state is LimbState.REST and tracker.loose[limb]:
+            if tracker.loose[limb]:
                 self.velocity[limb, :3] = -tracker.scale.speed * REST_SPEED * dynamics.limb_rotation[limb, :, 2]
             if state in (LimbState.REST, LimbState.FREE) or swing is None:
                 continue

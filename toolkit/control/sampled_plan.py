@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
+from toolkit.control.dynamics import RobotDynamics
 from toolkit.geometry.limb import PALMS, Limb
 from toolkit.geometry.pose import rotation_from_quaternion
-from toolkit.robot.model import RobotModel
 from toolkit.wholebody.motion_dynamics import planned_wrench, posture_momentum
 from toolkit.wholebody.plan import WholeBodyPlan
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
@@ -109,13 +108,13 @@ def sample_reference(times: np.ndarray, plan: WholeBodyPlan) -> Reference:
                 position[k, limb], rotation[k, limb] = pose.position, pose.rotation
                 velocity[k, limb], acceleration[k, limb] = rates
                 authority[k, limb] = paths.authority(limb, float(time))
-    for palm in PALMS:
-        reaching = np.flatnonzero((authority[:, palm] > 0.0) & ~in_contact[:, palm])
-        for rows in np.split(reaching, 1 + np.flatnonzero(np.diff(reaching) > 1)):
-            if len(rows) > 1:
-                found = _motion_of(robot, palm, times[rows], qpos[rows], qvel[rows])
-                for whole, part in zip((position, rotation, velocity, acceleration), found, strict=True):
-                    whole[rows, palm] = part
+    dynamics = RobotDynamics(robot)
+    for k, palm in zip(*np.nonzero((authority[:, PALMS] > 0.0) & ~in_contact[:, PALMS]), strict=True):
+        dynamics.update(qpos[k], qvel[k])
+        limb = PALMS[palm]
+        position[k, limb], rotation[k, limb] = dynamics.limb_position[limb], dynamics.limb_rotation[limb]
+        velocity[k, limb] = dynamics.limb_velocity[limb]
+        acceleration[k, limb] = dynamics.jacobian[limb] @ qacc[k] + dynamics.drift[limb]
     swings = _swings(plan.sequence, plan.schedule)
     friction, bearing = _ground(times, plan.sequence, swings)
     return Reference(
@@ -180,24 +179,6 @@ def _posture(times: np.ndarray, trajectory: WholeBodyTrajectory) -> tuple[np.nda
     qacc = (trajectory.qvel[cell + 1] - trajectory.qvel[cell]) / (grid[cell + 1] - grid[cell])[:, None]
     rest = (times > grid[-1])[:, None]
     return qpos, np.where(rest, 0.0, qvel), np.where(rest, 0.0, qacc)
-
-
-def _motion_of(
-    robot: RobotModel, limb: Limb, times: np.ndarray, qpos: np.ndarray, qvel: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Position (k, 3), rotation (k, 3, 3), velocity and acceleration, each (k, 6), of a limb's patch in k postures."""
-    model = robot.mujoco_model
-    data, site = mujoco.MjData(model), model.site(robot.limbs[limb].site).id
-    position, rotation = np.empty((len(times), 3)), np.empty((len(times), 3, 3))
-    velocity, jacobian = np.empty((len(times), 6)), np.zeros((6, model.nv))
-    for k in range(len(times)):
-        data.qpos[:] = qpos[k]
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], site)
-        position[k], rotation[k] = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
-        velocity[k] = jacobian @ qvel[k]
-    return position, rotation, velocity, np.gradient(velocity, times, axis=0)
 
 
 def _ground(times: np.ndarray, sequence: ContactSequence, swings: tuple[Swing, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -104,7 +104,7 @@ class ContactTracker:
                 self._advance(limb, swing, time + self.lead[limb], period, normal_force[limb])
             self.in_contact[limb] = self.state[limb] is LimbState.REST
             self._bound(limb, time)
-            self.loose[limb] = normal_force[limb] < LOOSE * self.min_force[limb]
+            self.loose[limb] = self.in_contact[limb] and normal_force[limb] < LOOSE * self.min_force[limb]
 
     def _advance(self, limb: Limb, swing: Swing, time: float, period: float, force: float) -> None:
         """Follow one limb through its swing; the given time includes its lead."""

@@ -147,10 +147,22 @@ def ankle_at(position, rotation, ankle_in_sole):
 
 
 @law
+def between(a, b):
+    """The way from a to b."""
+    return b[0] - a[0], b[1] - a[1], b[2] - a[2]
+
+
+@law
+def dot(a, b):
+    """Scalar product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@law
 def distance(a, b):
     """Distance between two points."""
-    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    return np.sqrt(x * x + y * y + z * z)
+    way = between(a, b)
+    return np.sqrt(dot(way, way))
 
 
 @law
@@ -259,15 +271,14 @@ def _hip_angles(thigh, joints):
 
 @law
 def hip_axes(thigh, joints, tiny):
-    """Axes of hip roll, pitch and yaw, of the thigh's axes x, y and z; unit vectors in the axes of the base.
+    """Axes of the hip's joints from the base down, of the thigh's axes x, y and z; unit vectors in the base.
 
     The first joint turns with the base, the last one with the thigh, and the one between is normal to both.
     """
     first, last = joints.first, picked_vector(joints.order[2], thigh)
     x, y, z = cross(last, first)
     scale = _sign(joints.order) / np.sqrt(x * x + y * y + z * z + tiny)
-    middle = (scale * x, scale * y, scale * z)
-    return vectors_by_axis(joints.order, (first, middle, last))
+    return first, (scale * x, scale * y, scale * z), last
 
 
 @law
@@ -278,7 +289,7 @@ def posture_between(hip, ankle, rotation, heading, thigh, shin, joints, tiny=0.0
     in m^2 is added to squares under roots where derivatives are needed, so that they stay finite.
     """
     r = rotation
-    dx, dy, dz = hip[0] - ankle[0], hip[1] - ankle[1], hip[2] - ankle[2]
+    dx, dy, dz = between(ankle, hip)
     x = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz
     y = r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
     z = r[0, 2] * dx + r[1, 2] * dy + r[2, 2] * dz
@@ -293,7 +304,7 @@ def posture_between(hip, ankle, rotation, heading, thigh, shin, joints, tiny=0.0
     knee = (ankle[0] + along * dx + out * wx, ankle[1] + along * dy + out * wy, ankle[2] + along * dz + out * wz)
     axes = _thigh_axes(
         _in_base(across, heading),
-        _in_base((hip[0] - knee[0], hip[1] - knee[1], hip[2] - knee[2]), heading),
+        _in_base(between(knee, hip), heading),
         thigh,
         joints,
     )
@@ -319,7 +330,8 @@ def posture_between(hip, ankle, rotation, heading, thigh, shin, joints, tiny=0.0
 @law
 def joint_lines(posture, rotation, tiny=0.0):
     """Axis and a point on it in m, in the world, of the joints of a leg in the order of `TORQUE_ROLES`."""
-    heading, hips = posture.heading, hip_axes(posture.thigh_axes, posture.hips, tiny)
+    heading, joints = posture.heading, posture.hips
+    hips = vectors_by_axis(joints.order, hip_axes(posture.thigh_axes, joints, tiny))
     return (
         (posture.pitch_axis, posture.knee_point),
         (from_base(hips[0], heading), posture.hip_point),
@@ -334,12 +346,14 @@ def joint_lines(posture, rotation, tiny=0.0):
 def torque_about(line, point, force, moment):
     """Torque tau = a . ((p - o) x f + m) about a joint's line: its axis a through o (`joint_lines`)."""
     axis, origin = line
-    x, y, z = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
-    return (
-        axis[0] * (y * force[2] - z * force[1] + moment[0])
-        + axis[1] * (z * force[0] - x * force[2] + moment[1])
-        + axis[2] * (x * force[1] - y * force[0] + moment[2])
-    )
+    return dot(axis, moment_about(origin, point, force, moment))
+
+
+@law
+def moment_about(origin, point, force, moment):
+    """Moment (p - o) x f + m about a point o of a force at another and of a moment."""
+    x, y, z = cross(between(origin, point), force)
+    return x + moment[0], y + moment[1], z + moment[2]
 
 
 @law

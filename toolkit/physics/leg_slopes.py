@@ -16,7 +16,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from toolkit.compiled import law
-from toolkit.physics.leg import STRAIGHT, by_axis, from_base, hip_axes, picked_vector, vectors_by_axis
+from toolkit.physics.leg import (
+    STRAIGHT,
+    between,
+    by_axis,
+    dot,
+    from_base,
+    hip_axes,
+    moment_about,
+    picked_vector,
+    vectors_by_axis,
+)
 from toolkit.physics.momentum import cross
 from toolkit.robot.model import HipJoints
 
@@ -42,15 +52,15 @@ def leg_slopes(posture, rotation, thigh, shin, tiny=0.0):
     """Slopes of a posture of links of `thigh` and `shin` m; the rotation is world_from_sole, `tiny` in m^2 as there."""
     hip, knee, ankle, across = posture.hip_point, posture.knee_point, posture.ankle_point, posture.pitch_axis
     forward = rotation[0, 0], rotation[1, 0], rotation[2, 0]
-    length, line = posture.length, _between(knee, hip)
-    along = _scaled(1.0 / length, _between(ankle, hip))
+    length, line = posture.length, between(knee, hip)
+    along = _scaled(1.0 / length, between(ankle, hip))
     cosine = (length * length + shin * shin - thigh * thigh) / (2.0 * shin * length)
     bends = (np.fabs(cosine) < STRAIGHT) / np.sqrt(np.fmax(1.0 - cosine * cosine, 1.0 - STRAIGHT * STRAIGHT))
     # The lean of the line from ankle to hip, and of the shin from there.
     shin_lean = _sum(1.0 / length, cross(across, along), (cosine / length - 1.0 / shin) * bends, along)
-    out = length * _dot(along, forward)
-    square = _dot(line, line)
-    thigh_lean = _sum(1.0 / square, cross(across, line), -_dot(_between(ankle, knee), line) / square, shin_lean)
+    out = length * dot(along, forward)
+    square = dot(line, line)
+    thigh_lean = _sum(1.0 / square, cross(across, line), -dot(between(ankle, knee), line) / square, shin_lean)
     roll = _scaled(1.0 / np.sqrt(length * length - out * out + tiny), across)
     return LegSlopes(along, roll, shin_lean, thigh_lean, forward)
 
@@ -76,14 +86,10 @@ def quantity_slopes(posture, slopes, tiny=0.0):
 @law
 def _hip_shares(posture, joints, slopes, tiny):
     """Rates of hip roll, pitch and yaw per rate of the ankle's roll, and per rate of the thigh's lean."""
-    axes = hip_axes(posture.thigh_axes, joints, tiny)
     order, heading = joints.order, posture.heading
-    first, middle, last = (
-        from_base(picked_vector(order[0], axes), heading),
-        from_base(picked_vector(order[1], axes), heading),
-        from_base(picked_vector(order[2], axes), heading),
-    )
-    skew = _dot(first, last)
+    first, middle, last = hip_axes(posture.thigh_axes, joints, tiny)
+    skew = dot(first, last)
+    first, middle, last = from_base(first, heading), from_base(middle, heading), from_base(last, heading)
     return (
         _shared(order, first, middle, last, skew, _scaled(-1.0, slopes.forward), tiny),
         _shared(order, first, middle, last, skew, posture.pitch_axis, tiny),
@@ -93,8 +99,8 @@ def _hip_shares(posture, joints, slopes, tiny):
 @law
 def _shared(order, first, middle, last, skew, spin, tiny):
     """Rates of hip roll, pitch and yaw that give the thigh an angular velocity; `skew` is first . last."""
-    a, b, scale = _dot(first, spin), _dot(last, spin), 1.0 / (1.0 - skew * skew + tiny)
-    return by_axis(order, (scale * (a - skew * b), _dot(middle, spin), scale * (b - skew * a)))
+    a, b, scale = dot(first, spin), dot(last, spin), 1.0 / (1.0 - skew * skew + tiny)
+    return by_axis(order, (scale * (a - skew * b), dot(middle, spin), scale * (b - skew * a)))
 
 
 @law
@@ -104,47 +110,29 @@ def torque_slopes(posture, slopes, lines, sole, force, moment):
     The lines are `leg.joint_lines` of the posture; the other arguments those of `joint_torques`.
     """
     order, across, hip, knee = posture.hips.order, posture.pitch_axis, posture.hip_point, posture.knee_point
-    at_hip, at_knee = _moment(hip, sole, force, moment), _moment(knee, sole, force, moment)
-    at_ankle = _moment(posture.ankle_point, sole, force, moment)
-    tipped, moved = cross(across, slopes.forward), _between(posture.ankle_point, knee)
+    at_hip, at_knee = moment_about(hip, sole, force, moment), moment_about(knee, sole, force, moment)
+    at_ankle = moment_about(posture.ankle_point, sole, force, moment)
+    tipped, moved = cross(across, slopes.forward), between(posture.ankle_point, knee)
     pushed = cross(force, across)
-    knee_roll = _dot(tipped, at_knee) + _dot(cross(slopes.forward, moved), pushed)
+    knee_roll = dot(tipped, at_knee) + dot(cross(slopes.forward, moved), pushed)
     axes = lines[1][0], lines[2][0], lines[3][0]
     first, middle, last = picked_vector(order[0], axes), picked_vector(order[1], axes), picked_vector(order[2], axes)
-    skew, turning = _dot(first, last), cross(first, middle)
-    scale = _dot(turning, at_hip) / (1.0 - skew * skew)
+    skew, turning = dot(first, last), cross(first, middle)
+    scale = dot(turning, at_hip) / (1.0 - skew * skew)
     spin = _sum(scale, first, -scale * skew, last)
     carried = cross(last, at_hip)
-    middle_slope = _sum(-_dot(spin, slopes.forward), slopes.roll, _dot(spin, across), slopes.thigh)
-    last_slope = _sum(-_dot(carried, slopes.forward), slopes.roll, _dot(carried, across), slopes.thigh)
+    middle_slope = _sum(-dot(spin, slopes.forward), slopes.roll, dot(spin, across), slopes.thigh)
+    last_slope = _sum(-dot(carried, slopes.forward), slopes.roll, dot(carried, across), slopes.thigh)
     none = _scaled(0.0, across)
     by_roll, by_pitch, by_yaw = vectors_by_axis(order, (none, middle_slope, last_slope))
     return (
-        _sum(knee_roll, slopes.roll, -_dot(cross(across, moved), pushed), slopes.shin),
+        _sum(knee_roll, slopes.roll, -dot(cross(across, moved), pushed), slopes.shin),
         _sum(1.0, by_roll, -1.0, cross(force, axes[0])),
         _sum(1.0, by_pitch, -1.0, cross(force, axes[1])),
         _sum(1.0, by_yaw, -1.0, cross(force, axes[2])),
-        _scaled(_dot(tipped, at_ankle), slopes.roll),
+        _scaled(dot(tipped, at_ankle), slopes.roll),
         none,
     )
-
-
-@law
-def _moment(point, sole, force, moment):
-    """Moment about a point of a force and a moment at a sole."""
-    x, y, z = cross(_between(point, sole), force)
-    return x + moment[0], y + moment[1], z + moment[2]
-
-
-@law
-def _between(a, b):
-    """The way from a to b."""
-    return b[0] - a[0], b[1] - a[1], b[2] - a[2]
-
-
-@law
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @law

@@ -203,9 +203,7 @@ class WholeBodyIK:
                 self.reaching[palm] = segment, angles[joints], end
             if palm in self.reaching:
                 _, begin, end = self.reaching[palm]
-                share = 1.0
-                if segment.path is not None:
-                    share = REACHING.step((time - segment.begin) / (segment.end - segment.begin))[0]
+                share = 1.0 if segment.path is None else REACHING.step(segment.share(time))[0]
                 posture[joints] = begin + share * (end - begin)
         return posture
 
@@ -262,7 +260,7 @@ class WholeBodyIK:
         segment = paths.segment(foot, time)
         if segment.path is None:
             return 0.0
-        u = (time - segment.begin) / (segment.end - segment.begin)
+        u = segment.share(time)
         return LEAVING.step(u)[0] - LANDING.step(u)[0]
 
     def _set_dampers(
@@ -360,7 +358,7 @@ class WholeBodyIK:
             turn = rotation_vector(actual[:3, :3] @ start.rotation.T)
             self.offsets[palm] = segment, actual[:3, 3] - start.position, turn
         _, shift, turn = self.offsets[palm]
-        left = 1.0 - OFFSET.step((time - segment.begin) / (segment.end - segment.begin))[0]
+        left = 1.0 - OFFSET.step(segment.share(time))[0]
         return pose.moved(left * shift, left * turn)
 
 

@@ -44,6 +44,10 @@ class Segment:
     free_start: bool = False
     free_end: bool = False
 
+    def share(self, time: float) -> float:
+        """The part of the phase that is over at a time in s."""
+        return (time - self.begin) / (self.end - self.begin)
+
 
 @dataclass(frozen=True)
 class LimbPaths:

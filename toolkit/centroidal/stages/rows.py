@@ -18,6 +18,7 @@ from toolkit.physics.leg import (
     PLANNED,
     TORQUE_ROLES,
     LegPosture,
+    between,
     hip_joints,
     joint_lines,
     posture_between,
@@ -212,9 +213,11 @@ def scatter(local, force, index, hessian, gradient):
 
 @compiled(reordered=True)
 def posture(p, turn, hip):
-    """Posture of a leg with its hip there."""
+    """Posture of a leg with its hip there, and its slopes."""
+    thigh, shin = p[_LINKS], p[_LINKS + 1]
     ankle, heading = (p[_ANKLE], p[_ANKLE + 1], p[_ANKLE + 2]), (p[_HEADING], p[_HEADING + 1])
-    return posture_between(hip, ankle, turn, heading, p[_LINKS], p[_LINKS + 1], hip_joints(p, _JOINTS), TINY)
+    found = posture_between(hip, ankle, turn, heading, thigh, shin, hip_joints(p, _JOINTS), TINY)
+    return found, leg_slopes(found, turn, thigh, shin, TINY)
 
 
 @compiled(reordered=True)
@@ -251,8 +254,7 @@ def fill_legs(block, y, hessian, gradient):
         p, t, index = block.parameters[i], block.stage[i], block.variables[i]
         turn, offset = p[_TURN : _TURN + 9].reshape(3, 3), index[4:]
         hip_of(p, turn, y, t, y[t, :3], offset, hip)
-        here, kept = posture(p, turn, hip), 1.0 - y[t, index[3]]
-        slopes = leg_slopes(here, turn, p[_LINKS], p[_LINKS + 1], TINY)
+        (here, slopes), kept = posture(p, turn, hip), 1.0 - y[t, index[3]]
         found, moved = limited(quantities(here)), limited(quantity_slopes(here, slopes, TINY))
         for q in range(len(PLANNED)):
             margin, factor = p[POSTURE + 2 * len(PLANNED) + _MARGIN[q]], _FACTOR[q]
@@ -359,15 +361,13 @@ def fill_torques(block, y):
             com[a] = y[t, a] + half * y[t, 3 + a]
         hip_of(p, turn, y, t, com, offset, hip)
         force, moment = turned(turn, wrench), turned(turn, wrench[3:])
-        posed = posture(p, turn, hip)
+        posed, moved = posture(p, turn, hip)
         lines = joint_lines(posed, turn, TINY)
-        by_hip = torque_slopes(
-            posed, leg_slopes(posed, turn, p[_LINKS], p[_LINKS + 1], TINY), lines, sole, force, moment
-        )
+        by_hip = torque_slopes(posed, moved, lines, sole, force, moment)
         for q in range(_TORQUES):
             here[q] = torque_about(lines[q], sole, force, moment)
             axis, origin = lines[q]
-            lever = cross(axis, (sole[0] - origin[0], sole[1] - origin[1], sole[2] - origin[2]))
+            lever = cross(axis, between(origin, sole))
             for k in range(3):
                 slopes[q, k] = by_hip[q][k] / limits[q]
                 by_force = turn[0, k] * lever[0] + turn[1, k] * lever[1] + turn[2, k] * lever[2]
