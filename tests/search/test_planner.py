@@ -1,3 +1,4 @@
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -134,6 +135,22 @@ def test_reason_of_failure_names_what_rejected_most(robot):
     result = plan(robot, steep, config)
     assert not result.solutions
     assert "limit of 200 expansions" in result.reason and "too steep" in result.reason and "\n" not in result.reason
+    x, y, z = (float(number) for number in re.search(r"feet at (\S+) (\S+) (\S+) m;", result.reason).groups())
+    assert 0.2 < x < 1.5 and abs(y) < 0.5 and abs(z) < 0.3
+
+
+def test_reason_of_failure_names_what_sequences_lack(robot):
+    """Sequences reach the goal, and none has a motion: what rejected single candidates is beside the point."""
+
+    def finish(sequence):
+        failure = Failure("infeasible: ankle pitch beyond its limit", transition=1)
+        return SimpleNamespace(motion=SimpleNamespace(feasible=False, failure=failure))
+
+    world = make_world(FLOOR, goal=(0.8, 0, 0))
+    planner = ContactPlanner(robot, world, KinematicEvaluator(robot), QUICK, finish)
+    result = planner.search(np.random.default_rng(0), 20.0)
+    assert not result.solutions and "\n" not in result.reason and "rejected" not in result.reason
+    assert "the last is infeasible: ankle pitch beyond its limit, with the feet at 0." in result.reason
 
 
 def test_search_exhausted(robot):

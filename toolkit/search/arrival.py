@@ -41,7 +41,7 @@ class Arrival:
         finish: Optimises whole sequences.
         reader: Reads states.
         cost: Costs of the search.
-        tally: Counts rejections.
+        tally: Counts rejections, and sequences without a motion.
         blame: Transitions that the search avoids; those to which failures lead again and again are added.
     """
 
@@ -70,9 +70,20 @@ class Arrival:
         if plan is None or not plan.motion.feasible:
             self._tally.rejected[Reason.DYNAMICS] += 1
             if plan is not None:
-                at = None if plan.motion.failure is None else plan.motion.failure.transition
+                failure = plan.motion.failure
+                at = None if failure is None else failure.transition
                 self._blame.add(sequence, at)
+                self._tally.refused += 1
+                self._tally.refusal = "" if failure is None else f"{failure.reason}{_place(sequence, at)}"
             return None if at is None or at + 1 >= len(passed) else Fault(list(states).index(passed[at + 1]))
         predicted = sum(payload[0] for payload in judged) + edge.payload[0]
         missing = self._cost.dynamics * (plan.motion.objective - predicted)
         return edge._replace(cost=edge.cost + missing, payload=(*edge.payload, Arrived(missing, plan)))
+
+
+def _place(sequence: ContactSequence, index: int | None) -> str:
+    """Where the feet are in a transition, in words; "" where the transition is unknown."""
+    if index is None or index >= len(sequence.stances):
+        return ""
+    x, y, z = sequence.stances[index].mean_feet.position
+    return f", with the feet at {x:.2f} {y:.2f} {z:.2f} m"

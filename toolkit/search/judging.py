@@ -22,10 +22,14 @@ class Tally:
     Attributes:
         rejected: (len(Reason),) int; rejected candidates by reason.
         untrained: Number of transitions outside what their judge was trained for.
+        refused: Number of sequences that lead to the goal, but have no motion.
+        refusal: Why the last of them has none, and where; "" where that is unknown.
     """
 
     rejected: np.ndarray = field(default_factory=lambda: np.zeros(len(Reason), np.int64))
     untrained: int = 0
+    refused: int = 0
+    refusal: str = ""
 
 
 class Judging:

@@ -140,7 +140,8 @@ class ContactPlanner:
         if paces or way.slides:  # a calmer search follows, or the strategy has extended the limit
             settings = replace(settings, persistence=1)
         judge = None if self._finish is None else Arrival(self._finish, parts.reader, parts.cost, tally, blame)
-        result = AnaStar(ContactProblem(parts, state), rng, settings, judge).run(time_limit, observer)
+        problem = ContactProblem(parts, state)
+        result = AnaStar(problem, rng, settings, judge).run(time_limit, observer)
         return SearchResult(
             solutions=tuple(Solution.of(parts.reader, path) for path in result.paths),
             seconds=result.seconds,
@@ -148,7 +149,7 @@ class ContactPlanner:
             expansions=result.expansions,
             exhausted=result.stopped_by == "exhausted",
             expanded=_places(parts.table, result.expanded),
-            reason="" if result.paths else self._reason(result, tally),
+            reason="" if result.paths else self._reason(result, tally, _nearest(parts.table, problem, result.expanded)),
             warning=_UNTRAINED if tally.untrained else "",
             slides=way.slides,
             paced=self.paced,
@@ -188,10 +189,17 @@ class ContactPlanner:
         screen = SequenceScreen(moves, limbs)
         return Parts(table, reader, candidates, judging, strategy.lazy, cost, delay, tally, screen)
 
-    def _reason(self, result: AnaStarResult[bytes], tally: Tally) -> str:
+    def _reason(self, result: AnaStarResult[bytes], tally: Tally, nearest: str) -> str:
         limit = self.config.search.max_expansions  # the setting, not the multiple of it that was allowed
         expansions = limit if result.stopped_by == "expansions" and limit is not None else result.expansions
-        return reason_of(result.stopped_by, result.seconds, expansions, tally.rejected, self._evaluator.rejection)
+        return reason_of(result.stopped_by, result.seconds, expansions, tally, self._evaluator.rejection, nearest)
+
+
+def _nearest(table: ContactTable, problem: ContactProblem, states: Sequence[bytes]) -> str:
+    """Where the feet are in the state with the least cost to go, in words."""
+    rows = unpack([states[int(np.argmin(problem.heuristic(states)))]]) if states else unpack([problem.start()])
+    x, y, z = mean_feet(table, rows[:, CONTACTS])[0][0]
+    return f"{x:.2f} {y:.2f} {z:.2f} m"
 
 
 def _places(table: ContactTable, states: Sequence[bytes]) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from toolkit.centroidal.plan import MotionPlan
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.search.anytime.graph import Path
+from toolkit.search.judging import Tally
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.search.states.reader import StateReader
@@ -98,22 +99,36 @@ class SearchResult:
     screen: SequenceScreen | None = field(default=None, repr=False, compare=False)
 
 
-def reason_of(stopped_by: str, seconds: float, expansions: int, rejected: np.ndarray, dynamics: str) -> str:
-    """One line on why there is no solution and what rejected most candidates, not counting the choice of palms."""
+def reason_of(stopped_by: str, seconds: float, expansions: int, tally: Tally, dynamics: str, nearest: str) -> str:
+    """One line on why there is no solution.
+
+    Args:
+        stopped_by: What ended the search; see `AnaStarResult`.
+        seconds: How long it took.
+        expansions: Number of states expanded.
+        tally: What was rejected. Sequences that lead to the goal say more than single candidates do; of those, the
+            choice of palms is not counted.
+        dynamics: What it means that a judge rejects a transition.
+        nearest: Where the search came nearest to the goal.
+    """
     how = {
         "exhausted": f"every stance that can be reached was looked at ({expansions})",
         "time": f"the time limit of {seconds:.3g} s was reached after {expansions} expansions; a longer one may help",
         "expansions": f"the limit of {expansions} expansions was reached; a higher one may help",
         "memory": f"the limit on memory was reached after {expansions} expansions",
     }[stopped_by]
-    rejected = np.where([reason.of_palm for reason in Reason], 0, rejected)
+    how = f"no contact sequence found: {how}"
+    if tally.refused:
+        last = f"; the last is {tally.refusal}" if tally.refusal else ""
+        return f"{how}; sequences that lead to the goal, but have no motion: {tally.refused}{last}"
+    rejected = np.where([reason.of_palm for reason in Reason], 0, tally.rejected)
     total = int(rejected.sum())
     if total == 0:
-        return f"no contact sequence found: {how}"
+        return how
     order = np.argsort(-rejected, kind="stable")[:4]
     shares = ", ".join(
         f"{dynamics if code == Reason.DYNAMICS else Reason(code).words} {100 * rejected[code] / total:.0f} %"
         for code in order
         if rejected[code] > 0
     )
-    return f"no contact sequence found: {how}; candidates were rejected for: {shares}"
+    return f"{how}; it came nearest to the goal with the feet at {nearest}; candidates were rejected for: {shares}"
