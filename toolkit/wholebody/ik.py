@@ -123,7 +123,7 @@ class WholeBodyIK:
         return [(names, weight) for weight, names in groups.items()]
 
     def start(self, qpos: np.ndarray, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
-        """(7 + n,) qpos at time 0, settled from a first guess (7 + n,)."""
+        """(7 + n,) qpos at time 0, settled from a first guess (7 + n,) and clear of the world."""
         guess = qpos.copy()
         for palm in self.palms:
             segment = paths.segment(palm, 0.0)
@@ -144,7 +144,11 @@ class WholeBodyIK:
         for task, names, weight in self.postures:
             task.set_joints({name: posture[name] for name in names})
             task.configure("posture", "soft", weight * self._ease)
+        self.drift, self.last_step = np.zeros(self.robot.mujoco_model.nv), np.zeros(len(self.robot.joint_names))
+        standing = next((foot for foot in FEET if paths.segment(foot, 0.0).path is None), None)
         for _ in range(weights.SETTLE):
+            state = self.order.qpos_from_q(self.wrapper.state.q)
+            self._set_dampers(state, self.joints, 0.0, paths, standing)
             if np.abs(self._solve(0.0)).max() < 1e-7:
                 break
         for task, _, weight in self.postures:
@@ -155,7 +159,6 @@ class WholeBodyIK:
         self.spin.configure("spin", "soft", (self.turning - 1.0) * weights.ANGULAR_MOMENTUM * angle**2)
         self.steady.configure("steady", "soft", weights.STEADY)
         self.solver.enable_velocity_limits(True)
-        self.drift, self.last_step = np.zeros(self.robot.mujoco_model.nv), np.zeros(len(self.robot.joint_names))
         return self.order.qpos_from_q(self.wrapper.state.q)
 
     def advance(self, time: float, paths: LimbPaths, motion: CentroidalMotion) -> np.ndarray:
