@@ -11,6 +11,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
 
 PERIOD, WEIGHT = 0.002, 700.0
+HERE = np.zeros((4, 3))  # m; limbs at their contacts
 
 
 def tracker(swings, resting=(0, 1)):
@@ -27,13 +28,13 @@ def swing(limb, start=1.0, end=2.0, makes=True, breaks=True):
     return Swing(limb, start, end, 0, contact, breaks)
 
 
-def follow(state, limb, force, until, start=0.0):
-    """Run ticks with a force as a function of time; returns when contact was made."""
-    made = []
+def follow(state, limb, force, until, start=0.0, height=0.0):
+    """Run ticks with a force as a function of time, above the contact; returns when contact was made."""
+    made, position = [], np.full((4, 3), [0.0, 0.0, height])
     for time in np.arange(start, until, PERIOD):
         measured = np.zeros(4)
         measured[limb] = force(time)
-        state.update(time, PERIOD, measured)
+        state.update(time, PERIOD, measured, position)
         if state.made[limb]:
             made.append(time)
     return made
@@ -50,6 +51,20 @@ def test_forces_before_the_fraction_of_the_swing_are_ignored():
     state = tracker([swing(Limb.LEFT_FOOT)])
     made = follow(state, 0, lambda t: 300.0 if 1.0 < t < 1.5 else 0.0, 1.9)
     assert made == [] and not state.in_contact[0]
+
+
+def test_a_foot_that_grazes_an_edge_high_above_its_contact_goes_on():
+    state = tracker([swing(Limb.LEFT_FOOT)])
+    high = 1.1 * touchdown.EARLY_HEIGHT
+    assert follow(state, 0, lambda t: 300.0 if t > 1.8 else 0.0, 1.9, height=high) == []
+    made = follow(state, 0, lambda t: 30.0, 2.0, start=1.9, height=0.9 * touchdown.EARLY_HEIGHT)
+    assert made[:1] == [pytest.approx(1.9, abs=2 * PERIOD)]
+
+
+def test_ground_that_is_too_high_bears_in_the_end():
+    state = tracker([swing(Limb.LEFT_FOOT)])
+    made = follow(state, 0, lambda t: 300.0 if t > 1.8 else 0.0, 2.1, height=1.1 * touchdown.EARLY_HEIGHT)
+    assert made == [pytest.approx(2.0, abs=2 * PERIOD)]
 
 
 def test_a_foot_that_finds_no_ground_goes_on_but_not_for_ever():
@@ -83,7 +98,7 @@ def test_the_bound_on_the_normal_force_falls_before_the_swing_and_rises_after_it
     bounds = {}
     for k in range(1200):
         time = k * PERIOD
-        state.update(time, PERIOD, np.array([100.0 if time >= 2.0 else 0.0, 0, 0, 0]))
+        state.update(time, PERIOD, np.array([100.0 if time >= 2.0 else 0.0, 0, 0, 0]), HERE)
         assert 0.0 <= state.min_force[0] <= state.max_force[0]
         bounds[k] = state.max_force[0]
     full = bounds[0]
@@ -98,7 +113,7 @@ def test_the_bound_on_the_normal_force_falls_before_the_swing_and_rises_after_it
 
 def test_palms_keep_their_own_limit():
     state = tracker([], resting=(0, 1, 2))
-    state.update(0.0, PERIOD, np.zeros(4))
+    state.update(0.0, PERIOD, np.zeros(4), HERE)
     assert state.max_force[2] == 150.0
 
 
@@ -117,7 +132,7 @@ def test_a_limb_that_bears_what_it_is_asked_for_is_not_loose(limb):
 def test_a_limb_in_the_air_or_about_to_leave_is_not_loose():
     state = tracker([swing(Limb.LEFT_FOOT)])
     follow(state, 0, lambda t: 100.0, 0.9995)
-    state.update(0.9998, PERIOD, np.ones(4))
+    state.update(0.9998, PERIOD, np.ones(4), HERE)
     assert state.in_contact[0] and not state.loose[0]
     follow(state, 0, lambda t: 0.0, 1.5, start=1.0)
     assert not state.in_contact[0] and not state.loose[0]

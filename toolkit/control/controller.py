@@ -187,7 +187,8 @@ class Controller:
         """
         self.dynamics.update(qpos, qvel)
         self.dynamics.roll_soles(self._reference.limb_rotation[index, :, :, 2])
-        self.tracker.update(float(self._reference.times[index]), self._period, normal_force)
+        time, position = float(self._reference.times[index]), self.dynamics.limb_position
+        self.tracker.update(time, self._period, normal_force, position)
         self._com[:], self._com_velocity[:] = self._reference.com[index], self._reference.com_velocity[index]
         self.aim.follow(self._reference, index)
         if self._corrector is not None:

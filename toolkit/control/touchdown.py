@@ -18,6 +18,7 @@ EARLY_FOOT_FORCE, LATE_FOOT_FORCE = 25.0, 15.0  # N; they end a foot's swing bef
 PALM_FORCE, CONFIRM_TICKS = 3.0, 2  # N, and consecutive ticks that it must last: arms bounce
 LATE_FOOT_SPEED, PALM_SPEED = 0.15, 0.08  # m/s; speeds along the inward normal after the planned end
 MAX_DEPTH = 0.08  # m; how far a limb searches below the planned surface
+EARLY_HEIGHT = 0.05  # m; a limb that is touched farther above that surface has met something else, and goes on
 
 # How much force a limb in contact is asked to bear.
 MIN_FOOT_FORCE, MIN_PALM_FORCE = 10.0, 2.0  # N; least forces of settled contacts, so that they stay closed
@@ -39,9 +40,9 @@ class LimbState(Enum):
 class ContactTracker:
     """Decides from planned times and measured forces which limbs are in contact, and how much force each may bear.
 
-    A foot that meets the ground late in its swing rests where it is; one that has not met it in time goes on along the
-    inward normal. A palm needs two ticks of force. The bound on the normal force rises after contact is made and falls
-    before it is broken, so that forces never jump.
+    A foot that meets the ground late in its swing rests where it is, but not where it grazes an edge high above; one
+    that has not met it in time goes on along the inward normal. A palm needs two ticks of force. The bound on the
+    normal force rises after contact is made and falls before it is broken, so that forces never jump.
 
     Attributes:
         state: By limb, what it does.
@@ -86,8 +87,11 @@ class ContactTracker:
         self.begun, self.made = np.zeros(4, bool), np.zeros(4, bool)
         self.loose = np.zeros(4, bool)
 
-    def update(self, time: float, period: float, normal_force: np.ndarray) -> None:
-        """Advance to a time in s, a period in s after the last tick; the forces (4,) in N are along the normals."""
+    def update(self, time: float, period: float, normal_force: np.ndarray, position: np.ndarray) -> None:
+        """Advance to a time in s, a period in s after the last tick.
+
+        The limbs are measured: forces (4,) in N along their normals, positions (4, 3) in m in the world.
+        """
         self.begun[:] = False
         self.made[:] = False
         for limb in self.state:
@@ -101,26 +105,30 @@ class ContactTracker:
             swing = self.current[limb]
             if swing is not None and self.state[limb] in (LimbState.SWING, LimbState.SEARCH):
                 self.lead[limb] += (self.pace[limb] - 1.0) * period
-                self._advance(limb, swing, time + self.lead[limb], period, normal_force[limb])
+                self._advance(limb, swing, time + self.lead[limb], period, normal_force[limb], position[limb])
             self.in_contact[limb] = self.state[limb] is LimbState.REST
             self._bound(limb, time)
             self.loose[limb] = self.in_contact[limb] and normal_force[limb] < LOOSE * self.min_force[limb]
 
-    def _advance(self, limb: Limb, swing: Swing, time: float, period: float, force: float) -> None:
+    def _advance(
+        self, limb: Limb, swing: Swing, time: float, period: float, force: float, position: np.ndarray
+    ) -> None:
         """Follow one limb through its swing; the given time includes its lead."""
         over = time >= swing.end - 1e-9
         if swing.contact is None:
             if over:
                 self.state[limb] = LimbState.FREE
             return
-        late_enough = time - swing.start >= EARLY_FRACTION * (swing.end - swing.start)
+        height = swing.contact.pose.normal @ (position - swing.contact.pose.position)
+        nearly = time - swing.start >= EARLY_FRACTION * (swing.end - swing.start)
+        there = over or (nearly and height <= self.scale.length * EARLY_HEIGHT)
         if limb.is_foot:
             met = force > self.scale.force * (LATE_FOOT_FORCE if over else EARLY_FOOT_FORCE)
         else:
             loaded = force > self.scale.force * PALM_FORCE
             self._loaded_ticks[limb] = self._loaded_ticks[limb] + 1 if loaded else 0
             met = self._loaded_ticks[limb] >= CONFIRM_TICKS
-        if met and late_enough:
+        if met and there:
             self.state[limb], self._since[limb] = LimbState.REST, time - self.lead[limb]
             self.made[limb] = True
         elif over:
