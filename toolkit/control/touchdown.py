@@ -119,16 +119,17 @@ class ContactTracker:
             if over:
                 self.state[limb] = LimbState.FREE
             return
-        height = swing.contact.pose.normal @ (position - swing.contact.pose.position)
-        nearly = time - swing.start >= EARLY_FRACTION * (swing.end - swing.start)
-        there = over or (nearly and height <= self.scale.length * EARLY_HEIGHT)
         if limb.is_foot:
             met = force > self.scale.force * (LATE_FOOT_FORCE if over else EARLY_FOOT_FORCE)
         else:
             loaded = force > self.scale.force * PALM_FORCE
             self._loaded_ticks[limb] = self._loaded_ticks[limb] + 1 if loaded else 0
             met = self._loaded_ticks[limb] >= CONFIRM_TICKS
-        if met and there:
+        if met and not over:
+            contact = swing.contact.pose
+            late_enough = time - swing.start >= EARLY_FRACTION * (swing.end - swing.start)
+            met = late_enough and contact.normal @ (position - contact.position) <= self.scale.length * EARLY_HEIGHT
+        if met:
             self.state[limb], self._since[limb] = LimbState.REST, time - self.lead[limb]
             self.made[limb] = True
         elif over:

@@ -15,6 +15,7 @@ from toolkit.search.costs.edge_cost import EdgeCost
 from toolkit.search.judging import Tally
 from toolkit.search.moves.exclusion import Blame
 from toolkit.search.moves.reasons import Reason
+from toolkit.search.result import feet_at
 from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import is_pending
 
@@ -74,16 +75,10 @@ class Arrival:
                 at = None if failure is None else failure.transition
                 self._blame.add(sequence, at)
                 self._tally.refused += 1
-                self._tally.refusal = "" if failure is None else f"{failure.reason}{_place(sequence, at)}"
+                self._tally.refusal = "" if failure is None else failure.reason
+                if at is not None:
+                    self._tally.refusal += f", {feet_at(sequence.stances[at].mean_feet.position)}"
             return None if at is None or at + 1 >= len(passed) else Fault(list(states).index(passed[at + 1]))
         predicted = sum(payload[0] for payload in judged) + edge.payload[0]
         missing = self._cost.dynamics * (plan.motion.objective - predicted)
         return edge._replace(cost=edge.cost + missing, payload=(*edge.payload, Arrived(missing, plan)))
-
-
-def _place(sequence: ContactSequence, index: int | None) -> str:
-    """Where the feet are in a transition, in words; "" where the transition is unknown."""
-    if index is None or index >= len(sequence.stances):
-        return ""
-    x, y, z = sequence.stances[index].mean_feet.position
-    return f", with the feet at {x:.2f} {y:.2f} {z:.2f} m"

@@ -28,7 +28,7 @@ from toolkit.search.moves.exclusion import Blame, Exclusion
 from toolkit.search.moves.reach_check import ReachCheck
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.problem import ContactProblem, Parts
-from toolkit.search.result import SearchResult, Solution, reason_of
+from toolkit.search.result import SearchResult, Solution, feet_at, reason_of
 from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.search.states.reader import StateReader
@@ -196,10 +196,10 @@ class ContactPlanner:
 
 
 def _nearest(table: ContactTable, problem: ContactProblem, states: Sequence[bytes]) -> str:
-    """Where the feet are in the state with the least cost to go, in words."""
-    rows = unpack([states[int(np.argmin(problem.heuristic(states)))]]) if states else unpack([problem.start()])
-    x, y, z = mean_feet(table, rows[:, CONTACTS])[0][0]
-    return f"{x:.2f} {y:.2f} {z:.2f} m"
+    """Where the feet are in the state with the least cost to go, in words; at the start where there are no states."""
+    states = states or [problem.start()]
+    nearest = states[int(np.argmin(problem.heuristic(states)))]
+    return feet_at(mean_feet(table, unpack([nearest])[:, CONTACTS])[0][0])
 
 
 def _places(table: ContactTable, states: Sequence[bytes]) -> np.ndarray:

@@ -99,6 +99,12 @@ class SearchResult:
     screen: SequenceScreen | None = field(default=None, repr=False, compare=False)
 
 
+def feet_at(position: np.ndarray) -> str:
+    """Where feet are whose mean is at (3,) m, in words."""
+    x, y, z = position
+    return f"with the feet at {x:.2f} {y:.2f} {z:.2f} m"
+
+
 def reason_of(stopped_by: str, seconds: float, expansions: int, tally: Tally, dynamics: str, nearest: str) -> str:
     """One line on why there is no solution.
 
@@ -109,7 +115,7 @@ def reason_of(stopped_by: str, seconds: float, expansions: int, tally: Tally, dy
         tally: What was rejected. Sequences that lead to the goal say more than single candidates do; of those, the
             choice of palms is not counted.
         dynamics: What it means that a judge rejects a transition.
-        nearest: Where the search came nearest to the goal.
+        nearest: Where the search came nearest to the goal (`feet_at`).
     """
     how = {
         "exhausted": f"every stance that can be reached was looked at ({expansions})",
@@ -131,4 +137,4 @@ def reason_of(stopped_by: str, seconds: float, expansions: int, tally: Tally, dy
         for code in order
         if rejected[code] > 0
     )
-    return f"{how}; it came nearest to the goal with the feet at {nearest}; candidates were rejected for: {shares}"
+    return f"{how}; it came nearest to the goal {nearest}; candidates were rejected for: {shares}"

@@ -145,7 +145,7 @@ class WholeBodyIK:
             task.set_joints({name: posture[name] for name in names})
             task.configure("posture", "soft", weight * self._ease)
         self.drift, self.last_step = np.zeros(self.robot.mujoco_model.nv), np.zeros(len(self.robot.joint_names))
-        standing = next((foot for foot in FEET if paths.segment(foot, 0.0).path is None), None)
+        standing = self._standing(0.0, paths)
         for _ in range(weights.SETTLE):
             state = self.order.qpos_from_q(self.wrapper.state.q)
             self._set_dampers(state, self.joints, 0.0, paths, standing)
@@ -181,7 +181,7 @@ class WholeBodyIK:
         turn = wanted + weights.KEPT_TURN * (self.drift[3:6] - wanted)
         self.steady.R_world_frame = self.wrapper.get_T_world_frame(self.robot.base)[:3, :3] @ rotation_exponential(turn)
         swinging = next((foot for foot in FEET if paths.segment(foot, time).path is not None), None)
-        standing = next((foot for foot in FEET if paths.segment(foot, time).path is None), None)
+        standing = self._standing(time, paths)
         self._set_dampers(before, angles, time, paths, standing)
         self._solve(time)
         self._spare_motors(time, before, motion, swinging, standing)
@@ -256,6 +256,11 @@ class WholeBodyIK:
         self.base.R_world_frame = mean_pose(*feet).rotation @ turn
         for palm, tasks in self.palms.items():
             self._set_palm(palm, tasks, time, paths)
+
+    @staticmethod
+    def _standing(time: float, paths: LimbPaths) -> Limb | None:
+        """A foot that stands at a time in s; None where there is none."""
+        return next((foot for foot in FEET if paths.segment(foot, time).path is None), None)
 
     @staticmethod
     def _air(foot: Limb, time: float, paths: LimbPaths) -> float:
