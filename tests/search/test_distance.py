@@ -77,6 +77,8 @@ def test_wall_with_a_doorway_lengthens_the_way(robot):
     distance = terrain(robot, world).distance(world.start, 0.4)
     detour = 2 * np.hypot(1.0, 1.2) - world.goal.radius
     assert 0.85 * detour < at(distance, 0, 0) < 1.1 * detour
+    ways = distance.ahead(np.array([[0.0, 0, 0], [1.0, 1.2, 0], [1.5, 0.6, 0], [2.0, 0, 0], [1.0, 0, 0]]), np.zeros(5))
+    np.testing.assert_allclose(ways, np.radians([50.0, -50.0, -50.0, np.nan, np.nan]), atol=np.radians(20.0))
     # Too narrow even sideways, by more than the cells of the grid.
     narrow = make_world(FLOOR, *wall_with_doorway(0.0, 2 * BodyBox.of(robot).half_depth - 0.15), goal=(2.0, 0, 0))
     assert terrain(robot, narrow).distance(narrow.start, 0.4) is None

@@ -116,7 +116,7 @@ def steps(table, contacts, offsets, timing=0):
     after = np.tile(contacts, (n, 1))
     after[:, 0] = number
     centre, yaw = mean_feet(table, after)
-    return Candidates(np.zeros(n, int), number, after, centre, yaw, np.zeros(n), np.full(n, timing))
+    return Candidates(np.zeros(n, int), number, after, centre, yaw, np.zeros(n), np.zeros(n), np.full(n, timing))
 
 
 def test_drift_expects_quick_feet_under_the_com(robot):

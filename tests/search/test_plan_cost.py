@@ -82,7 +82,7 @@ def test_an_infeasible_motion_costs_without_end_whatever_dynamics_cost(plan):
 def test_a_plan_without_transitions_costs_its_rests_and_its_motion(plan):
     standing = replace(plan, sequence=ContactSequence(plan.sequence.start, ()))
     cost = plan_cost(standing, CostConfig())
-    assert (cost.way, cost.step, cost.steep, cost.stagger) == (0.0, 0.0, 0.0, 0.0)
+    assert cost.way == cost.step == cost.steep == cost.stagger == cost.heading == 0.0
     assert cost.time == pytest.approx(20.0 * plan.schedule.duration)
 
 
@@ -109,5 +109,5 @@ def test_rivals_search_by_steps_and_not_by_seconds(robot, world):
     for config in (one, two):
         assert make_planner(robot, world, "kinematic", config).config.cost == replace(config.cost, time=0.0, pace=0.0)
     assert quasi_static_planner(robot, world, one).config.cost == replace(
-        one.cost, time=0.0, pace=0.0, steep=0.0, dynamics=0.0
+        one.cost, time=0.0, pace=0.0, steep=0.0, dynamics=0.0, heading=0.0
     )

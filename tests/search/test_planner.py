@@ -12,7 +12,7 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
-from toolkit.search.costs.edge_cost import CostConfig
+from toolkit.search.costs.edge_cost import CostConfig, backwards
 from toolkit.search.planner import ContactPlanner, PlannerConfig
 from toolkit.world.timing import Timing
 
@@ -37,8 +37,9 @@ def check(robot, world, result, price=CostConfig.time):
         assert solution.com.shape == solution.com_velocity.shape == (len(stances), 3)
         cost = price * solution.sequence.duration
         for before, after, objective in zip(stances[:-1], stances[1:], solution.objective, strict=True):
-            d = np.linalg.norm((after.mean_feet.position - before.mean_feet.position)[:2])
-            cost += d + 3.0 + 0.1 * objective
+            x, y = (after.mean_feet.position - before.mean_feet.position)[:2]
+            d, back = np.hypot(x, y), backwards(np.arctan2(y, x) - after.mean_feet.yaw)
+            cost += d + 3.0 + 0.1 * objective + CostConfig.heading * d * back
         heading = stances[-1].mean_feet.rotation[:, 0]
         left, right = (stances[-1][limb].pose.position for limb in FEET)
         assert solution.cost == pytest.approx(cost + 5.0 * abs((left - right) @ heading), abs=1e-6)

@@ -10,7 +10,8 @@ from toolkit.contacts.projected import Projected
 from toolkit.geometry.limb import Limb
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
-from toolkit.search.costs.edge_cost import CostConfig, EdgeCost
+from toolkit.search.costs.delay import Facing
+from toolkit.search.costs.edge_cost import CostConfig, EdgeCost, backwards
 from toolkit.search.costs.heuristic import EuclideanDistance
 from toolkit.search.moves.candidates import Candidates, mean_feet
 from toolkit.search.planner_config import PlannerConfig
@@ -87,7 +88,8 @@ def walk():
         left = table.add(Limb.LEFT_FOOT, Projected(np.zeros(n, int), place, np.tile(turn, (n, 1, 1))))
         after = np.column_stack([left, np.full(n, right[0]), np.full((n, 2), -1)])
         centre, yaw = mean_feet(table, after)
-        return Candidates(np.zeros(n, int), left, after, centre, yaw, np.abs(x) / 2, np.arange(n) % 2)
+        course = np.where(x < 0.0, np.pi, 0.0)
+        return Candidates(np.zeros(n, int), left, after, centre, yaw, np.abs(x) / 2, course, np.arange(n) % 2)
 
     return cost, moves
 
@@ -101,6 +103,23 @@ def test_the_edge_cost_is_the_sum_of_its_terms(walk):
     tilted, angle = moves(np.array([0.1]), 0.4), np.tan(0.4) / 0.5
     steep = cost(CostConfig(steep=200.0, reserve=0.5)).known(tilted) - cost(CostConfig(steep=0.0)).known(tilted)
     np.testing.assert_allclose(steep, 200.0 * (0.5 / (1.0 - angle) - 1.0), rtol=1e-9)
+
+
+def test_walking_backwards_has_its_price_and_walking_on_has_none(walk):
+    cost, moves = walk
+    forth, back = (cost(CostConfig(heading=60.0)).terms(moves(np.array([x]))) for x in (0.2, -0.2))
+    assert forth.heading == 0.0 and back.heading == pytest.approx(60.0 * 0.1)
+    angle = np.radians([0.0, 44.0, -90.0, 136.0, 180.0, 270.0, 350.0])
+    np.testing.assert_allclose(backwards(angle), [0.0, 0.0, 0.5, 1.0, 1.0, 0.5, 0.0], atol=1e-9)
+
+
+def test_states_wait_that_do_not_face_the_way_ahead():
+    goal = make_world(FLOOR, goal=(3.0, 0, 0)).goal
+    facing = Facing(EuclideanDistance(goal), 60.0, 100.0)
+    centre = np.array([[0.0, 0, 0], [0.0, 0, 0], [0.0, 0, 0], [2.7, 0, 0]])
+    ahead, aside, away, near = facing.delay(centre, np.array([0.5, np.pi / 2, np.pi, np.pi]))
+    assert 0.0 == ahead < near < aside < away  # near the goal it does not pay to turn
+    assert not Facing(EuclideanDistance(goal), 0.0, 100.0).delay(centre, np.full(4, np.pi)).any()
 
 
 def test_no_edge_costs_less_than_its_bound_and_the_heuristic_falls_no_faster_than_costs_rise(walk):

@@ -18,7 +18,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.anytime.ana_star import AnaStar, AnaStarResult
 from toolkit.search.anytime.graph import Progress
 from toolkit.search.arrival import Arrival, Finish
-from toolkit.search.costs.delay import Delay, Haste
+from toolkit.search.costs.delay import Delay, Facing, Haste
 from toolkit.search.costs.edge_cost import EdgeCost
 from toolkit.search.ground import Ground, Way
 from toolkit.search.judging import Judging, Tally
@@ -184,7 +184,8 @@ class ContactPlanner:
         haste = None
         if strategy.haste:
             haste = Haste(table, self.robot.com_height, way.forced, cost.per_metre, scale.length)
-        delay = Delay(Drift(self.robot, table, timings), haste, cost.per_metre)
+        facing = Facing(way.distance, strategy.cost.heading, cost.per_metre, scale.length)
+        delay = Delay(Drift(self.robot, table, timings), facing, haste, cost.per_metre)
         judging = Judging(strategy.judge, reader, reach, tally, deadline)
         screen = SequenceScreen(moves, limbs)
         return Parts(table, reader, candidates, judging, strategy.lazy, cost, delay, tally, screen)

@@ -140,7 +140,7 @@ class ContactProblem:
             cost = cost + self._parts.cost.known(candidates)
         states = self._parts.reader.states(candidates.contacts, candidates.limb, com, velocity)
         payloads = zip(objective.tolist(), candidates.timing.tolist(), strict=True)
-        delay = self._parts.delay.of_states(candidates.contacts, com, velocity)
+        delay = self._parts.delay.of_states(candidates, com, velocity)
         return [Edge(*item) for item in zip(states, cost.tolist(), payloads, delay.tolist(), strict=True)]
 
     def _postponed(self, row: np.ndarray, candidates: Candidates) -> list[Edge[bytes]]:

@@ -126,13 +126,13 @@ class QuasiStaticEvaluator(TransitionEvaluator):
 def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig | None = None) -> ContactPlanner:
     """The baseline planner; without walls for palms it leaves out ground beyond its friction angle at once.
 
-    Of the settings `config`, the weights of dynamics, time and steepness do not count.
+    Of the settings `config`, the weights of dynamics, time, steepness and heading do not count.
     """
     config = config or PlannerConfig()
     palms = config.palms and bool(robot.arms) and _walls_in_reach(robot, world)
     config = replace(
         config,
-        cost=replace(config.cost, dynamics=0.0, time=0.0, pace=0.0, steep=0.0),
+        cost=replace(config.cost, dynamics=0.0, time=0.0, pace=0.0, steep=0.0, heading=0.0),
         rest_friction=None if palms else _FRICTION,
         one_timing=True,
     )

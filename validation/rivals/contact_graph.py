@@ -12,7 +12,7 @@ import numpy as np
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.geometry.limb import PALMS
 from toolkit.prediction.evaluator import TransitionEvaluator
-from toolkit.search.costs.delay import Delay
+from toolkit.search.costs.delay import Delay, Facing
 from toolkit.search.costs.edge_cost import EdgeCost
 from toolkit.search.judging import Judging, Tally
 from toolkit.search.moves.candidates import CandidateGenerator, mean_feet
@@ -72,6 +72,7 @@ def contact_graph(planner: ContactPlanner, evaluator: TransitionEvaluator) -> Co
     limbs = [limb for limb in PALMS if planner.config.palms and moves.has_palm_surfaces and limb in robot.arms]
     reader, reach = StateReader(moves.table, timings, scale), ReachCheck(moves, limbs, timings)
     cost = EdgeCost(strategy.cost, moves.table, timings, world.goal, way.distance, way.longest, scale=scale)
+    facing = Facing(way.distance, strategy.cost.heading, cost.per_metre, scale.length)
     parts = Parts(
         table=moves.table,
         reader=reader,
@@ -79,7 +80,7 @@ def contact_graph(planner: ContactPlanner, evaluator: TransitionEvaluator) -> Co
         judging=Judging(strategy.judge, reader, reach, tally, math.inf),
         lazy=strategy.lazy,
         cost=cost,
-        delay=Delay(Drift(robot, moves.table, timings), None, cost.per_metre),
+        delay=Delay(Drift(robot, moves.table, timings), facing, None, cost.per_metre),
         tally=tally,
         screen=SequenceScreen(moves, limbs),
     )

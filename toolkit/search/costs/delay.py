@@ -1,7 +1,8 @@
 """Delays: estimates by which states wait for others in the order of expansion. They reject nothing.
 
 A transition that is not yet judged waits longer, the more it would have to bend the motion
-(`toolkit.search.moves.drift`). Where feet slide and cannot brake, a motion that runs ahead of its feet waits as well.
+(`toolkit.search.moves.drift`). States that do not face the way ahead wait, so that robots turn while they walk. Where
+feet slide and cannot brake, a motion that runs ahead of its feet waits as well.
 
 The capture point c + v / w, w^2 = g / h, of an inverted pendulum is where the robot would have to step to come to rest.
 The farther it lies ahead of the foremost foot, the longer the next stride has to be, until no stride is long enough.
@@ -19,6 +20,8 @@ import numpy as np
 
 from toolkit.centroidal.problem import GRAVITY
 from toolkit.geometry.heading import wrapped
+from toolkit.search.costs.edge_cost import backwards
+from toolkit.search.costs.heuristic import Distance
 from toolkit.search.moves.candidates import Candidates
 from toolkit.search.moves.drift import Drift
 from toolkit.search.states.contact_table import ContactTable
@@ -28,6 +31,8 @@ from toolkit.search.states.contact_table import ContactTable
 _CAPTURE = 1.0  # per m that the capture point lies ahead of the foremost foot
 _EARLY = 0.8  # per m of v^2 / 2 a; with 1 or more nothing would be gained by going on
 _TURN = 0.5  # per rad between the feet's headings
+# That of states that do not face the way ahead:
+_FACE = 0.5  # per rad that is missing
 # Those of transitions that are not judged yet:
 _MISS = 4.0  # per m by which a transition would have to bend the motion
 
@@ -62,21 +67,49 @@ class Haste:
         return self._capture * np.maximum(capture, 0.0) + self._energy * square + self._turn * turn
 
 
+class Facing:
+    """Delays of states that do not face the way ahead: what turning, or else the rest of the way as it is, may cost.
+
+    Args:
+        distance: Distance to the goal.
+        heading: Cost of 1 m of way that is walked backwards.
+        per_metre: The search's h of 1 m of way.
+        scale: Factor on lengths.
+    """
+
+    def __init__(self, distance: Distance, heading: float, per_metre: float, scale: float = 1.0):
+        self._distance, self._heading = distance, heading
+        self._turn = scale * _FACE * per_metre
+
+    def delay(self, centre: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """(n,) delays of states with the mean of the feet at (n, 3) m and headings (n,) rad."""
+        delay = np.zeros(len(yaw))
+        if self._heading > 0.0 and len(yaw):
+            part = backwards(self._distance.ahead(centre, yaw) - yaw)
+            (rows,) = np.nonzero(part > 0.0)  # not where it is NaN
+            if len(rows):
+                going_on = self._heading * self._distance(centre[rows], yaw[rows])
+                delay[rows] = part[rows] * np.minimum(self._turn * np.pi / 2, going_on)
+        return delay
+
+
 class Delay:
     """Delays of the states of one search, in units of cost.
 
     Args:
         drift: Drift of the CoM.
+        facing: Delays of states that do not face the way ahead.
         haste: Delays of motions that run ahead of their feet; None: these do not wait.
         per_metre: The search's h of 1 m of way.
     """
 
-    def __init__(self, drift: Drift, haste: Haste | None, per_metre: float):
-        self._drift, self._haste, self._per_metre = drift, haste, per_metre
+    def __init__(self, drift: Drift, facing: Facing, haste: Haste | None, per_metre: float):
+        self._drift, self._facing, self._haste, self._per_metre = drift, facing, haste, per_metre
 
-    def of_states(self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """(n,) delays of states with contact numbers (n, 4), CoM (n, 3) m and velocity (n, 3) m/s."""
-        return np.zeros(len(contacts)) if self._haste is None else self._haste.delay(contacts, com, velocity)
+    def of_states(self, candidates: Candidates, com: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """(n,) delays of the states after n candidates, with CoM (n, 3) m and velocity (n, 3) m/s."""
+        delay = self._facing.delay(candidates.centre, candidates.yaw)
+        return delay if self._haste is None else delay + self._haste.delay(candidates.contacts, com, velocity)
 
     def of_waiting(
         self, contacts: np.ndarray, com: np.ndarray, velocity: np.ndarray, candidates: Candidates
@@ -86,4 +119,4 @@ class Delay:
         The n candidates lead out of contact numbers (4,) with the CoM (3,) m and its velocity (3,) m/s.
         """
         miss = self._drift.miss(contacts, com, velocity, candidates)
-        return self._per_metre * _MISS * miss
+        return self._facing.delay(candidates.centre, candidates.yaw) + self._per_metre * _MISS * miss

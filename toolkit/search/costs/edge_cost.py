@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toolkit.centroidal.sequence import CALM
+from toolkit.geometry.heading import wrapped
 from toolkit.geometry.limb import Limb
 from toolkit.robot.scale import USUAL, Scale
 from toolkit.search.costs.heuristic import Distance
@@ -43,6 +44,7 @@ class CostConfig:
             count where no way leads over resting ground.
         reserve: Part of its friction that resting leaves where a contact costs nothing.
         stagger: Cost per m that one foot is ahead of the other in the final stance.
+        heading: Cost per m of way that is walked backwards, or in part so (`backwards`).
     """
 
     step: float = 3.0
@@ -52,6 +54,7 @@ class CostConfig:
     steep: float = 200.0
     reserve: float = 0.5
     stagger: float = 5.0
+    heading: float = 60.0
 
     def where(self, *, slides: bool, paced: bool) -> CostConfig:
         """The weights of one run.
@@ -67,7 +70,7 @@ class CostConfig:
         """The weights with which a body of another size chooses the same plan in a world to scale.
 
         The cost of a way remains its length in m, so the others' go with the length. The objective is an integral over
-        time, and the stagger is a length itself.
+        time, and the stagger and the way that is walked backwards are lengths themselves.
         """
         if scale == USUAL:
             return self
@@ -95,10 +98,19 @@ class Terms(NamedTuple):
     time: np.ndarray
     steep: np.ndarray
     stagger: np.ndarray
+    heading: np.ndarray
+
+
+def backwards(angle: np.ndarray) -> np.ndarray:
+    """(...,) part of a way that counts as walked backwards, at an angle (...,) in rad from the heading.
+
+    None up to 45 degrees, half of it sideways, all of it beyond 135 degrees.
+    """
+    return np.clip(np.abs(wrapped(angle)) / (np.pi / 2) - 0.5, 0.0, 1.0)
 
 
 class TransitionCost:
-    """Costs of transitions: way + step + time * duration + steep + stagger, known at once, + dynamics * objective.
+    """Costs of transitions: way + step + time * duration + steep + stagger + heading, known at once, and dynamics.
 
     Args:
         config: Weights.
@@ -130,7 +142,8 @@ class TransitionCost:
         """Terms of the cost of transitions without their dynamics."""
         step = np.full(len(candidates), self._config.step)
         time = self.time * self._durations[candidates.timing]
-        return Terms(candidates.way, step, time, self._steep(candidates), self._stagger(candidates))
+        heading = self._config.heading * candidates.way * backwards(candidates.course - candidates.yaw)
+        return Terms(candidates.way, step, time, self._steep(candidates), self._stagger(candidates), heading)
 
     def known(self, candidates: Candidates) -> np.ndarray:
         """(n,) cost of transitions without their dynamics."""

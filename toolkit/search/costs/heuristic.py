@@ -7,9 +7,8 @@ lie above ground, a cell has one node for each height. Dijkstra runs once, from 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -32,11 +31,20 @@ from toolkit.search.moves.occupancy import BodyBox, Occupancy
 from toolkit.world.world import Goal
 
 _MAX_NODES = 1_600_000  # cells in XY times layers of yaw; cells are larger where the world would need more
+_FORESEEN = 3  # the way's heading is that over two to the power of this edges
 _OCTILE = 1.0 / 1.0823923  # largest ratio of 8-connected to straight distance, inverted: keeps the estimate low
 
 
-Distance = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""(n,) m to the goal region from the mean of the feet (n, 3) m with heading (n,) rad; inf where no way leads there."""
+class Distance(Protocol):
+    """How far the goal region is, and which way leads there."""
+
+    def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """(n,) m from the mean of the feet (n, 3) m with heading (n,) rad; inf where no way leads there."""
+        ...
+
+    def ahead(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """(n,) rad; heading of the way from the same places. NaN where there is none, or it is at its end."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,11 @@ class EuclideanDistance:
     def __call__(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """See `Distance`."""
         return np.maximum(np.hypot(*(position[:, :2] - self.goal.position[:2]).T) - self.goal.radius, 0.0)
+
+    def ahead(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """See `Distance`."""
+        x, y = (self.goal.position[:2] - position[:, :2]).T
+        return np.arctan2(y, x)
 
 
 class GridBody(NamedTuple):
@@ -127,6 +140,7 @@ class GridDistance:
         low = np.zeros(nodes.shape, np.bool_)
         count = number_nodes(levels, self._corner, cell, occupancy, body, nodes, low)
         self._distance = np.full(nodes.shape, np.inf, np.float64)
+        self._ahead = np.full(nodes.shape, np.nan, np.float32)
         middle = self._corner + cell * np.stack(np.meshgrid(*(np.arange(k) for k in shape), indexing="ij"), axis=-1)
         inside = np.hypot(*(middle - goal.position[:2]).transpose(2, 0, 1)) <= max(goal.radius, 0.75 * cell)
         targets = nodes[inside]
@@ -142,8 +156,12 @@ class GridDistance:
             from scipy.sparse.csgraph import dijkstra
 
             graph = csr_matrix((weight, end, start), shape=(count, count))
-            distance = dijkstra(graph, directed=True, indices=targets, min_only=True)
-            self._distance[nodes >= 0] = distance[nodes[nodes >= 0]]
+            distance, before, _ = dijkstra(
+                graph, directed=True, indices=targets, min_only=True, return_predecessors=True
+            )
+            used = nodes >= 0  # in the order of their numbers
+            self._distance[used] = distance
+            self._ahead[used] = _directions(before, np.argwhere(used)[:, :2])
 
     def _grounds(self, projector: Projector, footholds: Footholds, shape: np.ndarray) -> np.ndarray:
         """(nx, ny, 4) float heights of ground in each cell, -inf where there is none."""
@@ -216,3 +234,23 @@ class GridDistance:
         query(position, yaw, self._corner, self._cell, self._height, self._distance, self._near, grid)
         straight = np.hypot(*(position[:, :2] - self._goal.position[:2]).T) - self._goal.radius
         return np.maximum(np.maximum(grid * _OCTILE - 0.5 * self._cell, straight), 0.0)
+
+    def ahead(self, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """See `Distance`; the mean over the next half metre or so of a body of the usual size."""
+        cells, yaws = np.array(self._height.shape[:2]), self._ahead.shape[-1]
+        i, j = np.clip(np.rint((position[:, :2] - self._corner) / self._cell).astype(int), 0, cells - 1).T
+        level = np.abs(self._height[i, j] - position[:, 2:]).argmin(1)
+        layer = np.rint(yaw / np.pi * yaws).astype(int) % yaws
+        return self._ahead[i, j, level, layer].astype(float)
+
+
+def _directions(before: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """(n,) rad; headings of the ways from nodes of a grid to the goal over the next few edges, NaN at their ends.
+
+    The next node on the way from each one is given by (n,), negative at the goal, and the cells by (n, 2).
+    """
+    later = np.where(before < 0, np.arange(len(before)), before)
+    for _ in range(_FORESEEN):
+        later = later[later]
+    x, y = (cells[later] - cells).T
+    return np.where((x == 0) & (y == 0), np.nan, np.arctan2(y, x))

@@ -17,7 +17,7 @@ from toolkit.contacts.sequence import ContactSequence
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.robot.scale import USUAL, Scale
-from toolkit.search.costs.edge_cost import CostConfig, TransitionCost
+from toolkit.search.costs.edge_cost import CostConfig, Terms, TransitionCost
 from toolkit.search.moves.candidates import Candidates
 from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
@@ -34,6 +34,7 @@ class PlanCost:
         time: Of the seconds, rests included.
         steep: Of contacts that leave little friction.
         stagger: Of one foot ahead of the other in the end.
+        heading: Of the way that is walked backwards.
         dynamics: Of the objective of the motion.
         seconds: s; length of the plan, rests included.
         objective: J of the motion with the weights of its problem; inf where the motion is infeasible.
@@ -44,6 +45,7 @@ class PlanCost:
     time: float
     steep: float
     stagger: float
+    heading: float
     dynamics: float
     seconds: float
     objective: float
@@ -56,7 +58,7 @@ class PlanCost:
     @property
     def terms(self) -> dict[str, float]:
         """The terms by name, which add up to the true cost."""
-        return {name: getattr(self, name) for name in ("way", "step", "time", "steep", "stagger", "dynamics")}
+        return {name: getattr(self, name) for name in (*Terms._fields, "dynamics")}
 
 
 def plan_cost(plan: MotionPlan, config: CostConfig) -> PlanCost:
@@ -67,15 +69,11 @@ def plan_cost(plan: MotionPlan, config: CostConfig) -> PlanCost:
         config: Weights of the run (`CostConfig.where`).
     """
     cost, candidates = _transitions(plan.sequence, plan.world.goal, config, plan.robot.scale)
-    way, step, time, steep, stagger = (float(term.sum()) for term in cost.terms(candidates))
+    known = {name: float(term.sum()) for name, term in cost.terms(candidates)._asdict().items()}
     rest = plan.schedule.duration - plan.sequence.duration
     feasible = plan.motion.feasible
     return PlanCost(
-        way=way,
-        step=step,
-        time=time + cost.time * rest,
-        steep=steep,
-        stagger=stagger,
+        **{**known, "time": known["time"] + cost.time * rest},
         dynamics=cost.dynamics * plan.motion.objective if feasible else np.inf,
         seconds=plan.schedule.duration,
         objective=plan.motion.objective if feasible else np.inf,

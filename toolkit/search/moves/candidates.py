@@ -30,6 +30,7 @@ class Candidates:
         centre: (n, 3) m; mean of the feet afterwards.
         yaw: (n,) rad; heading of the mean of the feet afterwards.
         way: (n,) m; distance that the mean of the feet moves in XY.
+        course: (n,) rad; direction in which it moves.
         timing: (n,) int; index of the timing.
     """
 
@@ -39,6 +40,7 @@ class Candidates:
     centre: np.ndarray
     yaw: np.ndarray
     way: np.ndarray
+    course: np.ndarray
     timing: np.ndarray
 
     @classmethod
@@ -47,8 +49,10 @@ class Candidates:
     ) -> Candidates:
         """Transitions of limbs (n,) from contact numbers (n, 4) to (n, 4), with timings (n,) by index."""
         centre, yaw = mean_feet(table, after)
-        way = np.hypot(*(centre - mean_feet(table, before)[0])[:, :2].T)
-        return cls(limb, after[np.arange(len(limb)), limb], after, centre, yaw, way, timing)
+        x, y = (centre - mean_feet(table, before)[0])[:, :2].T
+        return cls(
+            limb, after[np.arange(len(limb)), limb], after, centre, yaw, np.hypot(x, y), np.arctan2(y, x), timing
+        )
 
     def __len__(self) -> int:
         return len(self.limb)
