@@ -75,6 +75,15 @@ def test_walks_on_flat_ground(robot):
     assert all(abs(stance[limb].pose.yaw) < 0.6 for stance in last.stances for limb in FEET)
 
 
+@pytest.mark.parametrize(("x", "turns"), [(-5.0, True), (-0.5, False)])
+def test_robots_turn_to_goals_far_behind_them(robot, x, turns):
+    world = make_world(box([-2.0, 0, -0.05], [4.0, 2.0, 0.05]), goal=(x, 0, 0))
+    result = plan(robot, world)
+    check(robot, world, result)
+    final = result.solutions[-1].sequence.stances[-1].mean_feet
+    assert (abs(final.yaw) > 2.0) if turns else (abs(final.yaw) < 0.8)
+
+
 def test_start_stance_is_the_home_stance(robot):
     world = make_world(FLOOR, start=(0.3, -0.2, 0.1), goal=(1.5, 0, 0))
     stance = ContactPlanner(robot, world, KinematicEvaluator(robot)).ground.start_stance()

@@ -20,7 +20,7 @@ import numpy as np
 
 from toolkit.centroidal.problem import GRAVITY
 from toolkit.geometry.heading import wrapped
-from toolkit.search.costs.edge_cost import backwards
+from toolkit.search.costs.edge_cost import FORWARD, backwards
 from toolkit.search.costs.heuristic import Distance
 from toolkit.search.moves.candidates import Candidates
 from toolkit.search.moves.drift import Drift
@@ -32,7 +32,7 @@ _CAPTURE = 1.0  # per m that the capture point lies ahead of the foremost foot
 _EARLY = 0.8  # per m of v^2 / 2 a; with 1 or more nothing would be gained by going on
 _TURN = 0.5  # per rad between the feet's headings
 # That of states that do not face the way ahead:
-_FACE = 0.5  # per rad that is missing
+_FACE = 1.0  # per rad that is missing
 # Those of transitions that are not judged yet:
 _MISS = 4.0  # per m by which a transition would have to bend the motion
 
@@ -85,11 +85,11 @@ class Facing:
         """(n,) delays of states with the mean of the feet at (n, 3) m and headings (n,) rad."""
         delay = np.zeros(len(yaw))
         if self._heading > 0.0 and len(yaw):
-            part = backwards(self._distance.ahead(centre, yaw) - yaw)
-            (rows,) = np.nonzero(part > 0.0)  # not where it is NaN
+            angle = np.abs(wrapped(self._distance.ahead(centre, yaw) - yaw))
+            (rows,) = np.nonzero(angle > FORWARD)  # not where it is NaN
             if len(rows):
-                going_on = self._heading * self._distance(centre[rows], yaw[rows])
-                delay[rows] = part[rows] * np.minimum(self._turn * np.pi / 2, going_on)
+                going_on = self._heading * backwards(angle[rows]) * self._distance(centre[rows], yaw[rows])
+                delay[rows] = np.minimum(self._turn * (angle[rows] - FORWARD), going_on)
         return delay
 
 

@@ -22,6 +22,9 @@ from toolkit.search.states.contact_table import ContactTable
 from toolkit.world.timing import Timing
 from toolkit.world.world import Goal
 
+FORWARD = np.pi / 4
+"""Angle in rad between the heading and the way up to which a robot walks forwards."""
+
 _LEAST_RESERVE = 0.15  # part of the friction; a contact that leaves less costs no more than one that leaves so much
 _SURE = 0.98  # part of the least momentum's cost that is counted: the objective takes it at the ends of steps
 _LEAN = 0.3  # m for a body of the usual size; by so much less than the mean of the feet the CoM may move
@@ -106,7 +109,7 @@ def backwards(angle: np.ndarray) -> np.ndarray:
 
     None up to 45 degrees, half of it sideways, all of it beyond 135 degrees.
     """
-    return np.clip(np.abs(wrapped(angle)) / (np.pi / 2) - 0.5, 0.0, 1.0)
+    return np.clip((np.abs(wrapped(angle)) - FORWARD) / (np.pi - 2 * FORWARD), 0.0, 1.0)
 
 
 class TransitionCost:
