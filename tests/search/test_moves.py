@@ -1,7 +1,9 @@
 import numpy as np
 
 from tests.search.worlds import FLOOR, box, corridor, make_world
+from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
+from toolkit.geometry.pose import Pose
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig
@@ -54,6 +56,20 @@ def test_swings_do_not_cross_the_stance_leg():
     feet = screen.Sole(old, turn, 0.0), screen.Sole(stand, turn, 0.0)
     screen.screen_swings(new, np.zeros(4), *feet, half, 2.0, 0.04, 0.1, codes)
     assert codes.tolist() == [0, Reason.CROSSES, Reason.STILL, Reason.FAST]
+
+
+def test_legs_do_not_pass_through_each_other_where_soles_have_room(robot):
+    """A right foot that goes from behind the left one to its left; soles keep apart, but shins do not."""
+    moves = ContactPlanner(robot, make_world(FLOOR), KinematicEvaluator(robot)).ground.moves()
+
+    def sole(limb, x, y, yaw):
+        return moves.table.add_contact(Contact(limb, Pose.from_yaw(np.array([x, y, 0.0]), yaw), 0, 1.0))
+
+    stand = sole(Limb.LEFT_FOOT, 0.0, 0.0, 0.0)
+    crossing = sole(Limb.RIGHT_FOOT, -0.51, 0.21, -0.77), sole(Limb.RIGHT_FOOT, 0.28, 0.2, 0.0)
+    passing = sole(Limb.RIGHT_FOOT, -0.35, -0.2, 0.0), sole(Limb.RIGHT_FOOT, 0.35, -0.2, 0.0)
+    for (old, new), code in ((crossing, Reason.KNEES), (passing, Reason.NONE)):
+        assert moves.swings(Limb.RIGHT_FOOT, np.array([new]), old, stand, 2.0).tolist() == [code]
 
 
 def test_rectangles_overlap_like_polygons():

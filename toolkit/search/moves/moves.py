@@ -32,6 +32,7 @@ from toolkit.search.moves.screen import (
     StepLimits,
     screen_midway,
     screen_palms,
+    screen_passing,
     screen_steps,
     screen_swings,
 )
@@ -44,6 +45,7 @@ _WALL = (0.4, 0.6)  # m above the soles; see `StepLimits`
 _PALM_SIDE = 0.15  # m; least distance of a palm to the side of the body's middle
 _PALM_ANGLE = np.radians(65.0)  # largest angle between the arm and the surface's normal
 _PALM_MARGIN = 0.04  # m inside the arm's reach
+_LIFT = 0.08  # m; see `StepLimits`
 _STILL, _STILL_YAW = 0.04, np.radians(10.0)  # m, rad; a foot that would move less does not move
 
 
@@ -106,6 +108,7 @@ class MoveGenerator:
             drops=drops(robot),
             wall_bottom=self._scale * _WALL[0],
             wall_top=self._scale * _WALL[1],
+            lift=self._scale * _LIFT,
         )
         self._steps: dict[tuple, Moves] = {}
         self._palms: dict[tuple, Moves] = {}
@@ -159,11 +162,12 @@ class MoveGenerator:
         return Sole(table.position[number], table.rotation[number], float(table.yaw[number]))
 
     def swings(self, limb: Limb, numbers: np.ndarray, old: int, standing: int, longest: float) -> np.ndarray:
-        """Codes (n,) of the ways of a foot from `old` to each new place; see `screen_swings` and `screen_midway`."""
+        """Codes (n,) of the ways of a foot from `old` to each new place; see `screen_swings`, `_midway`, `_passing`."""
         table, codes = self.table, np.empty(len(numbers), np.int64)
         places, feet = (table.position[numbers], table.yaw[numbers]), (self._sole(old), self._sole(standing))
         screen_swings(*places, *feet, self._limits.half, longest, self._scale * _STILL, _STILL_YAW, codes)
         screen_midway(*places, *feet, self._limits, self._body, codes)
+        screen_passing(int(limb), *places, *feet, self._limits, self._body, codes)
         return codes
 
     def palms(self, limb: Limb, left: int, right: int) -> Moves:

@@ -67,6 +67,7 @@ class StepLimits(NamedTuple):
         com_height: Height in m of the CoM above the mean of the soles, standing straight.
         drops: (k,) m by which the CoM may be lower.
         wall_bottom, wall_top: m above the soles; what is there stops a foot, however high it is lifted.
+        lift: m above the straight way at which a foot passes the other one.
     """
 
     half: np.ndarray
@@ -75,6 +76,7 @@ class StepLimits(NamedTuple):
     drops: np.ndarray
     wall_bottom: float
     wall_top: float
+    lift: float
 
 
 @compiled
@@ -206,6 +208,51 @@ def screen_midway(position, yaw, old, stand, limits, body, codes):
                 x, y = p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])
                 if codes[row] == 0 and not body_free(body.occupancy, foot, x, y, z, old.yaw + t * turn):
                     codes[row] = Reason.SHANK
+
+
+@compiled
+def _legs_pass(body, limits, side, position, rotation, stand, heading):
+    """Whether the legs keep apart with a foot in the air and the other standing, under any allowed CoM that both reach.
+
+    Also where they reach under none, which is for others to say.
+    """
+    p, q = position, stand.position
+    x, y, z = (p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] - limits.lift + q[2]) / 2 + limits.com_height
+    reached = False
+    for m in range(len(SHIFTS)):
+        cx, cy = x + SHIFTS[m] * (p[0] - q[0]), y + SHIFTS[m] * (p[1] - q[1])
+        for k in range(len(limits.drops)):
+            com = (cx, cy, z - limits.drops[k])
+            broken, swinging = reach(body.legs, side, com, heading, p, rotation)
+            if broken == 0:
+                broken, standing = reach(body.legs, 1 - side, com, heading, q, stand.rotation)
+                if broken == 0:
+                    if legs_apart(body.shanks, swinging, standing):
+                        return True
+                    reached = True
+    return not reached
+
+
+@compiled(kept=True, allocates=True)
+def screen_passing(side, position, yaw, old, stand, limits, body, codes):
+    """Fill codes (n,) int of those swings that have passed `screen_midway`: do the legs keep apart on the way?
+
+    The foot of a side (0 left, 1 right) is looked at on the straight way, lifted and level.
+    """
+    p, rotation = old.position, np.zeros((3, 3))
+    rotation[2, 2] = 1.0
+    for row in range(len(yaw)):
+        turn = wrapped(yaw[row] - old.yaw)
+        for k in range(1, 4):
+            if codes[row] == 0:
+                angle = old.yaw + k / 4.0 * turn
+                place = p + k / 4.0 * (position[row] - p)
+                place[2] += limits.lift * np.sin(np.pi * k / 4.0)
+                rotation[0, 0] = rotation[1, 1] = np.cos(angle)
+                rotation[1, 0] = np.sin(angle)
+                rotation[0, 1] = -rotation[1, 0]
+                if not _legs_pass(body, limits, side, place, rotation, stand, mean_heading(angle, stand.yaw)):
+                    codes[row] = Reason.KNEES
 
 
 def screen_palms(
