@@ -92,10 +92,10 @@ def test_the_objective_with_other_weights_is_that_of_the_same_motion(plan):
     assert 0.0 < paper < plan.motion.objective  # the paper's weights of the angular momentum are smaller
 
 
-def test_steep_ground_costs_nothing_where_no_way_avoids_it():
+def test_steep_ground_and_heading_cost_nothing_where_no_way_leads_over_resting_ground():
     config = CostConfig()
     assert config.where(slides=False, paced=False) == config
-    assert config.where(slides=True, paced=False) == replace(config, steep=0.0)
+    assert config.where(slides=True, paced=False) == replace(config, steep=0.0, heading=0.0)
 
 
 def test_a_second_costs_more_where_the_pace_is_the_planners_to_choose():

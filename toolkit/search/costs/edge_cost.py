@@ -47,7 +47,8 @@ class CostConfig:
             count where no way leads over resting ground.
         reserve: Part of its friction that resting leaves where a contact costs nothing.
         stagger: Cost per m that one foot is ahead of the other in the final stance.
-        heading: Cost per m of way that is walked backwards, or in part so (`backwards`).
+        heading: Cost per m of way that is walked backwards, or in part so (`backwards`). Like `steep`, it does not count
+            where no way leads over resting ground, on which a body turns as sliding asks it to.
     """
 
     step: float = 3.0
@@ -66,8 +67,8 @@ class CostConfig:
             slides: Whether no way leads over resting ground alone.
             paced: Whether the planner chooses the timing.
         """
-        steep, time = 0.0 if slides else self.steep, self.pace if paced else self.time
-        return replace(self, steep=steep, time=time)
+        weights = replace(self, time=self.pace if paced else self.time)
+        return replace(weights, steep=0.0, heading=0.0) if slides else weights
 
     def scaled(self, scale: Scale) -> CostConfig:
         """The weights with which a body of another size chooses the same plan in a world to scale.
