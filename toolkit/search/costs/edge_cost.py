@@ -47,8 +47,8 @@ class CostConfig:
             count where no way leads over resting ground.
         reserve: Part of its friction that resting leaves where a contact costs nothing.
         stagger: Cost per m that one foot is ahead of the other in the final stance.
-        heading: Cost per m of way that is walked backwards, or in part so (`backwards`). Like `steep`, it does not count
-            where no way leads over resting ground, on which a body turns as sliding asks it to.
+        heading: Cost per m of way that is walked backwards, or in part so (`backwards`). It does not count either where
+            no way leads over resting ground, on which a body turns as sliding asks it to.
     """
 
     step: float = 3.0
