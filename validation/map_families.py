@@ -13,9 +13,10 @@ from scipy.stats import qmc
 from toolkit.world.loader import load_world
 from toolkit.world.world import World
 from validation import map_worlds
+from validation.map_courses import course
 from validation.map_worlds import BELOW, FRICTION
 
-QUICK = 63  # worlds of a quick sweep
+QUICK = 66  # worlds of a quick sweep
 SEEDS = 3  # of each value of a whole sweep
 
 _EVEN, _DRAWN = 21, 30  # values of a family with one parameter, and with two
@@ -197,5 +198,6 @@ FAMILIES: dict[str, Family] = {
         Family("mesh_ground", _height(0.0, 0.08), map_worlds.mesh_ground),
         Family("field_ground", _height(0.0, 0.08), map_worlds.field_ground),
         Family("hills", _height(0.0, 0.12), map_worlds.hills),
+        Family("course", (Axis("turn", "turns of [deg]", 0.0, 90.0),), course),
     )
 }
