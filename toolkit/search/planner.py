@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -134,7 +135,8 @@ class ContactPlanner:
             self.config, self._evaluator, way.length, slides=way.slides, paced=self.paced, scale=scale
         )
         blame = Blame(exclusions, _STRIKES, scale=scale)
-        parts = self._parts(way, strategy, timings, tally, blame.exclusions, palms, time.perf_counter() + time_limit)
+        deadline = time.perf_counter() + time_limit
+        parts = self.parts(way, strategy, timings, tally, blame.exclusions, palms=palms, deadline=deadline)
         state = parts.reader.at_rest(start, com)
         settings, paces = replace(strategy.search, unit=parts.cost.unit), self._paces_after(calmer, slides=way.slides)
         if paces or way.slides:  # a calmer search follows, or the strategy has extended the limit
@@ -162,17 +164,28 @@ class ContactPlanner:
         still = [ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], timing) for timing in timings[:1]]
         self._evaluator.evaluate(start, com, np.zeros(3), still)
 
-    def _parts(
+    def parts(
         self,
         way: Way,
         strategy: Strategy,
         timings: tuple[Timing, ...],
         tally: Tally,
-        exclusions: Sequence[Exclusion],
-        palms: bool,
-        deadline: float,
+        exclusions: Sequence[Exclusion] = (),
+        *,
+        palms: bool = True,
+        deadline: float = math.inf,
     ) -> Parts:
-        """The parts of the graphs of one search."""
+        """The parts of the graphs of one search, from which other searches than ANA* can be made.
+
+        Args:
+            way: The way to the goal.
+            strategy: How to search, and the judge of transitions.
+            timings: Timings to choose from.
+            tally: Counts the rejections.
+            exclusions: Transitions to avoid.
+            palms: Whether palms may be used, where `config.palms` allows them at all.
+            deadline: `time.perf_counter()` after which the judge is not asked any more.
+        """
         moves = self.ground.moves(way)
         table, palms = moves.table, palms and self.config.palms and moves.has_palm_surfaces
         limbs = [limb for limb in PALMS if palms and limb in self.robot.arms]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,18 +9,11 @@ from typing import Any
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.geometry.limb import PALMS
 from toolkit.prediction.evaluator import TransitionEvaluator
-from toolkit.search.costs.delay import Delay, Facing
-from toolkit.search.costs.edge_cost import EdgeCost
-from toolkit.search.judging import Judging, Tally
-from toolkit.search.moves.candidates import CandidateGenerator, mean_feet
-from toolkit.search.moves.drift import Drift
-from toolkit.search.moves.reach_check import ReachCheck
+from toolkit.search.judging import Tally
+from toolkit.search.moves.candidates import mean_feet
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.problem import ContactProblem, Parts
-from toolkit.search.sequence_screen import SequenceScreen
-from toolkit.search.states.reader import StateReader
 from toolkit.search.states.state import CONTACTS, is_pending, unpack, unpack_all
 from toolkit.search.strategies import strategy_of
 
@@ -61,32 +53,15 @@ def contact_graph(planner: ContactPlanner, evaluator: TransitionEvaluator) -> Co
     Raises:
         PlanningError: The robot cannot stand at the start, or nothing leads to the goal.
     """
-    ground, world, robot = planner.ground, planner.world, planner.robot
+    ground, robot = planner.ground, planner.robot
     start = ground.start_stance()
     way = ground.way(start)
-    timings, tally = planner.timings(slides=way.slides), Tally()
-    scale = robot.scale
-    slides, paced = way.slides, planner.paced
-    strategy = strategy_of(planner.config, evaluator, way.length, slides=slides, paced=paced, scale=scale.length)
-    moves = ground.moves(way)
-    limbs = [limb for limb in PALMS if planner.config.palms and moves.has_palm_surfaces and limb in robot.arms]
-    reader, reach = StateReader(moves.table, timings, scale), ReachCheck(moves, limbs, timings)
-    cost = EdgeCost(strategy.cost, moves.table, timings, world.goal, way.distance, way.longest, scale=scale)
-    facing = Facing(way.distance, strategy.cost.heading, cost.per_metre, scale.length)
-    parts = Parts(
-        table=moves.table,
-        reader=reader,
-        candidates=CandidateGenerator(moves, limbs, timings, (), tally.rejected),
-        judging=Judging(strategy.judge, reader, reach, tally, math.inf),
-        lazy=strategy.lazy,
-        cost=cost,
-        delay=Delay(Drift(robot, moves.table, timings), facing, None, cost.per_metre),
-        tally=tally,
-        screen=SequenceScreen(moves, limbs),
-    )
+    slides, paced, scale = way.slides, planner.paced, robot.scale.length
+    strategy = strategy_of(planner.config, evaluator, way.length, slides=slides, paced=paced, scale=scale)
+    parts = planner.parts(way, strategy, planner.timings(slides=slides), Tally())
     com = start.mean_feet.position + np.array([0.0, 0.0, robot.com_height])
-    problem = ContactProblem(parts, reader.at_rest(start, com))
-    return ContactGraph(problem, parts, _box(planner), world.goal.position[:2])
+    problem = ContactProblem(parts, parts.reader.at_rest(start, com))
+    return ContactGraph(problem, parts, _box(planner), planner.world.goal.position[:2])
 
 
 def _box(planner: ContactPlanner) -> np.ndarray:
