@@ -32,7 +32,7 @@ _CAPTURE = 1.0  # per m that the capture point lies ahead of the foremost foot
 _EARLY = 0.8  # per m of v^2 / 2 a; with 1 or more nothing would be gained by going on
 _TURN = 0.5  # per rad between the feet's headings
 # That of states that do not face the way ahead:
-_FACE = 1.0  # per rad that is missing
+_FACE = 0.5  # per rad that is missing
 # Those of transitions that are not judged yet:
 _MISS = 4.0  # per m by which a transition would have to bend the motion
 
