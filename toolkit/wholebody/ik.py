@@ -169,7 +169,6 @@ class WholeBodyIK:
         """
         angles, upright = self.joints, np.array(self.base.R_world_frame)
         self._set_targets(time, paths, motion)
-        self._set_ranges(angles, [arm for arm in self.arm_joints if paths.authority(arm, time) == 0.0])
         step = self._ease * (self._posture(time, angles, paths, motion) - angles)
         step = (step + weights.INERTIA * self.last_step) / (1.0 + weights.INERTIA)
         targets = dict(zip(self.robot.joint_names, angles + step, strict=True))
@@ -182,7 +181,9 @@ class WholeBodyIK:
         self.steady.R_world_frame = self.wrapper.get_T_world_frame(self.robot.base)[:3, :3] @ rotation_exponential(turn)
         swinging = next((foot for foot in FEET if paths.segment(foot, time).path is not None), None)
         standing = self._standing(time, paths)
-        self._set_dampers(before, angles, time, paths, standing)
+        pushed = self._set_dampers(before, angles, time, paths, standing)
+        free = [arm for arm in self.arm_joints if paths.authority(arm, time) == 0.0]
+        self._set_ranges(angles, free, pushed)
         self._solve(time)
         self._spare_motors(time, before, motion, swinging, standing)
         self.drift, self.last_step = self._motion(before), self.joints - angles
@@ -273,13 +274,13 @@ class WholeBodyIK:
 
     def _set_dampers(
         self, qpos: np.ndarray, angles: np.ndarray, time: float, paths: LimbPaths, standing: Limb | None
-    ) -> None:
-        """Keep all links clear of the world and of each other."""
+    ) -> set[Limb]:
+        """Keep all links clear of the world and of each other; returns the arms that have to give way now."""
         if self.dampers is not None:
             self.solver.remove_constraint(self.dampers)  # pyright: ignore[reportArgumentType]
             self.dampers = None
         if self.avoidance is None:
-            return
+            return set()
         reaching = {palm for palm in self.palms if paths.authority(palm, time) > 0.0}
         found = self.avoidance.dampers(qpos, self.drift, self.tick, reaching, standing)
         if self.ahead is not None:
@@ -290,6 +291,8 @@ class WholeBodyIK:
             bound = share * (found.bound + found.matrix @ angles)
             self.dampers = self.solver.add_joint_space_half_spaces_constraint(matrix, bound)
             self.dampers.configure("dampers", "soft", 1.0)
+        pushed = found.matrix[found.bound < 0.0]
+        return {arm for arm, joints in self.arm_joints.items() if pushed[:, joints].any()}
 
     def _spare_motors(
         self, time: float, before: np.ndarray, motion: CentroidalMotion, swinging: Limb | None, standing: Limb | None
@@ -323,15 +326,17 @@ class WholeBodyIK:
         mujoco.mj_differentiatePos(self.robot.mujoco_model, change, 1.0, before, after)
         return change
 
-    def _set_ranges(self, angles: np.ndarray, free: list[Limb]) -> None:
+    def _set_ranges(self, angles: np.ndarray, free: list[Limb], pushed: set[Limb]) -> None:
         """Set the ranges of this tick, whose ends joints approach ever more slowly.
 
-        They are narrow for arms that hang free: the momentum task alone would swing them wider than people do.
+        They are narrow for arms that hang free: the momentum task alone would swing them wider than people do. Arms that
+        have to give way may go farther.
         """
         lower, upper = self.lower.copy(), self.upper.copy()
         share = np.full(len(angles), min(weights.RANGE_RATE * self.tick / self.pace, 1.0))
-        for joints in (self.arm_joints[arm] for arm in free):
-            home, swing = self.robot.home[7:][joints], weights.ARM_SWING
+        for arm in free:
+            joints = self.arm_joints[arm]
+            home, swing = self.robot.home[7:][joints], weights.GIVING_WAY if arm in pushed else weights.ARM_SWING
             lower[joints] = np.maximum(lower[joints], np.minimum(home - swing, angles[joints]))
             upper[joints] = np.minimum(upper[joints], np.maximum(home + swing, angles[joints]))
             share[joints] = min(weights.SWING_RATE * self.tick / self.pace, 1.0)

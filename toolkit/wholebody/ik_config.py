@@ -35,6 +35,7 @@ EASING = 3  # most solutions of a quadratic program whose motion asks motors for
 SETTLE = 200  # most iterations for the first sample
 RANGE_RATE = 25.0  # 1/s; how fast a joint may approach the end of its range, per rad of distance
 ARM_SWING = 0.6  # rad; a free arm's joints stay this close to the home posture, or come no farther away
+GIVING_WAY = 1.0  # rad; the same for arms that have to give way
 SWING_RATE = 10.0  # 1/s; the same as RANGE_RATE for that range: an arm that runs into its ends has to brake
 VELOCITY_FRACTION = 0.95  # share of the joint velocity limits that may be used
 RANGE_MARGIN = 0.02  # rad; kept from each end of a joint's range
