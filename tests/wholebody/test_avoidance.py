@@ -11,6 +11,8 @@ from toolkit.robot.near_pairs import near_boxes
 from toolkit.wholebody.avoidance import ARM, BODY, Avoidance
 from toolkit.wholebody.check import check
 from toolkit.wholebody.collision import first_collision
+from toolkit.wholebody.ik import WholeBodyIK
+from toolkit.wholebody.ik_config import ARM_SWING, GIVING_WAY
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import solve_ik
 from toolkit.world.scene import compose_scene
@@ -168,6 +170,26 @@ def test_arms_are_drawn_in_beside_a_wall(robot, flat_walk, hand):
     assert hit is not None and "world/wall" in hit.reason
     drawn_in = solve_ik(robot, paths, flat_walk.motion, times, scene)
     assert first_collision(robot, scene, times, drawn_in) is None
+
+
+def test_arms_that_something_pushes_have_a_wider_range(robot, flat_walk):
+    """A wall that the left hand touches: that arm may go farther from home than the one that hangs free."""
+    scene = compose_scene(robot, side_wall(outermost(robot, robot.home)))
+    paths = limb_paths(robot, flat_walk.world, flat_walk.schedule, flat_walk.motion)
+    ik, angles, left = WholeBodyIK(robot, TICK, Avoidance(robot, scene)), robot.home[7:], Limb.LEFT_PALM
+    ik.drift = np.zeros(len(robot.home) - 1)
+    pushed = ik._set_dampers(robot.home, angles, 0.0, paths, Limb.LEFT_FOOT)
+    assert pushed == {left}
+    elbow = [int(robot.arm_sides[palm][np.argmax(np.minimum(*_room(robot, palm)))]) for palm in PALMS]
+    ik._set_ranges(angles, list(PALMS), pushed)
+    wide, narrow = (np.diff(ik.wrapper.get_joint_limits(robot.joint_names[joint]))[0] for joint in elbow)
+    assert wide == pytest.approx(narrow * GIVING_WAY / ARM_SWING)
+
+
+def _room(robot, palm):
+    """rad from home to both ends of an arm's joints."""
+    joints = robot.arm_sides[palm]
+    return robot.home[7:][joints] - robot.lower[joints], robot.upper[joints] - robot.home[7:][joints]
 
 
 def test_motions_begin_with_arms_clear_of_a_wall(robot):

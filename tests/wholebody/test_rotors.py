@@ -15,7 +15,7 @@ def test_heavy_rotors_come_to_the_end_of_a_range_more_slowly(robot):
 
     def room(one):
         ik = WholeBodyIK(one, 0.01)
-        ik._set_ranges(one.home[7:], [])
+        ik._set_ranges(one.home[7:], [], set())
         low, high = ik.wrapper.get_joint_limits(one.joint_names[knee])
         return np.array([one.home[7 + knee] - low, high - one.home[7 + knee]])
 

@@ -329,8 +329,8 @@ class WholeBodyIK:
     def _set_ranges(self, angles: np.ndarray, free: list[Limb], pushed: set[Limb]) -> None:
         """Set the ranges of this tick, whose ends joints approach ever more slowly.
 
-        They are narrow for arms that hang free: the momentum task alone would swing them wider than people do. Arms that
-        have to give way may go farther.
+        They are narrow for arms that hang free, which the momentum task alone would swing wider than people do, and
+        wider for those that something pushes.
         """
         lower, upper = self.lower.copy(), self.upper.copy()
         share = np.full(len(angles), min(weights.RANGE_RATE * self.tick / self.pace, 1.0))
