@@ -18,7 +18,8 @@ Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 # Lengths and speeds are those of a body of the usual size (`toolkit.robot.scale`).
 SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
 THICKNESS = 0.08  # m; height of the swept box above the patch, to hold the foot or the hand
-SPACING = 0.03  # m; largest way between two poses that are checked: less than the swept box is wide
+SPACING = 0.01  # m; largest way between two poses that are checked, so that none passes an edge unseen
+NEAR = 0.4  # m per m of way along a surface; the least padding below that grows with the distance from a contact
 
 RAISE_STEP, MAX_RAISE = 0.03, 0.36  # m; a path is raised in these steps until it is clear, at most by MAX_RAISE
 EASY_RAISE = 0.04  # m; paths raised by more than that are first tried with the steep timing
@@ -212,8 +213,9 @@ def _swept_boxes(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres (k, 3), rotations (k, 3, 3), half sizes (k, 3) of the patch, thickened and padded, along a path.
 
-    The padding below shrinks with the height of the patch's lowest edge above the surfaces at the ends. The padding at
-    the sides starts from what is free there and grows with the distance.
+    The padding below shrinks with the height of the patch's lowest edge above the surfaces at the ends, but only near
+    the contacts: the edge of a stair in front of its landing point is as high. The padding at the sides starts from
+    what is free there and grows with the distance.
     """
     length = sum(np.linalg.norm(move.vector) for move in path.moves)
     thickness, skin, spacing = (task.scale.length * each for each in (THICKNESS, SKIN, SPACING))
@@ -231,7 +233,7 @@ def _swept_boxes(
         height = way @ pose.normal
         along = np.linalg.norm(way - height[:, None] * pose.normal, axis=1)
         lowest = height - np.abs(np.einsum("kij,i->kj", rotations[:, :, :2], pose.normal)) @ task.half_size
-        below[half_of_swing] = np.minimum(below, 0.5 * lowest)[half_of_swing]
+        below[half_of_swing] = np.minimum(below, np.maximum(0.5 * lowest, NEAR * along))[half_of_swing]
         aside[half_of_swing] = np.minimum(aside, side + along)[half_of_swing]
     below = np.maximum(below, 0.0)
     half = np.empty((count, 3))
