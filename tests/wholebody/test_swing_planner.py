@@ -56,6 +56,22 @@ def test_path_clears_the_edge_of_a_step():
     assert lowest_over(path, HALF, (FIRST, FIRST + 0.02)) > RISE + 0.5 * MARGIN
 
 
+@pytest.mark.parametrize("nose", [0.466, 0.5])
+@pytest.mark.parametrize("beyond", [0.13, 0.155, 0.18])
+def test_a_fast_foot_clears_the_nose_of_the_stair_that_it_lands_on(nose, beyond):
+    """Two stairs in 0.3 s: the nose is as high as the landing point, and passed at 4 m/s."""
+    tread, depth = 0.2, 0.155
+    low = f'<geom type="box" size="{depth} 1 {tread / 4}" pos="{nose - depth} 0 {tread / 4}"/>'
+    high = f'<geom type="box" size="{depth} 1 {tread / 2}" pos="{nose + depth} 0 {tread / 2}"/>'
+    task = replace(task_of([0.0, 0.1, 0.0], [nose + beyond, 0.1, tread]), duration=0.3)
+    path = plan_swing(task, box_collide(world_of(low + high)))
+    assert path.clear
+    u = np.linspace(0.0, 0.7, 701)
+    toes = path.positions(u) + HALF[0] * path.rotations(u)[:, :, 0]
+    passing = (toes[:, 0] > nose) & (toes[:, 0] < nose + 0.04)
+    assert toes[passing, 2].min() > tread + 0.5 * MARGIN
+
+
 def test_path_rises_over_a_wall_in_the_way():
     wall = '<geom type="box" size="0.02 1 0.1" pos="0.25 0 0.1"/>'
     path = plan_swing(task_of([0, 0.1, 0], [0.5, 0.1, 0]), box_collide(world_of(wall)))
