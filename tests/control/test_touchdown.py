@@ -28,9 +28,9 @@ def swing(limb, start=1.0, end=2.0, makes=True, breaks=True):
     return Swing(limb, start, end, 0, contact, breaks)
 
 
-def follow(state, limb, force, until, start=0.0, height=0.0):
-    """Run ticks with a force as a function of time, above the contact; returns when contact was made."""
-    made, position = [], np.full((4, 3), [0.0, 0.0, height])
+def follow(state, limb, force, until, start=0.0, height=0.0, way=0.0):
+    """Run ticks with a force as a function of time, above the contact and before it; returns when contact was made."""
+    made, position = [], np.full((4, 3), [-way, 0.0, height])
     for time in np.arange(start, until, PERIOD):
         measured = np.zeros(4)
         measured[limb] = force(time)
@@ -53,11 +53,12 @@ def test_forces_before_the_fraction_of_the_swing_are_ignored():
     assert made == [] and not state.in_contact[0]
 
 
-def test_a_foot_that_grazes_an_edge_high_above_its_contact_goes_on():
+@pytest.mark.parametrize("end", [{"height": touchdown.EARLY_HEIGHT}, {"way": touchdown.EARLY_WAY}])
+def test_a_foot_that_grazes_an_edge_far_from_its_contact_goes_on(end):
     state = tracker([swing(Limb.LEFT_FOOT)])
-    high = 1.1 * touchdown.EARLY_HEIGHT
-    assert follow(state, 0, lambda t: 300.0 if t > 1.8 else 0.0, 1.9, height=high) == []
-    made = follow(state, 0, lambda t: 30.0, 2.0, start=1.9, height=0.9 * touchdown.EARLY_HEIGHT)
+    far, near = ({name: share * value for name, value in end.items()} for share in (1.1, 0.9))
+    assert follow(state, 0, lambda t: 300.0 if t > 1.8 else 0.0, 1.9, **far) == []
+    made = follow(state, 0, lambda t: 30.0, 2.0, start=1.9, **near)
     assert made[:1] == [pytest.approx(1.9, abs=2 * PERIOD)]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.geometry.limb import Limb
+from toolkit.geometry.pose import Pose
 from toolkit.robot.scale import USUAL, Scale
 
 # Forces, lengths, speeds and times are those of a body of the usual size (`toolkit.robot.scale`).
@@ -18,7 +19,7 @@ EARLY_FOOT_FORCE, LATE_FOOT_FORCE = 25.0, 15.0  # N; they end a foot's swing bef
 PALM_FORCE, CONFIRM_TICKS = 3.0, 2  # N, and consecutive ticks that it must last: arms bounce
 LATE_FOOT_SPEED, PALM_SPEED = 0.15, 0.08  # m/s; speeds along the inward normal after the planned end
 MAX_DEPTH = 0.08  # m; how far a limb searches below the planned surface
-EARLY_HEIGHT = 0.05  # m; a limb that is touched farther above that surface has met something else, and goes on
+EARLY_HEIGHT, EARLY_WAY = 0.05, 0.1  # m above its contact and along it; what touches a limb farther off is not its end
 
 # How much force a limb in contact is asked to bear.
 MIN_FOOT_FORCE, MIN_PALM_FORCE = 10.0, 2.0  # N; least forces of settled contacts, so that they stay closed
@@ -40,7 +41,7 @@ class LimbState(Enum):
 class ContactTracker:
     """Decides from planned times and measured forces which limbs are in contact, and how much force each may bear.
 
-    A foot that meets the ground late in its swing rests where it is, but not where it grazes an edge high above; one
+    A foot that meets the ground late in its swing rests where it is, but not where it grazes an edge on its way; one
     that has not met it in time goes on along the inward normal. A palm needs two ticks of force. The bound on the
     normal force rises after contact is made and falls before it is broken, so that forces never jump.
 
@@ -126,9 +127,8 @@ class ContactTracker:
             self._loaded_ticks[limb] = self._loaded_ticks[limb] + 1 if loaded else 0
             met = self._loaded_ticks[limb] >= CONFIRM_TICKS
         if met and not over:
-            contact = swing.contact.pose
             late_enough = time - swing.start >= EARLY_FRACTION * (swing.end - swing.start)
-            met = late_enough and contact.normal @ (position - contact.position) <= self.scale.length * EARLY_HEIGHT
+            met = late_enough and self._there(swing.contact.pose, position)
         if met:
             self.state[limb], self._since[limb] = LimbState.REST, time - self.lead[limb]
             self.made[limb] = True
@@ -136,6 +136,13 @@ class ContactTracker:
             self.state[limb] = LimbState.SEARCH
             depth = self.depth[limb] + self._inward_speed(limb) * period
             self.depth[limb] = min(depth, self.scale.length * MAX_DEPTH)
+
+    def _there(self, contact: Pose, position: np.ndarray) -> bool:
+        """Whether a limb at a position (3,) m that something touches may have met its contact."""
+        off = position - contact.position
+        height = contact.normal @ off
+        way = np.linalg.norm(off - height * contact.normal)
+        return bool(height <= self.scale.length * EARLY_HEIGHT and way <= self.scale.length * EARLY_WAY)
 
     def search_speed(self, limb: Limb) -> float:
         """Speed in m/s along the inward normal of a limb that searches its contact."""
