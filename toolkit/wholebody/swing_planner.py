@@ -19,7 +19,8 @@ Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
 THICKNESS = 0.08  # m; height of the swept box above the patch, to hold the foot or the hand
 SPACING = 0.01  # m; largest way between two poses that are checked, so that none passes an edge unseen
-NEAR = 0.4  # m per m of way along a surface; the least padding below that grows with the distance from a contact
+# m per m of way along the surface on which a swing ends that is higher by more than CLIMB (m): the least padding below
+NEAR, CLIMB = 0.4, 0.02
 
 RAISE_STEP, MAX_RAISE = 0.03, 0.36  # m; a path is raised in these steps until it is clear, at most by MAX_RAISE
 EASY_RAISE = 0.04  # m; paths raised by more than that are first tried with the steep timing
@@ -213,15 +214,16 @@ def _swept_boxes(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres (k, 3), rotations (k, 3, 3), half sizes (k, 3) of the patch, thickened and padded, along a path.
 
-    The padding below shrinks with the height of the patch's lowest edge above the surfaces at the ends, but only near
-    the contacts: the edge of a stair in front of its landing point is as high. The padding at the sides starts from
-    what is free there and grows with the distance.
+    The padding below shrinks with the height of the patch's lowest edge above the surfaces at the ends. Where the swing
+    climbs it does so near its end alone: the edge of a stair in front of its landing point is as high. The padding at
+    the sides starts from what is free there and grows with the distance.
     """
     length = sum(np.linalg.norm(move.vector) for move in path.moves)
     thickness, skin, spacing = (task.scale.length * each for each in (THICKNESS, SKIN, SPACING))
     count = max(SAMPLES, int(np.ceil(2.0 * length / spacing)) + 1)  # twice as fast in the middle
     u = np.linspace(0.0, 1.0, count)
     points, rotations = path.positions(u), path.rotations(u)
+    climbs = task.end.position[2] - task.start.position[2] > task.scale.length * CLIMB
     below, aside = np.full(count, margin), np.full(count, margin)
     for pose, free, half_of_swing, side in (
         (task.start, task.free_start, u < 0.5, sides[0]),
@@ -233,7 +235,8 @@ def _swept_boxes(
         height = way @ pose.normal
         along = np.linalg.norm(way - height[:, None] * pose.normal, axis=1)
         lowest = height - np.abs(np.einsum("kij,i->kj", rotations[:, :, :2], pose.normal)) @ task.half_size
-        below[half_of_swing] = np.minimum(below, np.maximum(0.5 * lowest, NEAR * along))[half_of_swing]
+        near = NEAR * along if pose is task.end and climbs else 0.0
+        below[half_of_swing] = np.minimum(below, np.maximum(0.5 * lowest, near))[half_of_swing]
         aside[half_of_swing] = np.minimum(aside, side + along)[half_of_swing]
     below = np.maximum(below, 0.0)
     half = np.empty((count, 3))
