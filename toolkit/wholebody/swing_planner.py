@@ -225,9 +225,9 @@ def _swept_boxes(
     points, rotations = path.positions(u), path.rotations(u)
     climbs = task.end.position[2] - task.start.position[2] > task.scale.length * CLIMB
     below, aside = np.full(count, margin), np.full(count, margin)
-    for pose, free, half_of_swing, side in (
-        (task.start, task.free_start, u < 0.5, sides[0]),
-        (task.end, task.free_end, u >= 0.5, sides[1]),
+    for pose, free, half_of_swing, side, near in (
+        (task.start, task.free_start, u < 0.5, sides[0], 0.0),
+        (task.end, task.free_end, u >= 0.5, sides[1], NEAR if climbs else 0.0),
     ):
         if free:
             continue
@@ -235,8 +235,7 @@ def _swept_boxes(
         height = way @ pose.normal
         along = np.linalg.norm(way - height[:, None] * pose.normal, axis=1)
         lowest = height - np.abs(np.einsum("kij,i->kj", rotations[:, :, :2], pose.normal)) @ task.half_size
-        near = NEAR * along if pose is task.end and climbs else 0.0
-        below[half_of_swing] = np.minimum(below, np.maximum(0.5 * lowest, near))[half_of_swing]
+        below[half_of_swing] = np.minimum(below, np.maximum(0.5 * lowest, near * along))[half_of_swing]
         aside[half_of_swing] = np.minimum(aside, side + along)[half_of_swing]
     below = np.maximum(below, 0.0)
     half = np.empty((count, 3))
