@@ -50,7 +50,7 @@ def walk():
     world = make_world(FLOOR, goal=(0.7, 0, 0), radius=0.15, timing="0.4 0.6")
     config = PlannerConfig(search=AnaStarConfig(max_expansions=20))
     planner = make_planner(robot, world, "kinematic", config)
-    search = planner.search(np.random.default_rng(0), 20.0)
+    search = planner.search(np.random.default_rng(0), 600.0)
     assert search.screen is not None
     sequence = steps(planner.ground.start_stance(), 8, 0.2)
     assert search.screen.passes(sequence)

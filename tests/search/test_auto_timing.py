@@ -72,7 +72,7 @@ def test_judges_that_know_no_dynamics_walk_at_one_calm_pace(robot):
 
 def swings(name, world):
     config = PlannerConfig(timings="auto", search=AnaStarConfig(max_expansions=400))
-    result = make_planner(load_robot(name), world, "learned", config).search(np.random.default_rng(0), 120.0)
+    result = make_planner(load_robot(name), world, "learned", config).search(np.random.default_rng(0), 600.0)
     assert result.solutions and not result.warning
     return np.array([transition.timing.swing for transition in result.solutions[-1].sequence.transitions])
 

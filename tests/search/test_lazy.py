@@ -70,7 +70,7 @@ def test_fewer_judgements_until_the_first_plan_of_the_same_graph(robot):
             if progress.cost < np.inf and not first:
                 first.append(evaluator.asked)
 
-        result = ContactPlanner(robot, world, evaluator, ENDLESS).search(np.random.default_rng(0), 60.0, note)
+        result = ContactPlanner(robot, world, evaluator, ENDLESS).search(np.random.default_rng(0), 600.0, note)
         assert result.solutions
         found[kind], asked[kind] = result.solutions, first[0]
         for solution in result.solutions:  # costs and predictions are those of the transitions alone
@@ -92,7 +92,7 @@ def test_fewer_judgements_until_the_first_plan_of_the_same_graph(robot):
 def test_same_seed_same_plan(robot):
     world = make_world(FLOOR, goal=(1.0, 0, 0))
     one, other = (
-        ContactPlanner(robot, world, Costly(robot), ENDLESS).search(np.random.default_rng(3), 60.0) for _ in range(2)
+        ContactPlanner(robot, world, Costly(robot), ENDLESS).search(np.random.default_rng(3), 600.0) for _ in range(2)
     )
     np.testing.assert_array_equal(one.expanded, other.expanded)
     assert [solution.cost for solution in one.solutions] == [solution.cost for solution in other.solutions]
@@ -158,6 +158,6 @@ def test_a_plan_by_guesses_comes_with_a_warning(robot):
 
     for timing, strange in (("0.3 0.6", False), ("0.3 0.4", True)):
         world = make_world(FLOOR, goal=(0.6, 0, 0), timing=timing)
-        result = ContactPlanner(robot, world, Trained(robot), ENDLESS).search(np.random.default_rng(0), 60.0)
+        result = ContactPlanner(robot, world, Trained(robot), ENDLESS).search(np.random.default_rng(0), 600.0)
         assert result.solutions
         assert ("below what the networks were trained for" in result.warning) == strange

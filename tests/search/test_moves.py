@@ -134,7 +134,7 @@ def test_cul_de_sac(robot):
                 raise StopIteration
 
         try:
-            planner.search(np.random.default_rng(0), 60.0, stop)
+            planner.search(np.random.default_rng(0), 600.0, stop)
         except StopIteration:
             return found[0]
         return np.inf

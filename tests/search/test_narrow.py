@@ -216,5 +216,5 @@ def test_plans_lead_through_low_and_narrow_places(robot, geoms):
     ground = box([1.2, 0, -0.05], [2.0, 1.0, 0.05])
     world = make_world(ground, *geoms, goal=(2.3, 0, 0), timing="0.6 0.8")
     planner = pipeline.make_planner(robot, world, config=PlannerConfig(search=AnaStarConfig(max_expansions=800)))
-    result = pipeline.run(robot, world, planner, PipelineConfig(until="wholebody", time_limit=120.0, candidates=8))
+    result = pipeline.run(robot, world, planner, PipelineConfig(until="wholebody", time_limit=600.0, candidates=8))
     assert result.passed, result.reason

@@ -28,7 +28,7 @@ FAST, SLOW = Timing(0.4, 0.6), Timing(1.0, 1.0)
 def searched(robot, world, config):
     """All solutions of a search."""
     planner = ContactPlanner(robot, world, KinematicEvaluator(robot), config)
-    return planner.search(np.random.default_rng(0), 20.0).solutions
+    return planner.search(np.random.default_rng(0), 600.0).solutions
 
 
 @pytest.fixture(scope="module")

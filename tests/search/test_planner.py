@@ -19,7 +19,7 @@ from toolkit.world.timing import Timing
 QUICK = PlannerConfig(search=AnaStarConfig(max_expansions=150))
 
 
-def plan(robot, world, config=QUICK, seed=0, kinematic=None, limit=20.0):
+def plan(robot, world, config=QUICK, seed=0, kinematic=None, limit=600.0):
     planner = ContactPlanner(robot, world, KinematicEvaluator(robot, kinematic), config)
     return planner.search(np.random.default_rng(seed), limit)
 
@@ -158,7 +158,7 @@ def test_reason_of_failure_names_what_sequences_lack(robot):
 
     world = make_world(FLOOR, goal=(0.8, 0, 0))
     planner = ContactPlanner(robot, world, KinematicEvaluator(robot), QUICK, finish)
-    result = planner.search(np.random.default_rng(0), 20.0)
+    result = planner.search(np.random.default_rng(0), 600.0)
     assert not result.solutions and "\n" not in result.reason and "rejected" not in result.reason
     assert "the last is infeasible: ankle pitch beyond its limit, with the feet at 0." in result.reason
 
@@ -204,7 +204,7 @@ def test_all_ten_categories_occur_and_palms_are_chosen_where_they_help(robot):
     evaluator = Recorder(robot, KinematicConfig(palm_relief=0.3, stride=300.0, spread=50.0))
     free = CostConfig(time=0.0)  # palms cost two transitions, which made-up objectives of steps do not outweigh
     config = PlannerConfig(cost=free, search=AnaStarConfig(epsilon=0.3, max_expansions=400))
-    result = ContactPlanner(robot, world, evaluator, config).search(np.random.default_rng(0), 20.0)
+    result = ContactPlanner(robot, world, evaluator, config).search(np.random.default_rng(0), 600.0)
     check(robot, world, result, price=0.0)
     assert evaluator.seen == set(Category)
     assert any(stance.palms for stance in result.solutions[-1].sequence.stances)
@@ -214,7 +214,7 @@ def test_all_ten_categories_occur_and_palms_are_chosen_where_they_help(robot):
             local = feet.inverse() @ stance[palm].pose.position
             assert local[1] * (1 if palm.is_left else -1) > 0.1
     feet_only = PlannerConfig(palms=False, search=AnaStarConfig(max_expansions=200))
-    without = ContactPlanner(robot, world, evaluator, feet_only).search(np.random.default_rng(0), 20.0)
+    without = ContactPlanner(robot, world, evaluator, feet_only).search(np.random.default_rng(0), 600.0)
     assert not any(stance.palms for solution in without.solutions for stance in solution.sequence.stances)
 
 
@@ -223,7 +223,7 @@ def test_held_palms_stay_in_reach_while_the_body_is_over_the_standing_foot(robot
         monkeypatch.setattr("toolkit.search.moves.reach_check._ARM_SWAY", sway)
         evaluator = KinematicEvaluator(robot, KinematicConfig(palm_relief=0.3, stride=300.0, spread=50.0))
         config = PlannerConfig(cost=CostConfig(time=0.0), search=AnaStarConfig(max_expansions=300))
-        found = ContactPlanner(robot, corridor(2), evaluator, config).search(np.random.default_rng(0), 20.0).solutions
+        found = ContactPlanner(robot, corridor(2), evaluator, config).search(np.random.default_rng(0), 600.0).solutions
         stretch = []
         for solution in found:
             moves = zip(solution.sequence.transitions, solution.sequence.stances[1:], solution.com[1:], strict=True)
@@ -253,21 +253,21 @@ def test_timing_is_chosen(robot):
     timings = (Timing(0.3, 0.5), Timing(1.0, 1.0))
     config = PlannerConfig(timings=timings, cost=CostConfig(time=5.0), search=AnaStarConfig(max_expansions=150))
     planner = ContactPlanner(robot, make_world(FLOOR), HurriesAreHard(robot), config)
-    last = planner.search(np.random.default_rng(0), 20.0).solutions[-1].sequence
+    last = planner.search(np.random.default_rng(0), 600.0).solutions[-1].sequence
     used = [transition.timing for transition in last.transitions]
     assert used[0] == timings[0] and used[-1] == timings[1]
 
 
 def test_the_motion_of_the_whole_sequence_has_the_last_word(robot):
     world, base = make_world(FLOOR, goal=(0.6, 0, 0)), KinematicEvaluator(robot)
-    plain = ContactPlanner(robot, world, base, QUICK).search(np.random.default_rng(0), 9.0)
+    plain = ContactPlanner(robot, world, base, QUICK).search(np.random.default_rng(0), 600.0)
 
     def searched(feasible):
         """With motions that are all the same; and the motion."""
         motion = SimpleNamespace(feasible=feasible, objective=500.0, failure=None if feasible else Failure("no"))
         plan = SimpleNamespace(motion=motion)
         planner = ContactPlanner(robot, world, base, QUICK, lambda sequence: plan)
-        return planner.search(np.random.default_rng(0), 9.0).solutions, plan
+        return planner.search(np.random.default_rng(0), 600.0).solutions, plan
 
     solutions, plan = searched(feasible=True)
     assert plain.solutions and not searched(feasible=False)[0]

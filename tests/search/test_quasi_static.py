@@ -28,7 +28,7 @@ def slope(degrees, friction):
 
 def test_every_stance_of_a_plan_is_balanced(robot):
     world = corridor(4)
-    result = quasi_static_planner(robot, world, QUICK).search(np.random.default_rng(0), 20.0)
+    result = quasi_static_planner(robot, world, QUICK).search(np.random.default_rng(0), 600.0)
     last = result.solutions[-1]
     stances = last.sequence.stances
     for before, after, transition, com in zip(
@@ -47,9 +47,9 @@ def test_every_stance_of_a_plan_is_balanced(robot):
 
 
 def test_a_gentle_slope_has_a_plan_and_a_steep_one_says_why_not(robot):
-    assert quasi_static_planner(robot, slope(15, 0.5), QUICK).search(np.random.default_rng(0), 20.0).solutions
+    assert quasi_static_planner(robot, slope(15, 0.5), QUICK).search(np.random.default_rng(0), 600.0).solutions
     with pytest.raises(PlanningError, match=r"steeper than its friction angle .*30 deg, friction 0\.5 holds 26\.6 deg"):
-        quasi_static_planner(robot, slope(30, 0.5), QUICK).search(np.random.default_rng(0), 20.0)
+        quasi_static_planner(robot, slope(30, 0.5), QUICK).search(np.random.default_rng(0), 600.0)
 
 
 def test_long_strides_are_not_quasi_static(robot):

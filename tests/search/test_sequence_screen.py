@@ -24,7 +24,7 @@ def found(robot):
     """A search in a corridor that likes palms."""
     evaluator = KinematicEvaluator(robot, KinematicConfig(palm_relief=0.3, stride=300.0, spread=50.0))
     config = PlannerConfig(cost=CostConfig(time=0.0), search=AnaStarConfig(epsilon=0.3, max_expansions=200))
-    return ContactPlanner(robot, corridor(2), evaluator, config).search(np.random.default_rng(0), 20.0)
+    return ContactPlanner(robot, corridor(2), evaluator, config).search(np.random.default_rng(0), 600.0)
 
 
 @pytest.fixture
@@ -84,7 +84,7 @@ def test_palms_need_a_wall_and_a_contact_to_break(found):
 
 def test_no_palm_passes_where_the_search_may_not_use_it(robot, sequence):
     config = PlannerConfig(palms=False, search=AnaStarConfig(max_expansions=20))
-    feet = ContactPlanner(robot, corridor(2), KinematicEvaluator(robot), config).search(np.random.default_rng(0), 20.0)
+    feet = ContactPlanner(robot, corridor(2), KinematicEvaluator(robot), config).search(np.random.default_rng(0), 600.0)
     made = [i for i, item in enumerate(sequence.transitions) if item.limb not in FEET and item.contact is not None]
     assert feet.screen is not None and (feet.screen.codes(sequence)[made] == Reason.NO_WALL).all()
 
@@ -92,7 +92,7 @@ def test_no_palm_passes_where_the_search_may_not_use_it(robot, sequence):
 def test_limbs_must_reach_in_the_motion(robot, found):
     evaluator = KinematicEvaluator(robot)
     config = PlannerConfig(palms=False, search=AnaStarConfig(max_expansions=60))
-    search = ContactPlanner(robot, corridor(2), evaluator, config).search(np.random.default_rng(0), 20.0)
+    search = ContactPlanner(robot, corridor(2), evaluator, config).search(np.random.default_rng(0), 600.0)
     sequence = ContactSequence(
         search.solutions[-1].sequence.start, search.solutions[-1].sequence.transitions[:3]
     )  # a short motion is enough

@@ -96,12 +96,12 @@ def test_the_site_need_not_lie_on_the_wall(robot, place, offset):
 def test_a_search_goes_on_from_the_palms(robot, place):
     world = walled(place, both=True, goal=(0.9, 0, 0))
     search = planner(robot, world)
-    result = search.search(np.random.default_rng(0), 20.0)
+    result = search.search(np.random.default_rng(0), 600.0)
     assert result.solutions
     for solution in result.solutions:
         assert solution.sequence.start.palms == (LEFT, RIGHT)
         np.testing.assert_allclose(solution.com[0], [0, 0, robot.com_height], atol=1e-3)
-    alone = search.search(np.random.default_rng(0), 20.0, palms=False)
+    alone = search.search(np.random.default_rng(0), 600.0, palms=False)
     for solution in alone.solutions:
         limbs = [item.limb for item in solution.sequence.transitions]
         assert set(limbs[:2]) == {LEFT, RIGHT} and all(limb.is_foot for limb in limbs[2:])
@@ -110,7 +110,7 @@ def test_a_search_goes_on_from_the_palms(robot, place):
 
 def test_the_quasi_static_planner_starts_from_palms_too(robot, place):
     world = walled(place, goal=(0.7, 0, 0))
-    result = quasi_static_planner(robot, world, QUICK).search(np.random.default_rng(0), 20.0)
+    result = quasi_static_planner(robot, world, QUICK).search(np.random.default_rng(0), 600.0)
     assert result.solutions and result.solutions[-1].sequence.start.palms == (LEFT,)
     for stance in result.solutions[-1].sequence.stances:
         assert statically_balanced(robot, stance.contacts).balanced

@@ -9,7 +9,6 @@ import pytest
 
 from tests.validation.three_surfaces import BEST, three_surfaces, visited
 from toolkit.pipeline import make_planner
-from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.robot.loader import load_robot
 from toolkit.search.anytime.graph import Edge
 from toolkit.search.costs.edge_cost import CostConfig
@@ -131,7 +130,7 @@ def test_choices_come_in_the_order_of_their_slacks():
 def test_a_star_and_the_random_tree_find_the_plan(robot, world):
     steps_alone = CostConfig(dynamics=0.0, time=0.0, steep=0.0, stagger=0.0)
     planner = make_planner(robot, world, "kinematic", PlannerConfig(steps=38, drawn=False, cost=steps_alone))
-    graph = contact_graph(planner, KinematicEvaluator(robot))
+    graph = contact_graph(planner)
     found = a_star(graph.problem, lambda states, payloads: True)
     sequence = graph.sequence(found.states, found.payloads)
     assert visited(world, sequence) == BEST

@@ -130,11 +130,7 @@ class ContactPlanner:
         com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
         tally, timings = Tally(), self.timings(calmer, slides=way.slides)
         self._warm_up(start, com, timings)
-        scale = self.robot.scale.length
-        strategy = strategy_of(
-            self.config, self._evaluator, way.length, slides=way.slides, paced=self.paced, scale=scale
-        )
-        blame = Blame(exclusions, _STRIKES, scale=scale)
+        strategy, blame = self.strategy(way), Blame(exclusions, _STRIKES, scale=self.robot.scale.length)
         deadline = time.perf_counter() + time_limit
         parts = self.parts(way, strategy, timings, tally, blame.exclusions, palms=palms, deadline=deadline)
         state = parts.reader.at_rest(start, com)
@@ -163,6 +159,11 @@ class ContactPlanner:
         """Ask the evaluator once, so that what it compiles or loads at first takes no time of the search."""
         still = [ContactTransition(Limb.LEFT_FOOT, start[Limb.LEFT_FOOT], timing) for timing in timings[:1]]
         self._evaluator.evaluate(start, com, np.zeros(3), still)
+
+    def strategy(self, way: Way) -> Strategy:
+        """How to search along a way."""
+        scale = self.robot.scale.length
+        return strategy_of(self.config, self._evaluator, way.length, slides=way.slides, paced=self.paced, scale=scale)
 
     def parts(
         self,

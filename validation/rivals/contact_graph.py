@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
-from toolkit.prediction.evaluator import TransitionEvaluator
 from toolkit.search.judging import Tally
 from toolkit.search.moves.candidates import mean_feet
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.problem import ContactProblem, Parts
 from toolkit.search.states.state import CONTACTS, is_pending, unpack, unpack_all
-from toolkit.search.strategies import strategy_of
 
 
 @dataclass(frozen=True)
@@ -47,8 +45,8 @@ class ContactGraph:
         return ContactSequence(reader.stance(unpack(judged[:1])[0, CONTACTS]), transitions)
 
 
-def contact_graph(planner: ContactPlanner, evaluator: TransitionEvaluator) -> ContactGraph:
-    """The graph that a planner searches, with transitions judged by an evaluator.
+def contact_graph(planner: ContactPlanner) -> ContactGraph:
+    """The graph that a planner searches.
 
     Raises:
         PlanningError: The robot cannot stand at the start, or nothing leads to the goal.
@@ -56,9 +54,7 @@ def contact_graph(planner: ContactPlanner, evaluator: TransitionEvaluator) -> Co
     ground, robot = planner.ground, planner.robot
     start = ground.start_stance()
     way = ground.way(start)
-    slides, paced, scale = way.slides, planner.paced, robot.scale.length
-    strategy = strategy_of(planner.config, evaluator, way.length, slides=slides, paced=paced, scale=scale)
-    parts = planner.parts(way, strategy, planner.timings(slides=slides), Tally())
+    parts = planner.parts(way, planner.strategy(way), planner.timings(slides=way.slides), Tally())
     com = start.mean_feet.position + np.array([0.0, 0.0, robot.com_height])
     problem = ContactProblem(parts, parts.reader.at_rest(start, com))
     return ContactGraph(problem, parts, _box(planner), planner.world.goal.position[:2])

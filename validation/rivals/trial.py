@@ -12,8 +12,6 @@ import numpy as np
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.errors import PlanningError
 from toolkit.geometry.limb import Limb
-from toolkit.pipeline.planner import judge_of, planner_kind
-from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.robot.model import RobotModel
 from toolkit.search.planner import ContactPlanner
 from toolkit.world.world import World
@@ -120,7 +118,7 @@ def checked(
     simulate: bool,
 ) -> Record:
     """What the search's screens, the optimiser with its independent verdict, and the simulation say of any plan."""
-    graph = contact_graph(planner, KinematicEvaluator(robot))
+    graph = contact_graph(planner)
     screened = int((graph.parts.screen.codes(sequence) == 0).sum())
     outcome = truth(sequence)
     found = {"found": True, "screened": screened, **outcome.record(), "stage": "dynamics"}
@@ -145,8 +143,7 @@ class _Arena:
     @property
     def graph(self) -> ContactGraph:
         """The graph of the planner with its own judges."""
-        kind = planner_kind(self.robot, self.settings.planner)
-        return contact_graph(self.planner, judge_of(self.robot, self.world, kind))
+        return contact_graph(self.planner)
 
     @property
     def limits(self) -> Limits:
