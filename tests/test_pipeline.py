@@ -66,7 +66,8 @@ class Run:
     """A run with made-up costs; infinite ones have no motion, and only sequences in `passing` pass.
 
     The local search turns a sequence into what `better` has for its name; those in `hurrying` ask too much of joints.
-    What has no motion lacks it from `since` s on, and what does not pass fails in the transition `failed_at`.
+    What has no motion lacks it from `since` s on, and what does not pass fails in the transition `failed_at`; where
+    that is because of something `touching` the world, no pace is to blame.
     """
 
     def __init__(
@@ -80,6 +81,7 @@ class Run:
         since=None,
         failed_at=None,
         still=True,
+        touching=False,
         **settings,
     ):
         self.optimised, self.tested, self.improved = [], [], []
@@ -108,7 +110,7 @@ class Run:
                     tested.append(candidate.plan.name)
                 passed = candidate.plan.name in passing
                 hurried = candidate.plan.name in (hurrying or ())
-                failed = Failure("it fell", transition=failed_at, too_fast=hurried)
+                failed = Failure("it fell", transition=failed_at, too_fast=hurried, at_any_pace=touching)
                 failure = candidate.failure or (None if passed else failed)
                 return SimpleNamespace(candidate=candidate, passed=passed, merit=(passed,), failure=failure)
 
@@ -238,6 +240,16 @@ def test_where_a_transition_fails_it_alone_is_slowed_down_at_first(monkeypatch, 
         planner.paces, planner.calm = paces, [solution("slow", FOOT)]
         run = Run(planner, {"fast at 1 in 0", "slow"}, monkeypatch, cost, failed_at=failed_at)
         assert run.tested == tested and run.result.passed
+
+
+def test_where_links_touch_the_world_the_pace_does_not_yield(monkeypatch):
+    """Nor is the transition to blame slowed down; the next search does without it."""
+    planner = Planner([solution("fast", FOOT)], [])
+    planner.paces, planner.calm = 2, [solution("other", FOOT)]
+    cost = {"fast": 10.0, "fast at 1": 10.0, "fast at 1 in 0": 10.5, "other": 11.0}
+    run = Run(planner, {"fast at 1 in 0", "other"}, monkeypatch, cost, failed_at=0, touching=True)
+    assert run.tested == ["fast", "other"] and run.result.passed
+    assert planner.pace == 0 and planner.exclusions == [0, 1]
 
 
 def test_where_a_calmer_pace_finds_nothing_the_one_before_is_searched_again(monkeypatch):

@@ -151,12 +151,13 @@ class _Run:
             if paces:
                 aside, self._pace = found, self._pace + paces
                 continue
+            tested = len(self._trials)
             passed, aside = self._tried(found), []
             failed_with_palms = any(candidate.uses_palms for candidate in found)
             if passed or self._spent():
                 break
             palms = palms and (self._too_fast or not failed_with_palms)
-            if self._calmer:
+            if self._calmer and not self._keeps_pace(tested):
                 self._pace += 1
             elif not found and self._fruitful is not None and self._fruitful < self._pace:
                 self._pace = self._calmest = self._fruitful  # what failed there may not be all that there is
@@ -175,6 +176,12 @@ class _Run:
             and candidate.number not in tested
             and self._blame.first_in(candidate.solution.sequence) is None
         ]
+
+    def _keeps_pace(self, tested: int) -> bool:
+        """Whether no pace is to blame in the trials from number `tested` on; half of all are left for calmer ones."""
+        last = [trial.failure for trial in self._trials[tested:]]
+        innocent = bool(last) and all(failure is not None and failure.at_any_pace for failure in last)
+        return innocent and len(self._trials) < self._config.candidates // 2
 
     @property
     def _calmer(self) -> tuple[Timing, ...]:
@@ -332,8 +339,9 @@ class _Run:
         """Whether a candidate passes the stages after the optimiser; the truly cheapest is tried first.
 
         Before a candidate is tested, it is improved, and again where a transition has been blamed since. Where the pace
-        may yield, one that fails is tested once more with the transition to blame at a calmer timing, and no other is
-        after one that asks too much of the joints, or after a few failures. On soles that roll, calmer is harder.
+        may yield, one that fails is tested once more with the transition to blame at a calmer timing unless it does no
+        more than touch the world, and no other is after one that asks too much of the joints, or after a few failures.
+        On soles that roll, calmer is harder.
         """
         blame = self._blame
         since = len(blame.exclusions)  # what the optimiser rejected concerns only searches to come
@@ -367,7 +375,7 @@ class _Run:
         """A candidate with the transition to blame at the next calmer timing; None where that is not to be had."""
         sequence = candidate.plan.sequence
         index = to_blame(sequence, failure.transition)
-        if index is None or not self._robot.stands_on_one_foot or not self._allowed(candidate):
+        if index is None or failure.at_any_pace or not self._robot.stands_on_one_foot or not self._allowed(candidate):
             return None
         swing = sequence.transitions[index].timing.swing
         timing = next((each for each in self._searches[-1].calmer if each.swing > swing), None)

@@ -44,6 +44,7 @@ def first_collision(robot: RobotModel, scene: mujoco.MjModel, times: np.ndarray,
                     f"{_label(model, first)} and {_label(model, second)} collide at {times[index]:.2f} s, "
                     f"{depth * 1e3:.1f} mm deep (allowed {allowed * 1e3:.1f} mm)",
                     float(times[index]),
+                    at_any_pace=bool(static[first] or static[second]),
                 )
     return None
 

@@ -163,7 +163,7 @@ def _trajectory(
         max_position_error=report.max_position_error,
         max_orientation_error=report.max_orientation_error,
         limits_respected=report.limits_respected,
-        failure=_joined([*blocked, *report.findings], plan.schedule),
+        failure=_joined(blocked, report.findings, plan.schedule),
     )
 
 
@@ -195,19 +195,25 @@ def _blocked(schedule: ContactSchedule, paths: LimbPaths) -> list[Failure]:
     """A failure for each swing without a clear way."""
     starts = {(phase.swing, phase.transition): phase.start for phase in schedule.phases}
     return [
-        Failure(f"{limb.label} finds no way clear of the world in transition {transition}", starts[limb, transition])
+        Failure(
+            f"{limb.label} finds no way clear of the world in transition {transition}",
+            starts[limb, transition],
+            at_any_pace=not limb.is_foot,
+        )
         for limb, transition in paths.blocked
     ]
 
 
-def _joined(findings: Sequence[Failure], schedule: ContactSchedule) -> Failure | None:
-    """All findings as one failure at the place of the first."""
+def _joined(blocked: Sequence[Failure], found: Sequence[Failure], schedule: ContactSchedule) -> Failure | None:
+    """All findings as one failure at the place of the first; blocked swings are what the others may come from."""
+    findings = [*blocked, *found]
     if not findings:
         return None
     time = findings[0].time
     transition = None if time is None else schedule.phase_at(time).transition
-    reason, too_fast = "; ".join(each.reason for each in findings), all(each.too_fast for each in findings)
-    return replace(findings[0], reason=reason, transition=transition, too_fast=too_fast)
+    causes, reason = blocked or findings, "; ".join(each.reason for each in findings)
+    too_fast, at_any_pace = all(each.too_fast for each in causes), all(each.at_any_pace for each in causes)
+    return replace(findings[0], reason=reason, transition=transition, too_fast=too_fast, at_any_pace=at_any_pace)
 
 
 def _without_postures(robot: RobotModel, paths: LimbPaths, times: np.ndarray) -> WholeBodyTrajectory:
