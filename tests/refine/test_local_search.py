@@ -107,10 +107,41 @@ def test_what_is_not_allowed_is_not_tried(walk, plan):
 def test_a_plan_off_its_screens_starts_from_the_sequence_of_the_search(walk, plan):
     first = plan.sequence.transitions[0]
     still = replace(plan.sequence, transitions=(first, *plan.sequence.transitions))
-    off = replace(plan, sequence=still)
-    assert not walk.screen.passes(off.sequence)
-    found, _ = improved(walk, off, optimisations=12)
-    assert found is off or (walk.screen.passes(found.sequence) and total(found) < total(off))
+    off = Workshop(walk).optimise(still)
+    assert off.motion.feasible and not walk.screen.passes(off.sequence)
+    found, workshop = improved(walk, off, optimisations=12)
+    assert workshop.sequences[0] is walk.sequence
+    assert walk.screen.passes(found.sequence) and total(found) < total(off)
+
+
+class Astray:
+    """A screen that finds limbs out of reach in a number of transitions of a motion."""
+
+    def __init__(self, screen, count):
+        self._screen, self._count = screen, count
+
+    def __getattr__(self, name):
+        return getattr(self._screen, name)
+
+    def reach_codes(self, plan):
+        codes = np.zeros(len(plan.sequence.transitions), int)
+        codes[: self._count(plan)] = 1
+        return codes
+
+
+def test_limbs_may_be_out_of_reach_no_more_than_they_were(walk, plan):
+    search = Workshop(walk).search(optimisations=12)
+    as_often = Astray(walk.screen, lambda each: 2)
+    assert total(search.improved(plan, walk.sequence, as_often, lambda sequence: True)) < total(plan)
+    more_often = Astray(walk.screen, lambda each: 2 if each is plan else 3)
+    assert search.improved(plan, walk.sequence, more_often, lambda sequence: True) is plan
+
+
+def test_a_long_sequence_has_more_motions(walk, plan):
+    half = len(plan.sequence.transitions) // 2
+    found, workshop = improved(walk, plan, optimisations=5, usual=half)
+    assert 5 < len(workshop.sequences) + len(workshop.slides) <= 10
+    assert total(found) <= total(plan)
 
 
 def test_the_guess_of_a_sequence_itself_is_its_cost_and_detours_cost_more(walk, plan):

@@ -34,18 +34,22 @@ class RefineConfig:
 
     Attributes:
         starts: Number of the truly cheapest sequences from which it starts.
-        optimisations: Most motions to optimise for each of them. A quarter is kept to find out in the end whether
-            contacts can be left out.
+        usual: Transitions of a sequence of the usual length.
+        optimisations: Most motions to optimise for each of them, of longer sequences more in proportion. A quarter is
+            kept to find out in the end whether contacts can be left out.
         batch: Motions that are optimised before the cheapest of them is taken, if it is cheaper than the sequence is.
-        gain: Least part of the true cost by which a variant has to be cheaper.
+        gain: Least part of the true cost by which a variant has to be cheaper, of longer sequences that of their usual
+            part: a variant differs in a few transitions, however many there are.
         prospect: Variants whose guessed cost is higher than the sequence's by more than this part are not optimised,
             unless they only leave contacts out.
-        patience: Most variants of one sequence that are optimised, not counting those that only leave contacts out.
+        patience: Most variants of one sequence that are optimised, of longer ones more in proportion, besides those
+            that only leave contacts out.
         slides: Most times in a row that landing points are moved.
         landing: How far they move each time.
     """
 
     starts: int = 2
+    usual: int = 20
     optimisations: int = 60
     batch: int = 6
     gain: float = 0.005
@@ -72,6 +76,7 @@ class LocalSearch:
         self._config, self._cost, self._optimise, self._slide = config, cost, optimise, slide
         self._known: dict[bytes, tuple[MotionPlan, PlanCost]] = {}
         self._limit = self.spent = 0
+        self._longer = 1.0  # how many times as long as usual the sequence is
 
     def improved(
         self, plan: MotionPlan, origin: ContactSequence, screen: SequenceScreen, allowed: Allowed
@@ -85,26 +90,29 @@ class LocalSearch:
             screen: The screens of that search.
             allowed: Whether a sequence may be tried.
         """
-        before, self._limit = self.spent, self.spent + 3 * self._config.optimisations // 4
+        self._longer = max(1.0, len(plan.sequence.transitions) / self._config.usual)
+        most = int(self._longer * self._config.optimisations)
+        before, self._limit = self.spent, self.spent + 3 * most // 4
         best = self._searched(plan, origin, screen, allowed)
-        self._limit = before + self._config.optimisations
+        self._limit = before + most
         return self._descended(*best, screen, allowed, all_kinds=False)[0] if screen.passes(best[0].sequence) else plan
 
     def _searched(
         self, plan: MotionPlan, origin: ContactSequence, screen: SequenceScreen, allowed: Allowed
     ) -> tuple[MotionPlan, PlanCost]:
         """The best plan of the search in all kinds of variants."""
-        best = plan, plan_cost(plan, self._cost)
+        best = first = plan, plan_cost(plan, self._cost)
         if not screen.passes(plan.sequence):
-            better = self._best_variant(*best, origin, screen, allowed)
-            if better is None:
-                return best
-            best = better
+            start = self._judged(origin, plan, screen, np.inf, _astray(plan, screen)) if allowed(origin) else None
+            start = start or self._best_variant(*best, origin, screen, allowed)
+            if start is None:
+                return first
+            best = self._slid(*start, screen, allowed) or start
         while True:
             best = self._descended(*best, screen, allowed)
             slid = self._slid(*best, screen, allowed)
             if slid is None:
-                return best
+                return min(first, best, key=lambda each: each[1].total)
             best = slid
 
     def _descended(
@@ -132,17 +140,21 @@ class LocalSearch:
     ) -> tuple[MotionPlan, PlanCost] | None:
         """The cheapest of the first variants of a sequence, as soon as one is cheaper than the plan; None: none is."""
         best: tuple[MotionPlan, PlanCost] | None = None
-        least, tried = cost.total * (1.0 - self._config.gain), 0
+        least, astray, tried = self._less_than(cost), _astray(plan, screen), 0
         for variant in self._variants(sequence, plan, cost, screen, all_kinds=all_kinds):
             if not allowed(variant) or not arrives(variant, plan):
                 continue
             if best is not None and tried >= self._config.batch:
                 break
-            found = self._judged(variant, plan, screen, least)
+            found = self._judged(variant, plan, screen, least, astray)
             tried += 1
             if found is not None and found[1].total < least:
                 best, least = found, found[1].total
         return best
+
+    def _less_than(self, cost: PlanCost) -> float:
+        """The true cost below which a variant of a sequence with a given one is cheaper."""
+        return cost.total * (1.0 - self._config.gain / self._longer)
 
     def _variants(
         self, sequence: ContactSequence, plan: MotionPlan, cost: PlanCost, screen: SequenceScreen, *, all_kinds: bool
@@ -159,16 +171,16 @@ class LocalSearch:
             if best.identity not in fewer and guess(best) <= most:
                 others[best.identity] = best
         others.pop(sequence.identity, None)
-        ranked = sorted(others.values(), key=guess)[: self._config.patience]
+        ranked = sorted(others.values(), key=guess)[: int(self._longer * self._config.patience)]
         yield from sorted([*fewer.values(), *ranked], key=guess)
 
     def _judged(
-        self, sequence: ContactSequence, base: MotionPlan, screen: SequenceScreen, wanted: float
+        self, sequence: ContactSequence, base: MotionPlan, screen: SequenceScreen, wanted: float, astray: int
     ) -> tuple[MotionPlan, PlanCost] | None:
         """A sequence with its motion and true cost; None where the budget is spent or the motion does not hold.
 
-        The motion has to keep the margins of the base. Where it does not, but costs little more than is wanted at most,
-        landing points are moved.
+        The motion has to keep the margins of the base, and limbs may be out of reach in no more than the `astray`
+        transitions of the base's. Where it lacks margins, but costs little more than is wanted, contacts are moved.
         """
         identity = sequence.identity
         if identity not in self._known:
@@ -178,7 +190,7 @@ class LocalSearch:
             plan = self._optimise(sequence)
             self._known[identity] = plan, plan_cost(plan, self._cost)
         plan, cost = self._known[identity]
-        if not plan.motion.feasible or screen.reach_codes(plan).any():
+        if not plan.motion.feasible or _astray(plan, screen) > astray:
             return None
         if keeps_margins(plan, base):
             return plan, cost
@@ -191,7 +203,7 @@ class LocalSearch:
         best: tuple[MotionPlan, PlanCost] | None = None
         for _ in range(self._config.slides):
             found = self._slid_once(plan, plan, screen)
-            if found is None or found[1].total > cost.total * (1.0 - self._config.gain):
+            if found is None or found[1].total > self._less_than(cost):
                 break
             if not allowed(found[0].sequence):
                 break
@@ -205,7 +217,7 @@ class LocalSearch:
 
         None where the motion does not keep the margins of the base.
         """
-        sequence = plan.sequence
+        sequence, excused = plan.sequence, screen.reach_codes(plan) > 0
         share = np.ones(len(sequence.transitions))
         for less in (*_SHARES, 0.0):
             if self.spent >= self._limit:
@@ -214,12 +226,17 @@ class LocalSearch:
             moved = self._slide(plan, self._config.landing, share)
             if moved is None or not moved.motion.feasible or not keeps_margins(moved, base):
                 return None
-            wrong = np.flatnonzero(screen.codes(moved.sequence) | screen.reach_codes(moved))
+            wrong = np.flatnonzero(screen.codes(moved.sequence) | np.where(excused, 0, screen.reach_codes(moved)))
             if not len(wrong):
                 return moved, plan_cost(moved, self._cost)
             for index in wrong.tolist():
                 share[_contacts_of(sequence, index)] = less
         return None
+
+
+def _astray(plan: MotionPlan, screen: SequenceScreen) -> int:
+    """Number of transitions in which limbs do not reach in a plan's motion."""
+    return int(np.count_nonzero(screen.reach_codes(plan)))
 
 
 def _contacts_of(sequence: ContactSequence, index: int) -> list[int]:
