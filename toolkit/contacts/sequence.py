@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass, replace
-
-import numpy as np
+from functools import cached_property
 
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import Limb
@@ -30,6 +30,12 @@ class ContactTransition:
             raise ValueError("a foot contact cannot be broken without a new one")
         if self.contact is not None and self.contact.limb != self.limb:
             raise ValueError(f"{self.limb.label} cannot move to a contact of {self.contact.limb.label}")
+
+    @cached_property
+    def identity(self) -> bytes:
+        """Bytes that are equal for equal transitions: limb, contact and timing, to the last bit."""
+        times = struct.pack("2d", self.timing.shift, self.timing.swing)
+        return bytes([self.limb]) + times + (b"" if self.contact is None else self.contact.identity)
 
     def apply(self, stance: Stance) -> Stance:
         """The stance after the transition."""
@@ -75,23 +81,12 @@ class ContactSequence:
         """Every contact: those of the start, then what each transition makes."""
         return *self.start.contacts, *(t.contact for t in self.transitions if t.contact is not None)
 
-    @property
+    @cached_property
     def identity(self) -> bytes:
         """Bytes that are equal for equal sequences: limbs, places, surfaces and timings, to the last bit."""
-        parts = [_bytes_of(contact) for contact in self.start.contacts]
-        for transition in self.transitions:
-            times = np.array([transition.timing.shift, transition.timing.swing]).tobytes()
-            contact = b"" if transition.contact is None else _bytes_of(transition.contact)
-            parts.append(bytes([transition.limb]) + times + contact)
-        return b"|".join(parts)
+        return b"|".join(each.identity for each in (*self.start.contacts, *self.transitions))
 
     @property
     def duration(self) -> float:
         """Length of all transitions in s."""
         return sum(transition.timing.shift + transition.timing.swing for transition in self.transitions)
-
-
-def _bytes_of(contact: Contact) -> bytes:
-    """Limb, place and surface of a contact."""
-    numbers = np.array([contact.limb, contact.surface, contact.friction, *contact.pose.position])
-    return numbers.tobytes() + contact.pose.rotation.tobytes()

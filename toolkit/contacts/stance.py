@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
 
 from toolkit.geometry.limb import FEET, PALMS, Limb
 from toolkit.geometry.pose import Pose, mean_pose
@@ -27,6 +30,12 @@ class Contact:
     friction: float
     surface: int = -1
     bearing: float = math.inf
+
+    @cached_property
+    def identity(self) -> bytes:
+        """Bytes that are equal for equal contacts: limb, place and surface, to the last bit."""
+        numbers = np.array([self.limb, self.surface, self.friction, *self.pose.position])
+        return numbers.tobytes() + self.pose.rotation.tobytes()
 
 
 @dataclass(frozen=True)

@@ -165,14 +165,15 @@ class LocalSearch:
         swaps = (iter([each]) for each in swapped(sequence, screen))
         groups = chain(relinked(sequence, screen), swaps) if all_kinds else ()
         most = cost.total * (1.0 + self._config.prospect)
-        others: dict[bytes, ContactSequence] = {}
+        others: dict[bytes, tuple[float, ContactSequence]] = {}
         for group in groups:
             best = next(group, sequence)  # those of a group take equally long, and the others travel more
-            if best.identity not in fewer and guess(best) <= most:
-                others[best.identity] = best
+            if best.identity not in fewer and (cost_of_best := guess(best)) <= most:
+                others[best.identity] = cost_of_best, best
         others.pop(sequence.identity, None)
-        ranked = sorted(others.values(), key=guess)[: int(self._longer * self._config.patience)]
-        yield from sorted([*fewer.values(), *ranked], key=guess)
+        ranked = sorted(others.values(), key=_guessed)[: int(self._longer * self._config.patience)]
+        ranked = [*((guess(each), each) for each in fewer.values()), *ranked]
+        yield from (each for _, each in sorted(ranked, key=_guessed))
 
     def _judged(
         self, sequence: ContactSequence, base: MotionPlan, screen: SequenceScreen, wanted: float, astray: int
@@ -232,6 +233,11 @@ class LocalSearch:
             for index in wrong.tolist():
                 share[_contacts_of(sequence, index)] = less
         return None
+
+
+def _guessed(variant: tuple[float, ContactSequence]) -> float:
+    """The guessed cost of a variant."""
+    return variant[0]
 
 
 def _astray(plan: MotionPlan, screen: SequenceScreen) -> int:
