@@ -66,8 +66,8 @@ class Run:
     """A run with made-up costs; infinite ones have no motion, and only sequences in `passing` pass.
 
     The local search turns a sequence into what `better` has for its name; those in `hurrying` ask too much of joints.
-    What has no motion lacks it from `since` s on, and what does not pass fails in the transition `failed_at`; where
-    that is because of something `touching` the world, no pace is to blame.
+    What has no motion lacks it from `since` s on, and what does not pass fails in the transition `failed_at`; for those
+    in `touching` no pace is to blame.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class Run:
         since=None,
         failed_at=None,
         still=True,
-        touching=False,
+        touching=None,
         **settings,
     ):
         self.optimised, self.tested, self.improved = [], [], []
@@ -109,8 +109,8 @@ class Run:
                 if candidate.failure is None:
                     tested.append(candidate.plan.name)
                 passed = candidate.plan.name in passing
-                hurried = candidate.plan.name in (hurrying or ())
-                failed = Failure("it fell", transition=failed_at, too_fast=hurried, at_any_pace=touching)
+                hurried, touches = (candidate.plan.name in (names or ()) for names in (hurrying, touching))
+                failed = Failure("it fell", transition=failed_at, too_fast=hurried, at_any_pace=touches)
                 failure = candidate.failure or (None if passed else failed)
                 return SimpleNamespace(candidate=candidate, passed=passed, merit=(passed,), failure=failure)
 
@@ -247,9 +247,18 @@ def test_where_links_touch_the_world_the_pace_does_not_yield(monkeypatch):
     planner = Planner([solution("fast", FOOT)], [])
     planner.paces, planner.calm = 2, [solution("other", FOOT)]
     cost = {"fast": 10.0, "fast at 1": 10.0, "fast at 1 in 0": 10.5, "other": 11.0}
-    run = Run(planner, {"fast at 1 in 0", "other"}, monkeypatch, cost, failed_at=0, touching=True)
+    run = Run(planner, {"fast at 1 in 0", "other"}, monkeypatch, cost, failed_at=0, touching={"fast"})
     assert run.tested == ["fast", "other"] and run.result.passed
     assert planner.pace == 0 and planner.exclusions == [0, 1]
+
+
+def test_where_a_slowed_transition_leaves_links_that_touch_the_world_both_are_blamed(monkeypatch):
+    planner = Planner([solution("fast", FOOT)], [])
+    planner.paces, planner.calm = 2, [solution("other", FOOT)]
+    cost = {"fast": 10.0, "fast at 1": 10.0, "fast at 1 in 0": 10.5, "other": 11.0}
+    run = Run(planner, {"other"}, monkeypatch, cost, failed_at=0, touching={"fast at 1 in 0"})
+    assert run.tested == ["fast", "fast at 1 in 0", "other"] and run.result.passed
+    assert planner.pace == 0 and planner.exclusions == [0, 2]
 
 
 def test_where_a_calmer_pace_finds_nothing_the_one_before_is_searched_again(monkeypatch):

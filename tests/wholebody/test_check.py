@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from tests.wholebody.conftest import world_of
+from toolkit.contacts.failure import Failure
 from toolkit.geometry.limb import Limb
 from toolkit.wholebody.check import check
 from toolkit.wholebody.collision import first_collision
 from toolkit.wholebody.motion_dynamics import contact_wrenches, inverse_dynamics
-from toolkit.wholebody.plan import whole_body
+from toolkit.wholebody.plan import _joined, whole_body
 from toolkit.world.scene import compose_scene
 
 
@@ -124,6 +125,22 @@ def test_not_a_number_fails(robot, flat_walk, good):
     qpos[20, 9] = np.nan
     report, text = reasons(robot, flat_walk, good, qpos=qpos)
     assert text and not report.limits_respected and report.max_position_error == np.inf
+
+
+def test_a_link_in_the_world_is_to_blame_rather_than_joints_that_turn_too_hard(flat_walk):
+    hard, touch, off = Failure("hard", 2.0, too_fast=True), Failure("in", 1.0, at_any_pace=True), Failure("off", 0.5)
+
+    def joined(*findings, blocked=()):
+        return _joined(blocked, findings, flat_walk.schedule)
+
+    both = joined(hard, touch)
+    assert (both.reason, both.time, both.too_fast, both.at_any_pace) == ("hard; in", 1.0, False, True)
+    assert joined(hard).too_fast and not joined(hard).at_any_pace
+    assert joined(off, hard, touch).time == 0.5 and not joined(off, hard, touch).at_any_pace
+    palm, foot = Failure("palm", 3.0, at_any_pace=True), Failure("foot", 3.0)
+    assert joined(off, blocked=[palm]).at_any_pace and joined(touch, blocked=[palm]).time == 3.0
+    assert not joined(touch, blocked=[foot]).at_any_pace
+    assert joined() is None
 
 
 def test_a_blocked_swing_is_reported(robot, flat_walk):

@@ -178,10 +178,9 @@ class _Run:
         ]
 
     def _keeps_pace(self, tested: int) -> bool:
-        """Whether no pace is to blame in the trials from number `tested` on; half of all are left for calmer ones."""
-        last = [trial.failure for trial in self._trials[tested:]]
-        innocent = bool(last) and all(failure is not None and failure.at_any_pace for failure in last)
-        return innocent and len(self._trials) < self._config.candidates // 2
+        """Whether no pace is to blame in the last trial from number `tested` on; half are left for calmer ones."""
+        last = self._trials[-1].failure if len(self._trials) > tested else None
+        return last is not None and last.at_any_pace and len(self._trials) < self._config.candidates // 2
 
     @property
     def _calmer(self) -> tuple[Timing, ...]:
@@ -356,11 +355,14 @@ class _Run:
                 continue
             failure = self._failure_of(candidate)
             slowed = None if failure is None else self._slowed(candidate, failure)
-            if failure is None or (slowed is not None and self._failure_of(slowed) is None):
+            again = failure if slowed is None else self._failure_of(slowed)
+            if failure is None or again is None:
                 return True
             if self._too_fast:
                 break  # the next search is calmer, and no transition is to blame
             self._note(candidate.solution.sequence, failure)
+            if slowed is not None and again.at_any_pace:
+                self._note(candidate.solution.sequence, again)
             failures += 1 if slowed is None else 2
             if failures >= _FAILURES and self._calmer and self._robot.stands_on_one_foot:
                 break

@@ -205,15 +205,19 @@ def _blocked(schedule: ContactSchedule, paths: LimbPaths) -> list[Failure]:
 
 
 def _joined(blocked: Sequence[Failure], found: Sequence[Failure], schedule: ContactSchedule) -> Failure | None:
-    """All findings as one failure at the place of the first; blocked swings are what the others may come from."""
-    findings = [*blocked, *found]
+    """All findings as one failure at the place of the first that others may come from.
+
+    Others may come from blocked swings, and joints that turn too hard make no link touch the world.
+    """
+    findings, touches = [*blocked, *found], [each for each in found if each.at_any_pace]
     if not findings:
         return None
-    time = findings[0].time
+    only_hard_besides = all(each.too_fast or each.at_any_pace for each in found)
+    causes = blocked or (only_hard_besides and touches) or findings
+    time, reason = causes[0].time, "; ".join(each.reason for each in findings)
     transition = None if time is None else schedule.phase_at(time).transition
-    causes, reason = blocked or findings, "; ".join(each.reason for each in findings)
     too_fast, at_any_pace = all(each.too_fast for each in causes), all(each.at_any_pace for each in causes)
-    return replace(findings[0], reason=reason, transition=transition, too_fast=too_fast, at_any_pace=at_any_pace)
+    return replace(causes[0], reason=reason, transition=transition, too_fast=too_fast, at_any_pace=at_any_pace)
 
 
 def _without_postures(robot: RobotModel, paths: LimbPaths, times: np.ndarray) -> WholeBodyTrajectory:
