@@ -103,11 +103,13 @@ class LocalSearch:
         """The best plan of the search in all kinds of variants."""
         best = first = plan, plan_cost(plan, self._cost)
         if not screen.passes(plan.sequence):
-            start = self._judged(origin, plan, screen, np.inf, _astray(plan, screen)) if allowed(origin) else None
-            start = start or self._best_variant(*best, origin, screen, allowed)
-            if start is None:
+            start = self._judged(origin, plan, screen, np.inf, None) if allowed(origin) else None
+            if start is not None and len(_astray(start[0], screen)) <= len(_astray(plan, screen)):
+                best = self._slid(*start, screen, allowed) or start
+            elif (better := self._best_variant(*best, origin, screen, allowed)) is not None:
+                best = better
+            else:
                 return first
-            best = self._slid(*start, screen, allowed) or start
         while True:
             best = self._descended(*best, screen, allowed)
             slid = self._slid(*best, screen, allowed)
@@ -176,12 +178,18 @@ class LocalSearch:
         yield from (each for _, each in sorted(ranked, key=_guessed))
 
     def _judged(
-        self, sequence: ContactSequence, base: MotionPlan, screen: SequenceScreen, wanted: float, astray: int
+        self,
+        sequence: ContactSequence,
+        base: MotionPlan,
+        screen: SequenceScreen,
+        wanted: float,
+        astray: set[bytes] | None,
     ) -> tuple[MotionPlan, PlanCost] | None:
         """A sequence with its motion and true cost; None where the budget is spent or the motion does not hold.
 
-        The motion has to keep the margins of the base, and limbs may be out of reach in no more than the `astray`
-        transitions of the base's. Where it lacks margins, but costs little more than is wanted, contacts are moved.
+        The motion has to keep the margins of the base, and limbs may be out of reach only in the `astray` transitions,
+        those in which the base's are; None: anywhere. Where it lacks margins, but costs little more than is wanted,
+        contacts are moved.
         """
         identity = sequence.identity
         if identity not in self._known:
@@ -191,7 +199,7 @@ class LocalSearch:
             plan = self._optimise(sequence)
             self._known[identity] = plan, plan_cost(plan, self._cost)
         plan, cost = self._known[identity]
-        if not plan.motion.feasible or _astray(plan, screen) > astray:
+        if not plan.motion.feasible or (astray is not None and not _astray(plan, screen) <= astray):
             return None
         if keeps_margins(plan, base):
             return plan, cost
@@ -240,9 +248,13 @@ def _guessed(variant: tuple[float, ContactSequence]) -> float:
     return variant[0]
 
 
-def _astray(plan: MotionPlan, screen: SequenceScreen) -> int:
-    """Number of transitions in which limbs do not reach in a plan's motion."""
-    return int(np.count_nonzero(screen.reach_codes(plan)))
+def _astray(plan: MotionPlan, screen: SequenceScreen) -> set[bytes]:
+    """Identities of the transitions, with the stances before them, in which limbs do not reach in a plan's motion."""
+    sequence = plan.sequence
+    return {
+        b"|".join(each.identity for each in (*sequence.stances[index].contacts, sequence.transitions[index]))
+        for index in np.flatnonzero(screen.reach_codes(plan))
+    }
 
 
 def _contacts_of(sequence: ContactSequence, index: int) -> list[int]:
