@@ -354,9 +354,11 @@ class _Run:
                 ranked += [candidate, *self._improved(candidate)]
                 continue
             failure = self._failure_of(candidate)
-            slowed = None if failure is None else self._slowed(candidate, failure)
+            if failure is None:
+                return True
+            slowed = self._slowed(candidate, failure)
             again = failure if slowed is None else self._failure_of(slowed)
-            if failure is None or again is None:
+            if again is None:
                 return True
             if self._too_fast:
                 break  # the next search is calmer, and no transition is to blame

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain
+from operator import itemgetter
 
 import numpy as np
 
@@ -173,9 +174,9 @@ class LocalSearch:
             if best.identity not in fewer and (cost_of_best := guess(best)) <= most:
                 others[best.identity] = cost_of_best, best
         others.pop(sequence.identity, None)
-        ranked = sorted(others.values(), key=_guessed)[: int(self._longer * self._config.patience)]
+        ranked = sorted(others.values(), key=itemgetter(0))[: int(self._longer * self._config.patience)]
         ranked = [*((guess(each), each) for each in fewer.values()), *ranked]
-        yield from (each for _, each in sorted(ranked, key=_guessed))
+        yield from (each for _, each in sorted(ranked, key=itemgetter(0)))
 
     def _judged(
         self,
@@ -243,16 +244,11 @@ class LocalSearch:
         return None
 
 
-def _guessed(variant: tuple[float, ContactSequence]) -> float:
-    """The guessed cost of a variant."""
-    return variant[0]
-
-
 def _astray(plan: MotionPlan, screen: SequenceScreen) -> set[bytes]:
     """Identities of the transitions, with the stances before them, in which limbs do not reach in a plan's motion."""
-    sequence = plan.sequence
+    stances, transitions = plan.sequence.stances, plan.sequence.transitions
     return {
-        b"|".join(each.identity for each in (*sequence.stances[index].contacts, sequence.transitions[index]))
+        b"|".join(each.identity for each in (*stances[index].contacts, transitions[index]))
         for index in np.flatnonzero(screen.reach_codes(plan))
     }
 
