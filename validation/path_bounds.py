@@ -9,7 +9,7 @@ import numpy as np
 from toolkit.centroidal.intervals import intervals
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.search.costs.edge_cost import EdgeCost
-from toolkit.search.costs.plan_cost import known_cost
+from toolkit.search.costs.plan_cost import known_costs
 from toolkit.search.planner import ContactPlanner
 from validation.searched import Tested
 
@@ -101,7 +101,7 @@ class BoundCheck:
         """(n,) what the transitions from each one on cost without their dynamics."""
         stances, transitions = sequence.stances, sequence.transitions
         rests = [ContactSequence(stances[index], transitions[index:]) for index in range(len(transitions))]
-        return np.array([known_cost(rest, self._goal, self._usual, self._scale) for rest in rests])
+        return np.array([known_costs(rest, self._goal, self._usual, self._scale).sum() for rest in rests])
 
 
 def _from_here(objective: np.ndarray) -> np.ndarray:

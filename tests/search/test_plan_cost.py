@@ -15,7 +15,7 @@ from toolkit.pipeline.planner import make_planner
 from toolkit.prediction.kinematic import KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig
-from toolkit.search.costs.plan_cost import known_cost, plan_cost
+from toolkit.search.costs.plan_cost import known_costs, plan_cost
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.quasi_static import quasi_static_planner
@@ -52,10 +52,10 @@ def test_what_is_known_costs_what_it_cost_in_the_search(robot, timings):
     solutions = searched(robot, tilted, config)
     assert solutions
     for solution in solutions:
-        known = known_cost(solution.sequence, tilted.goal, config.cost)
+        known = known_costs(solution.sequence, tilted.goal, config.cost).sum()
         assert known + config.cost.dynamics * solution.objective.sum() == pytest.approx(solution.cost, rel=1e-12)
     last, level = solutions[-1].sequence, replace(config.cost, steep=0.0)
-    assert known_cost(last, tilted.goal, level) < known_cost(last, tilted.goal, config.cost)
+    assert known_costs(last, tilted.goal, level).sum() < known_costs(last, tilted.goal, config.cost).sum()
 
 
 def test_the_true_cost_is_the_sum_of_its_terms(plan):
@@ -65,7 +65,7 @@ def test_the_true_cost_is_the_sum_of_its_terms(plan):
     assert cost.total == pytest.approx(sum(cost.terms.values())) and all(term >= 0.0 for term in cost.terms.values())
     rests = plan.schedule.duration - plan.sequence.duration
     assert rests == pytest.approx(1.4) and cost.seconds == pytest.approx(plan.schedule.duration)
-    known = known_cost(plan.sequence, plan.world.goal, config)
+    known = known_costs(plan.sequence, plan.world.goal, config).sum()
     assert cost.total == pytest.approx(known + config.time * rests + config.dynamics * plan.motion.objective)
     assert cost.step == config.step * len(plan.sequence.transitions)
     assert cost.time == pytest.approx(20.0 * plan.schedule.duration)

@@ -17,7 +17,7 @@ from toolkit.robot.scale import USUAL, Scale
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig, EdgeCost, arrival_radius
 from toolkit.search.costs.heuristic import EuclideanDistance
-from toolkit.search.costs.plan_cost import known_cost
+from toolkit.search.costs.plan_cost import known_costs
 from toolkit.search.ground import Ground
 from toolkit.search.moves.body_room import BodyRoom
 from toolkit.search.moves.exclusion import Blame
@@ -191,7 +191,7 @@ def sequence_of(factor):
 def test_terms_of_the_cost_go_with_the_length_of_the_way():
     scale, factor = Scale(0.25, 0.1), 0.25
     usual, small = (
-        known_cost(sequence_of(each), Goal(each * np.array([0.6, 0.0, 0.0]), each * 0.3), CostConfig(), size)
+        known_costs(sequence_of(each), Goal(each * np.array([0.6, 0.0, 0.0]), each * 0.3), CostConfig(), size).sum()
         for each, size in ((1.0, USUAL), (factor, scale))
     )
     assert small == pytest.approx(factor * usual, rel=1e-12)

@@ -7,14 +7,17 @@ sequence that is already optimised gives the scale.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.stance import Contact, Stance
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.scale import USUAL, Scale
 from toolkit.search.costs.edge_cost import CostConfig
-from toolkit.search.costs.plan_cost import PlanCost, known_cost
+from toolkit.search.costs.plan_cost import PlanCost, known_costs
 from toolkit.world.world import Goal
 
 _OVER = 0.7  # part of the way from the middle of the feet to the standing one, in the middle of a swing
@@ -37,13 +40,43 @@ class Foresight:
 
     def __init__(self, sequence: ContactSequence, cost: PlanCost, config: CostConfig, goal: Goal, scale: Scale = USUAL):
         self._config, self._goal, self._scale = config, goal, scale
-        self._per_travel = cost.dynamics / max(travel(sequence, scale.time), 1e-9)
-        self._rests = cost.total - cost.dynamics - known_cost(sequence, goal, config, scale)
+        # Known cost, place of the CoM, shift and swing of each transition that was met. Variants share most of them.
+        self._met: dict[tuple[bytes, bytes, bool, bytes], np.ndarray] = {}
+        known, way = self._known_and_travel(sequence)
+        self._per_travel = cost.dynamics / max(way, 1e-9)
+        self._rests = cost.total - cost.dynamics - known
 
     def __call__(self, sequence: ContactSequence) -> float:
         """The guess for a variant."""
-        known, way = known_cost(sequence, self._goal, self._config, self._scale), travel(sequence, self._scale.time)
+        known, way = self._known_and_travel(sequence)
         return known + self._rests + self._per_travel * way
+
+    def _known_and_travel(self, sequence: ContactSequence) -> tuple[float, float]:
+        """The cost that is known without the motion, and `travel`."""
+        contacts = {contact.limb: contact for contact in sequence.start.contacts}
+        begin, keys, new = _middle(contacts), [], None
+        for index, transition in enumerate(sequence.transitions):
+            feet = (contacts[foot].identity for foot in FEET)
+            keys.append((*feet, len(contacts) > len(FEET), transition.identity))
+            if keys[-1] not in self._met:
+                first, stance = new[:2] if new else (index, Stance(tuple(contacts[limb] for limb in sorted(contacts))))
+                new = first, stance, index + 1
+            if transition.contact is None:
+                contacts.pop(transition.limb, None)
+            else:
+                contacts[transition.limb] = transition.contact
+        if new:
+            first, stance, after = new
+            part = ContactSequence(stance, sequence.transitions[first:after])
+            self._met.update(zip(keys[first:after], self._rows(part), strict=True))
+        rows = np.array([self._met[key] for key in keys]).reshape(-1, 6)
+        way = _travelled(begin[None], rows[:, 1:4], _middle(contacts)[None], rows[:, 4:], self._scale.time)
+        return float(rows[:, 0].sum()), float(way)
+
+    def _rows(self, sequence: ContactSequence) -> np.ndarray:
+        """(n, 6) known cost, place of the CoM, shift and swing of the transitions of a sequence."""
+        walk, known = Walk.of(sequence), known_costs(sequence, self._goal, self._config, self._scale)
+        return np.column_stack([known, walk.swings, walk.times])
 
 
 def travel(sequence: ContactSequence, pace: float = 1.0) -> float:
@@ -107,15 +140,30 @@ class Walk(NamedTuple):
             np.concatenate([self.times[:first], np.repeat(self.times[first : first + 1], steps, 0), self.times[last:]]),
         )
 
-    def travel(self, pace: float) -> np.ndarray:
-        """(...); see `travel`."""
-        rest, spans = pace * _REST, self.times.sum(1)
-        begins = np.concatenate([[0.0], np.cumsum(spans)])
-        times = np.concatenate([[-rest], begins[:-1] + self.times[:, 0] + self.times[:, 1] / 2, begins[-1:] + rest])
+    @property
+    def swings(self) -> np.ndarray:
+        """(..., n, 3) m; places of the CoM in the middle of each swing."""
         middle = self.feet.mean(-2)
         swings = (middle[..., :-1, :] + middle[..., 1:, :]) / 2
         foot = np.maximum(self.standing, 0)[..., None, None]
         stands = np.take_along_axis(self.feet[..., :-1, :, :], foot, axis=-2)[..., 0, :]
-        swings = swings + np.where(self.standing >= 0, self.over, 0.0)[..., None] * (stands - swings)
-        places = np.concatenate([middle[..., :1, :], swings, middle[..., -1:, :]], axis=-2)
-        return ((np.diff(places, axis=-2) ** 2).sum(-1) / np.diff(times)).sum(-1)
+        return swings + np.where(self.standing >= 0, self.over, 0.0)[..., None] * (stands - swings)
+
+    def travel(self, pace: float) -> np.ndarray:
+        """(...); see `travel`."""
+        begin, end = (self.feet[..., where, :, :].mean(-2) for where in (slice(1), slice(-1, None)))
+        return _travelled(begin, self.swings, end, self.times, pace)
+
+
+def _travelled(begin: np.ndarray, swings: np.ndarray, end: np.ndarray, times: np.ndarray, pace: float) -> np.ndarray:
+    """(...) sum of |way|^2 / time from (..., 1, 3) through the swings' (..., n, 3) to (..., 1, 3) in times (n, 2)."""
+    rest, begins = pace * _REST, np.concatenate([[0.0], np.cumsum(times.sum(1))])
+    at = np.concatenate([[-rest], begins[:-1] + times[:, 0] + times[:, 1] / 2, begins[-1:] + rest])
+    places = np.concatenate([begin, swings, end], axis=-2)
+    return ((np.diff(places, axis=-2) ** 2).sum(-1) / np.diff(at)).sum(-1)
+
+
+def _middle(contacts: Mapping[Limb, Contact]) -> np.ndarray:
+    """(3,) m; mean of the feet."""
+    left, right = (contacts[foot].pose.position for foot in FEET)
+    return (left + right) / 2

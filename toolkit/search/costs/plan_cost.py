@@ -80,10 +80,10 @@ def plan_cost(plan: MotionPlan, config: CostConfig) -> PlanCost:
     )
 
 
-def known_cost(sequence: ContactSequence, goal: Goal, config: CostConfig, scale: Scale = USUAL) -> float:
-    """Sum over the transitions of a sequence of the terms that are known without the motion; no rests."""
+def known_costs(sequence: ContactSequence, goal: Goal, config: CostConfig, scale: Scale = USUAL) -> np.ndarray:
+    """(transitions,) sums of the terms of a sequence that are known without its motion; no rests."""
     cost, candidates = _transitions(sequence, goal, config, scale)
-    return float(cost.known(candidates).sum())
+    return cost.known(candidates)
 
 
 def _transitions(
