@@ -239,19 +239,28 @@ def _fill_reach(occupancy, walker, places, yaw, sink, feet, turns, standing, rea
 def _reach_of(occupancy, walker, body, posture, side):
     """How far a body can move to a side (see `_fill_reach`) in m; inf where it is far."""
     tries, step = int(_FAR / _STEP), walker.scale * _STEP
-    free = tries
-    for k in range(tries, 0, -1):
-        if not _body_free(occupancy, body, posture, side, k * step):
-            free = k - 1
+    if _body_free(occupancy, _stretched(body, side, tries * step / 2), posture, side, tries * step / 2):
+        return np.inf
+    free = 0
+    while free < tries and _body_free(occupancy, body, posture, side, (free + 1) * step):
+        free += 1
     if free == tries:
         return np.inf
     if side % 2 == 1:
         return max(free * step, walker.scale * _SWAY)
     if _legs_free(occupancy, walker, posture, side, 0.0):
-        for k in range(free, 0, -1):
-            if not _legs_free(occupancy, walker, posture, side, k * step):
-                free = k - 1
+        bodies, free = free, 0
+        while free < bodies and _legs_free(occupancy, walker, posture, side, (free + 1) * step):
+            free += 1
     return max(free * step, walker.scale * _LEAST)
+
+
+@compiled
+def _stretched(body, side, by):
+    """A body that is longer by so many m to a side and away from it, and a hair more."""
+    more = by + 1e-9
+    depth, width = (more, 0.0) if side % 2 == 0 else (0.0, more)
+    return BodyBox(body.half_depth + depth, body.half_width + width, body.bottom, body.top)
 
 
 @compiled
