@@ -10,6 +10,7 @@ from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import Pose
+from toolkit.refine.chains import FootChains
 from toolkit.refine.foresight import travel
 from toolkit.refine.variants import left_out, relinked, swapped, without_palms
 
@@ -85,7 +86,7 @@ def test_neighbours_change_places(leaning, walk):
 
 
 def test_other_steps_lead_to_the_same_stance(walk):
-    groups = [list(group) for group in relinked(walk.sequence, walk.screen)]
+    groups = [list(group) for group in relinked(walk.sequence, FootChains(walk.screen))]
     variants = [variant for group in groups for variant in group]
     counts = {len(variant.transitions) - len(walk.sequence.transitions) for variant in variants}
     assert {-2, 0, 2} <= counts and min(counts) >= -3 and max(counts) <= 2
@@ -105,7 +106,7 @@ def test_palms_are_never_in_what_is_replaced(leaning, walk):
     own = walk.screen
     known = {"numbers": own.numbers, "steps": own.steps, "table": own.table, "scale": own.scale}
     screen = SimpleNamespace(passes=lambda sequence, last=None: True, code=lambda *_: 0, **known)
-    for group in relinked(leaning, screen):  # pyright: ignore[reportArgumentType]
+    for group in relinked(leaning, FootChains(screen)):  # pyright: ignore[reportArgumentType]
         for variant in group:
             palms = [[item for item in each.transitions if item.limb == PALM] for each in (variant, leaning)]
             assert palms[0] == palms[1]

@@ -12,6 +12,7 @@ import numpy as np
 from toolkit.centroidal.plan import MotionPlan, keeps_margins
 from toolkit.contacts.room import RoomConfig
 from toolkit.contacts.sequence import ContactSequence
+from toolkit.refine.chains import FootChains
 from toolkit.refine.foresight import Foresight
 from toolkit.refine.variants import left_out, relinked, swapped, without_palms
 from toolkit.search.costs.edge_cost import CostConfig, arrival_radius
@@ -93,6 +94,7 @@ class LocalSearch:
         """
         self._longer = max(1.0, len(plan.sequence.transitions) / self._config.usual)
         most = int(self._longer * self._config.optimisations)
+        self._chains = FootChains(screen)
         before, self._limit = self.spent, self.spent + 3 * most // 4
         best = self._searched(plan, origin, screen, allowed)
         self._limit = before + most
@@ -166,7 +168,7 @@ class LocalSearch:
         guess = Foresight(plan.sequence, cost, self._cost, plan.world.goal, plan.robot.scale)
         fewer = {each.identity: each for each in (*without_palms(sequence, screen), *left_out(sequence, screen))}
         swaps = (iter([each]) for each in swapped(sequence, screen))
-        groups = chain(relinked(sequence, screen), swaps) if all_kinds else ()
+        groups = chain(relinked(sequence, self._chains), swaps) if all_kinds else ()
         most = cost.total * (1.0 + self._config.prospect)
         others: dict[bytes, tuple[float, ContactSequence]] = {}
         for group in groups:

@@ -8,19 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
-from toolkit.geometry.heading import wrapped
 from toolkit.geometry.limb import FEET, PALMS, Limb
+from toolkit.refine.chains import FootChains
 from toolkit.refine.foresight import Walk
 from toolkit.search.sequence_screen import SequenceScreen
-from toolkit.world.timing import Timing
 
 _APART = 3  # transitions; two that are farther apart can be left out together if each of them can be left out alone
 _WINDOW = 7  # most transitions that are replaced together
 _LESS, _MORE = 3, 2  # most by which their number falls or rises
 _STEPS = 5  # most transitions that replace them
-_BEAM = 4  # most places that are tried for a new contact in between
-# m of distance that 1 rad of turning counts as for a body of the usual size (`toolkit.robot.scale`), to compare places
-_TURN = 0.1
 
 
 def left_out(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[ContactSequence]:
@@ -70,14 +66,14 @@ def swapped(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[Conta
             yield variant
 
 
-def relinked(sequence: ContactSequence, screen: SequenceScreen) -> Iterator[Iterator[ContactSequence]]:
+def relinked(sequence: ContactSequence, chains: FootChains) -> Iterator[Iterator[ContactSequence]]:
     """Sequences in which other steps lead from one stance to a later one: fewer, as many or a few more.
 
     Those with as many steps between the same stances come together, since they differ little, the one on which the CoM
     travels least first. New contacts in between are steps that the search itself would consider, near the straight way
     of their foot.
     """
-    transitions, links = sequence.transitions, _Links(sequence, screen)
+    transitions, links = sequence.transitions, _Links(sequence, chains)
     for first in range(len(transitions)):
         if not transitions[first].limb.is_foot:
             continue
@@ -100,12 +96,13 @@ class _Links:
 
     Args:
         sequence: The sequence.
-        screen: The screens of its search.
+        chains: Chains of steps out of the moves of its search.
     """
 
-    def __init__(self, sequence: ContactSequence, screen: SequenceScreen):
-        self._sequence, self._screen, self._stances = sequence, screen, sequence.stances
-        self._numbers, self._walk = screen.numbers(sequence), Walk.of(sequence)
+    def __init__(self, sequence: ContactSequence, chains: FootChains):
+        self._sequence, self._chains, self._screen = sequence, chains, chains.screen
+        self._stances, self._numbers = sequence.stances, chains.screen.numbers(sequence)
+        self._walk = Walk.of(sequence)
 
     def between(self, first: int, last: int, count: int) -> Iterator[ContactSequence]:
         """Sequences with chains of `count` steps from the stance `first` to the stance `last`, between feet alone."""
@@ -116,7 +113,8 @@ class _Links:
             limbs = tuple(foot if index % 2 == 0 else foot.mirrored for index in range(count))
             follows = last == len(transitions) or transitions[last].limb != limbs[-1]
             if foot != before and follows:
-                chains += [(limbs, rows) for rows in self._chains(first, last, limbs)]
+                made = self._chains.between(self._numbers[first], self._numbers[last], limbs, timing)
+                chains += [(limbs, rows) for rows in made]
         for limbs, rows in self._shortest_first(first, last, chains):
             ends, table = max(count - 2, 0), self._screen.table
             if any(
@@ -133,36 +131,6 @@ class _Links:
             if self._screen.passes(changed, before):
                 yield replace(self._sequence, transitions=(*transitions[:first], *chain, *transitions[last:]))
 
-    def _chains(self, first: int, last: int, limbs: tuple[Limb, ...]) -> list[np.ndarray]:
-        """Chains of steps of some feet, to the feet of the later stance: (steps + 1, 4) contact numbers each."""
-        start, end, position = self._numbers[first], self._numbers[last], self._screen.table.position
-        timing = self._sequence.transitions[first].timing
-        if len(limbs) == 1:
-            other = limbs[0].mirrored
-            if (position[start[other]] != position[end[other]]).any():
-                return []
-        ends = limbs[max(len(limbs) - 2, 0) :]
-        beam = [start[None]]
-        for index, limb in enumerate(limbs[: -len(ends)]):
-            share = limbs[: index + 1].count(limb) / limbs.count(limb)
-            beam = [
-                _moved(rows, limb, number)
-                for rows in beam
-                for number in self._nearest(rows[-1], limb, timing, int(start[limb]), int(end[limb]), share)
-            ]
-        for limb in ends:
-            beam = [_moved(rows, limb, int(end[limb])) for rows in beam]
-        return beam
-
-    def _nearest(self, row: np.ndarray, limb: Limb, timing: Timing, first: int, last: int, share: float) -> list[int]:
-        """The steps out of a stance that are nearest to a share of the straight way between two contacts."""
-        table, steps = self._screen.table, self._screen.steps(row, limb, timing)
-        place = table.position[first] + share * (table.position[last] - table.position[first])
-        yaw = table.yaw[first] + share * wrapped(table.yaw[last] - table.yaw[first])
-        away = np.linalg.norm(table.position[steps] - place, axis=1)
-        turn = self._screen.scale.length * _TURN * np.abs((table.yaw[steps] - yaw + np.pi) % (2 * np.pi) - np.pi)
-        return steps[np.argsort(away + turn, kind="stable")[:_BEAM]].tolist()
-
     def _shortest_first(
         self, first: int, last: int, chains: list[tuple[tuple[Limb, ...], np.ndarray]]
     ) -> list[tuple[tuple[Limb, ...], np.ndarray]]:
@@ -174,10 +142,3 @@ class _Links:
         walks = self._walk.linked(first, last, self._screen.table.position[between], standing)
         order = np.argsort(walks.travel(self._screen.scale.time), kind="stable")
         return [chains[index] for index in order]
-
-
-def _moved(rows: np.ndarray, limb: Limb, number: int) -> np.ndarray:
-    """Stances (k, 4) and the one after a limb has moved, as contact numbers (k + 1, 4)."""
-    longer = np.concatenate([rows, rows[-1:]])
-    longer[-1, limb] = number
-    return longer
