@@ -1,5 +1,6 @@
 """A walk over flat ground with more steps than it needs, and the screens of a search there."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.sequence_screen import SequenceScreen
 from toolkit.world.world import World
+
+PALM = Limb.LEFT_PALM
 
 
 class Walk(NamedTuple):
@@ -55,3 +58,17 @@ def walk():
     sequence = steps(planner.ground.start_stance(), 8, 0.2)
     assert search.screen.passes(sequence)
     return Walk(robot, world, search.screen, sequence)
+
+
+@pytest.fixture
+def leaning(walk):
+    """The walk with two touches of a palm, of which the first moves once."""
+    pose = walk.sequence.start[Limb.LEFT_FOOT].pose
+
+    def touch(height):
+        place = Pose(pose.rotation, pose.position + [0.0, 0.5, height])
+        return ContactTransition(PALM, Contact(PALM, place, 0.7, 0), walk.world.timing)
+
+    release = ContactTransition(PALM, None, walk.world.timing)
+    a, b, c, d, *_ = walk.sequence.transitions
+    return replace(walk.sequence, transitions=(touch(1.0), a, touch(1.1), b, release, c, touch(1.2), d))

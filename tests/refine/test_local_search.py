@@ -10,7 +10,7 @@ from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.sequence import SequenceConfig
 from toolkit.refine.foresight import Foresight, travel
 from toolkit.refine.local_search import LocalSearch, RefineConfig, arrives
-from toolkit.refine.variants import left_out
+from toolkit.refine.variants import left_out, swapped
 from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.plan_cost import plan_cost
 
@@ -157,6 +157,16 @@ def test_the_guess_of_a_sequence_itself_is_its_cost_and_detours_cost_more(walk, 
     wide[3] = replace(wide[3], contact=replace(contact, pose=aside))
     detour = replace(plan.sequence, transitions=tuple(wide))
     assert travel(detour) > travel(plan.sequence) and guess(detour) > cost.total
+
+
+def test_what_variants_share_does_not_change_their_guesses(walk, leaning, plan):
+    cost = plan_cost(plan, COST)
+    guess = Foresight(plan.sequence, cost, COST, walk.world.goal)
+    variants = [*left_out(walk.sequence, walk.screen), *swapped(walk.sequence, walk.screen), leaning]
+    assert len(variants) > 10
+    for variant in [*variants, *variants[::-1]]:
+        alone = Foresight(plan.sequence, cost, COST, walk.world.goal)(variant)
+        assert guess(variant) == pytest.approx(alone, rel=1e-12)
 
 
 def test_a_plan_slides_within_its_share_of_the_room(walk, plan):

@@ -6,15 +6,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from toolkit.contacts.sequence import ContactSequence, ContactTransition
-from toolkit.contacts.stance import Contact
+from tests.refine.conftest import PALM
+from toolkit.contacts.sequence import ContactSequence
 from toolkit.geometry.limb import Limb
-from toolkit.geometry.pose import Pose
 from toolkit.refine.chains import FootChains
 from toolkit.refine.foresight import travel
 from toolkit.refine.variants import left_out, relinked, swapped, without_palms
-
-PALM = Limb.LEFT_PALM
 
 
 class Anything:
@@ -28,20 +25,6 @@ class Anything:
                     return False
                 held = item.contact is not None
         return True
-
-
-@pytest.fixture
-def leaning(walk):
-    """The walk with two touches of a palm, of which the first moves once."""
-    pose = walk.sequence.start[Limb.LEFT_FOOT].pose
-
-    def touch(height):
-        place = Pose(pose.rotation, pose.position + [0.0, 0.5, height])
-        return ContactTransition(PALM, Contact(PALM, place, 0.7, 0), walk.world.timing)
-
-    release = ContactTransition(PALM, None, walk.world.timing)
-    a, b, c, d, *_ = walk.sequence.transitions
-    return replace(walk.sequence, transitions=(touch(1.0), a, touch(1.1), b, release, c, touch(1.2), d))
 
 
 def limbs(sequence):
