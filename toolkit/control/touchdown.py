@@ -23,8 +23,8 @@ EARLY_HEIGHT, EARLY_WAY = 0.05, 0.1  # m above its contact and along it; what to
 
 # How much force a limb in contact is asked to bear.
 MIN_FOOT_FORCE, MIN_PALM_FORCE = 10.0, 2.0  # N; least forces of settled contacts, so that they stay closed
-# s; times in which the bound on the normal force rises after contact is made. Plans brake with all of a foot's force at
-# once: each 0.01 s in which it is held back leaves a robot that runs down a slope 0.05 m/s too fast.
+# s; times in which the bound on the normal force rises after contact is made. Plans use all of a foot's force at once:
+# with 0.06 s a robot that ran down a steep slope was 0.15 m/s too fast at its end.
 FOOT_RAMP, PALM_RAMP = 0.015, 0.4
 RELEASE_RAMP = 0.06  # s; time in which it falls before contact is broken
 SETTLE_FORCE, RELEASE_FORCE = 30.0, 5.0  # N; where the rising bound starts, and where the falling one ends
