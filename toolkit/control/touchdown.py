@@ -25,7 +25,7 @@ EARLY_HEIGHT, EARLY_WAY = 0.05, 0.1  # m above its contact and along it; what to
 MIN_FOOT_FORCE, MIN_PALM_FORCE = 10.0, 2.0  # N; least forces of settled contacts, so that they stay closed
 # s; times in which the bound on the normal force rises after contact is made. Plans use all of a foot's force at once:
 # with 0.06 s a robot that ran down a steep slope was 0.15 m/s too fast at its end.
-FOOT_RAMP, PALM_RAMP = 0.015, 0.4
+FOOT_RAMP, PALM_RAMP = 0.006, 0.4
 RELEASE_RAMP = 0.06  # s; time in which it falls before contact is broken
 SETTLE_FORCE, RELEASE_FORCE = 30.0, 5.0  # N; where the rising bound starts, and where the falling one ends
 LOOSE = 0.5  # part of its least force; a limb in contact that bears less has bounced off
