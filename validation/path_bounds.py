@@ -99,11 +99,9 @@ class BoundCheck:
 
     def _known(self, sequence: ContactSequence) -> np.ndarray:
         """(n,) what the transitions from each one on cost without their dynamics."""
-        stances, transitions = sequence.stances, sequence.transitions
-        rests = [ContactSequence(stances[index], transitions[index:]) for index in range(len(transitions))]
-        return np.array([known_costs(rest, self._goal, self._usual, self._scale).sum() for rest in rests])
+        return _from_here(known_costs(sequence, self._goal, self._usual, self._scale))
 
 
-def _from_here(objective: np.ndarray) -> np.ndarray:
-    """(n,) sums of the objectives of the transitions from each one on."""
-    return np.cumsum(objective[::-1])[::-1]
+def _from_here(terms: np.ndarray) -> np.ndarray:
+    """(n,) sums of a term (n,) of the transitions from each one on."""
+    return np.cumsum(terms[::-1])[::-1]

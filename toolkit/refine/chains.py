@@ -71,7 +71,7 @@ class FootChains:
         place = table.position[first] + share * (table.position[last] - table.position[first])
         yaw = table.yaw[first] + share * wrapped(table.yaw[last] - table.yaw[first])
         away = np.linalg.norm(table.position[steps] - place, axis=1)
-        turn = self.screen.scale.length * _TURN * np.abs((table.yaw[steps] - yaw + np.pi) % (2 * np.pi) - np.pi)
+        turn = self.screen.scale.length * _TURN * np.abs(wrapped(table.yaw[steps] - yaw))
         return steps[np.argsort(away + turn, kind="stable")[:_BEAM]].tolist()
 
 

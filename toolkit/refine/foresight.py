@@ -54,21 +54,21 @@ class Foresight:
     def _known_and_travel(self, sequence: ContactSequence) -> tuple[float, float]:
         """The cost that is known without the motion, and `travel`."""
         contacts = {contact.limb: contact for contact in sequence.start.contacts}
-        begin, keys, new = _middle(contacts), [], None
-        for index, transition in enumerate(sequence.transitions):
+        begin, keys, befores = _middle(contacts), [], []
+        for transition in sequence.transitions:
+            befores.append(contacts.copy())
             feet = (contacts[foot].identity for foot in FEET)
             keys.append((*feet, len(contacts) > len(FEET), transition.identity))
-            if keys[-1] not in self._met:
-                first, stance = new[:2] if new else (index, Stance(tuple(contacts[limb] for limb in sorted(contacts))))
-                new = first, stance, index + 1
             if transition.contact is None:
                 contacts.pop(transition.limb, None)
             else:
                 contacts[transition.limb] = transition.contact
+        new = [index for index, key in enumerate(keys) if key not in self._met]
         if new:
-            first, stance, after = new
-            part = ContactSequence(stance, sequence.transitions[first:after])
-            self._met.update(zip(keys[first:after], self._rows(part), strict=True))
+            before, span = befores[new[0]], slice(new[0], new[-1] + 1)
+            stance = Stance(tuple(before[limb] for limb in sorted(before)))
+            rows = self._rows(ContactSequence(stance, sequence.transitions[span]))
+            self._met.update(zip(keys[span], rows, strict=True))
         rows = np.array([self._met[key] for key in keys]).reshape(-1, 6)
         way = _travelled(begin[None], rows[:, 1:4], _middle(contacts)[None], rows[:, 4:], self._scale.time)
         return float(rows[:, 0].sum()), float(way)

@@ -239,7 +239,8 @@ def _fill_reach(occupancy, walker, places, yaw, sink, feet, turns, standing, rea
 def _reach_of(occupancy, walker, body, posture, side):
     """How far a body can move to a side (see `_fill_reach`) in m; inf where it is far."""
     tries, step = int(_FAR / _STEP), walker.scale * _STEP
-    if _body_free(occupancy, _stretched(body, side, tries * step / 2), posture, side, tries * step / 2):
+    half = tries * step / 2
+    if _body_free(occupancy, _stretched(body, side, half), posture, side, half):
         return np.inf
     free = 0
     while free < tries and _body_free(occupancy, body, posture, side, (free + 1) * step):
