@@ -15,8 +15,7 @@ from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.program import SMOOTH, Program, Regularisers, wanted_friction
 from toolkit.centroidal.residual import check, confirmed, cop_margin
 from toolkit.centroidal.sequence import WANTED, WANTED_BODY, SequenceConfig, optimise
-from toolkit.centroidal.stages.method import Squares, Work, evaluate
-from toolkit.centroidal.stages.rows import prepare_contacts
+from toolkit.centroidal.stages.method import Squares, Work, evaluate, prepare
 from toolkit.contacts.schedule import ContactSchedule
 from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.contacts.stance import Contact, Stance
@@ -205,11 +204,13 @@ def sample_point(program, rng):
 def model_at(program, y, multiplier):
     """The stage solver's model at y, with all multipliers alike: work arrays and objective."""
     layout = program.layout
-    work = Work.of(len(layout.size), layout.states, y.shape[1])
-    prepare_contacts(program.blocks.contacts)
+    stages, m = y.shape
+    work = Work.of(stages, layout.states, m)._replace(hessian=np.zeros((stages, m, m)))
+    given = program.prices, Squares.none(), program.blocks
+    prepare(*given, work)
     for block in program.blocks:
         block.multiplier[:] = multiplier
-    value = evaluate(program.steps, program.prices, Squares.none(), program.blocks, layout.size, y, 0.0, False, work)
+    value = evaluate(program.steps, *given, 0, stages, layout.size, y, 0.0, False, work)
     return work, value
 
 

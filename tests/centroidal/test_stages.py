@@ -8,10 +8,10 @@ import pytest
 from toolkit.centroidal.build import transition_problem
 from toolkit.centroidal.program import Program
 from toolkit.centroidal.sequence import SequenceConfig, guess
-from toolkit.centroidal.stages import blocks, newton
+from toolkit.centroidal.stages import blocks, method, newton
 from toolkit.centroidal.stages.blocks import Block
-from toolkit.centroidal.stages.method import Prices, Squares, Work, direction, evaluate, longest_steps
-from toolkit.centroidal.stages.rows import CONE, SHARPNESS, add_prices, add_squares, prepare_contacts
+from toolkit.centroidal.stages.method import Options, Prices, Squares, Work
+from toolkit.centroidal.stages.rows import CONE, SHARPNESS, add_prices, add_squares
 from toolkit.contacts.category import Category
 from validation.random_contacts import sample_transition
 
@@ -50,11 +50,18 @@ def test_the_sweep_solves_the_system_of_all_stages(seed):
             following[t, :, :k] = jacobian[rows, here] = rng.normal(size=(n, k))
             jacobian[rows, first[t + 1] : first[t + 1] + n] = -np.eye(n)
             value[rows] = defect[t]
-    sweep, change = newton.allocate(stages, n, m), np.zeros((stages, m))
-    newton.factor(size, hessian, following, sweep)
+    sweep, change, middle = newton.allocate(stages, n, m), np.zeros((stages, m)), int(rng.integers(0, stages))
+    for begin, end in ((middle, stages), (0, middle)):  # some of the stages at a time
+        few = np.full((max(end - begin, 1), m, m), np.nan)
+        for t in range(begin, end):
+            few[t % len(few)] = hessian[t]
+        newton.factor(begin, end, size, few, following, sweep)
     expected = newton_step(whole, slope, jacobian, value)
     for _ in range(2):  # the factors serve many right-hand sides
-        newton.solve(size, following, defect, gradient.copy(), sweep, change)
+        q = gradient.copy()
+        for begin, end in ((middle, stages), (0, middle)):
+            newton.backward(begin, end, size, following, defect, q, sweep)
+        newton.forward(size, following, defect, sweep, change)
         found = np.concatenate([row[:k] for row, k in zip(change, size, strict=True)])
         np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
 
@@ -94,8 +101,9 @@ def test_condensed_rows_fulfil_the_linearised_conditions(corrected):
     s, z, g = (array.ravel() for array in (block.slack, block.multiplier, block.value))
     wanted = goal - (block.slack_change * block.multiplier_change).ravel() * corrected
     condensed, force = hessian.copy(), gradient.copy()
-    blocks.add_curvature(block, condensed)
-    blocks.add_gradient(block, goal, corrected, force)
+    for part in ((4, len(block.stage)), (0, 4)):
+        blocks.add_curvature(block, part, condensed)
+        blocks.add_gradient(block, part, goal, corrected, force)
     change = -np.linalg.solve(condensed, force[..., None])[..., 0]
     blocks.set_changes(block, goal, corrected, change)
     d, ds, dz = change.ravel(), block.slack_change.ravel(), block.multiplier_change.ravel()
@@ -118,15 +126,13 @@ def test_steps_keep_slacks_and_multipliers_positive():
         for end, step in zip(ends, (primal, dual), strict=True):
             assert end.min() >= -1e-12 and (step == pytest.approx(1.01) or end.min() < 1e-12)
         expected = blocks.product_after(block, 0.9 * primal, 0.8 * dual)
-        together = longest_steps((block, block), 0.9)
+        together = method.longest_steps((block, block), 0.9)
         np.testing.assert_allclose(together, np.minimum(0.9 * np.array([primal, dual]), 1.0), rtol=1e-12)
         blocks.move(block, 0.9 * primal, 0.8 * dual, False)
         assert block.slack.min() > 0.0 and block.multiplier.min() > 0.0
-        assert blocks.complementarity(block) == pytest.approx(expected)
         assert expected == pytest.approx((block.slack * block.multiplier).sum())
-        assert blocks.largest_violation(block) == pytest.approx(-block.value.min())
-        off = np.abs(block.value - block.slack)
-        assert blocks.mismatch(block) == pytest.approx((off * block.multiplier).sum())
+        mismatch = (np.abs(block.value - block.slack) * block.multiplier).sum()
+        assert blocks.state(block) == pytest.approx((-block.value.min(), expected, mismatch))
 
 
 def test_linear_rows_change_with_a_step_as_their_slopes_say():
@@ -148,7 +154,7 @@ def test_prices_and_their_derivatives():
 
     def model(y):
         hessian, gradient = np.zeros((stages, size, size)), np.zeros((stages, size))
-        value = add_prices(single, y, hessian, gradient) + add_squares(sums, y, hessian, gradient)
+        value = add_prices(single, (0, n), y, hessian, gradient) + add_squares(sums, (0, n), y, hessian, gradient)
         return value, gradient, hessian
 
     y, step = rng.normal(size=(2, stages, size))
@@ -161,9 +167,11 @@ def test_prices_and_their_derivatives():
     assert model(y + step)[0] == pytest.approx(value + (gradient * step).sum() + bend / 2)
 
 
-def parts_of(program):
-    """What the solver takes of a program."""
-    return program.steps, program.prices, Squares.none(), program.blocks
+def model_of(program, y, floor, work):
+    """Fill the model of all stages at y; returns the objective."""
+    prices, squares, given = program.prices, Squares.none(), program.blocks
+    method.prepare(prices, squares, given, work)
+    return method.evaluate(program.steps, prices, squares, given, 0, len(y), program.layout.size, y, floor, False, work)
 
 
 @pytest.fixture(scope="module")
@@ -178,10 +186,10 @@ def transition(robot):
     inside = np.arange(y.shape[1]) < size[:, None]
     y[inside] += 0.01 * rng.normal(size=inside.sum())
     work = Work.of(len(size), program.layout.states, y.shape[1])
-    prepare_contacts(program.blocks.contacts)
+    assert len(work.hessian) == len(size)  # all stages in one group
     for block in program.blocks:
         block.multiplier[:] = rng.uniform(0.1, 2.0, block.multiplier.shape)
-    evaluate(*parts_of(program), size, y, 0.01, False, work)
+    model_of(program, y, 0.01, work)
     for block in program.blocks:
         block.slack[:] = np.maximum(block.value, 0.1)
     return SimpleNamespace(program=program, y=y, work=work, inside=inside)
@@ -217,14 +225,27 @@ def test_a_newton_step_of_a_transition_is_that_of_the_dense_system(transition):
     expected = newton_step(system, right, equal, np.concatenate(value))
 
     for block in program.blocks:
-        blocks.add_curvature(block, work.hessian)
-    newton.factor(size, work.hessian, work.following, work.sweep)
-    direction(program.blocks, size, goal, False, work)
+        blocks.add_curvature(block, (0, len(block.stage)), work.hessian)
+    newton.factor(0, stages, size, work.hessian, work.following, work.sweep)
+    method.backward(program.blocks, 0, stages, size, goal, False, work)
+    method.forward(program.blocks, size, goal, False, work)
     found = work.change[inside]
     scale = np.abs(expected[: len(whole)]).max()
     np.testing.assert_allclose(found, expected[: len(whole)], atol=1e-6 * scale)  # conditioned like 1e9
     changes = np.concatenate([block.multiplier_change.ravel() for block in program.blocks])
     np.testing.assert_allclose(changes, expected[len(whole) :], atol=1e-6 * np.abs(changes).max())
+
+
+def test_stages_in_small_groups_lead_to_the_same_motion(transition):
+    program, start = transition.program, guess(transition.program)
+    given = program.steps, program.prices, Squares.none(), program.blocks, program.layout.size
+    motions = []
+    for group in (len(start), 4):
+        work = transition.work._replace(hessian=np.zeros((group, *transition.work.hessian.shape[1:])))
+        y = start.copy()
+        assert method.minimise(*given, y, work, Options(False))[0]
+        motions.append(y[transition.inside])
+    np.testing.assert_allclose(*motions, rtol=0.0, atol=1e-9)
 
 
 def test_a_cone_s_row_is_zero_on_its_boundary_and_falls_outside(transition):
@@ -235,7 +256,7 @@ def test_a_cone_s_row_is_zero_on_its_boundary_and_falls_outside(transition):
     most = block.parameters[0, 0] * block.parameters[0, 3] * y[at, index[2]]
     for part, sign in ((0.5, 1), (1.0, 0), (1.5, -1)):
         y[at, index[:2]] = part * most * np.array([0.6, -0.8])
-        evaluate(*parts_of(program), program.layout.size, y, 0.0, False, work)
+        model_of(program, y, 0.0, work)
         value = block.value[0, CONE] / SHARPNESS
         assert np.sign(np.round(value, 6)) == sign
         assert value == pytest.approx((1 - part**2) * most, abs=1e-6)
@@ -250,7 +271,7 @@ def test_a_cone_that_holds_less_than_the_floor_has_one_branch(transition):
     values, slopes = [], []
     for load in (-0.1, -1e-3, 0.0, 1e-3):
         y[at, index[:3]] = 0.003, 0.004, load
-        evaluate(*parts_of(program), program.layout.size, y, floor, False, work)
+        model_of(program, y, floor, work)
         held = block.parameters[0, 0] * block.parameters[0, 3] * load
         values.append(block.value[0, CONE] / SHARPNESS - held)
         slopes.append(block.slope[0, CONE, :3].copy())

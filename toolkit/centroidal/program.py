@@ -346,10 +346,8 @@ def _posture_parameters(
 
 
 def _joined(parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]], rows: int) -> Block:
-    """One block of stages, variables and parameters, in the order of the stages."""
-    stage, variables, parameters = (np.concatenate(part) for part in zip(*parts, strict=True))
-    order = np.argsort(stage, kind="stable")
-    return Block.of(stage[order], variables[order], parameters[order], rows)
+    """One block of stages, variables and parameters."""
+    return Block.of(*(np.concatenate(part) for part in zip(*parts, strict=True)), rows=rows)
 
 
 def _sums(stage: np.ndarray, variable: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -17,7 +17,7 @@ class Block(NamedTuple):
     """One function at n stages with m rows of k variables each.
 
     Attributes:
-        stage: (n,) stage of each application.
+        stage: (n,) stage of each application, in ascending order.
         variables: (n, k) numbers of its variables within the stage; one may be named twice.
         parameters: (n, p).
         value: (n, m) rows g.
@@ -39,12 +39,13 @@ class Block(NamedTuple):
 
     @classmethod
     def of(cls, stage: np.ndarray, variables: np.ndarray, parameters: np.ndarray, rows: int) -> Block:
-        """A block whose work arrays are empty."""
+        """A block whose work arrays are empty, in the order of the stages."""
         n, k = variables.shape
+        order = np.argsort(stage, kind="stable")
         return cls(
-            stage=np.ascontiguousarray(stage, np.int64),
-            variables=np.ascontiguousarray(variables, np.int64),
-            parameters=np.ascontiguousarray(parameters, float),
+            stage=np.ascontiguousarray(stage[order], np.int64),
+            variables=np.ascontiguousarray(variables[order], np.int64),
+            parameters=np.ascontiguousarray(parameters[order], float),
             value=np.zeros((n, rows)),
             slope=np.zeros((n, rows, k)),
             slack=np.zeros((n, rows)),
@@ -52,6 +53,16 @@ class Block(NamedTuple):
             slack_change=np.zeros((n, rows)),
             multiplier_change=np.zeros((n, rows)),
         )
+
+
+@compiled(reordered=True)
+def find_stages(stage, first):
+    """Fill (T + 1,) the first of some stages (n,) in ascending order that is not before each of T, and n at the end."""
+    i = 0
+    for t in range(first.shape[0]):
+        while i < stage.shape[0] and stage[i] < t:
+            i += 1
+        first[t] = i
 
 
 @compiled(reordered=True)
@@ -64,41 +75,27 @@ def start(block, least, gap):
 
 
 @compiled(reordered=True)
-def largest_violation(block):
-    """Largest -g; negative where every row holds."""
-    worst = -np.inf
+def state(block):
+    """Largest -g, which is negative where every row holds; sum of s z; and sum of |g - s| z.
+
+    The last is by how much the sum of |g z| may exceed that of s z.
+    """
+    worst, gap, mismatch = -np.inf, 0.0, 0.0
     for i in range(block.value.shape[0]):
         for a in range(block.value.shape[1]):
-            worst = max(worst, -block.value[i, a])
-    return worst
-
-
-@compiled(reordered=True)
-def mismatch(block):
-    """Sum of |g - s| z: by how much the sum of |g z| may exceed that of s z."""
-    total = 0.0
-    for i in range(block.value.shape[0]):
-        for a in range(block.value.shape[1]):
-            total += abs(block.value[i, a] - block.slack[i, a]) * block.multiplier[i, a]
-    return total
-
-
-@compiled(reordered=True)
-def complementarity(block):
-    """Sum of s z."""
-    total = 0.0
-    for i in range(block.value.shape[0]):
-        for a in range(block.value.shape[1]):
-            total += block.slack[i, a] * block.multiplier[i, a]
-    return total
+            value, slack, multiplier = block.value[i, a], block.slack[i, a], block.multiplier[i, a]
+            worst = max(worst, -value)
+            gap += slack * multiplier
+            mismatch += abs(value - slack) * multiplier
+    return worst, gap, mismatch
 
 
 @compiled(reordered=True, allocates=True)
-def add_curvature(block, hessian):
-    """Add J' (z / s) J of all rows to the stages' Hessians."""
+def add_curvature(block, span, hessian):
+    """Add J' (z / s) J of a span of applications to the stages' Hessians."""
     rows, k = block.value.shape[1], block.variables.shape[1]
     local = np.empty((k, k))
-    for i in range(block.value.shape[0]):
+    for i in range(span[0], span[1]):
         local[:] = 0.0
         for a in range(rows):
             stiffness = block.multiplier[i, a] / block.slack[i, a]
@@ -109,7 +106,7 @@ def add_curvature(block, hessian):
                 factor = stiffness * slope[b]
                 for c in range(k):
                     local[b, c] += factor * slope[c]
-        out = hessian[block.stage[i]]
+        out = hessian[block.stage[i] % len(hessian)]
         for b in range(k):
             row = block.variables[i, b]
             for c in range(k):
@@ -117,10 +114,10 @@ def add_curvature(block, hessian):
 
 
 @compiled(reordered=True)
-def add_gradient(block, goal, corrected, gradient):
-    """Add the rows' part of the condensed gradient for s z = goal, with Mehrotra's second-order term if wanted."""
+def add_gradient(block, span, goal, corrected, gradient):
+    """Add a span's part of the condensed gradient for s z = goal, with Mehrotra's second-order term if wanted."""
     rows, k = block.value.shape[1], block.variables.shape[1]
-    for i in range(block.value.shape[0]):
+    for i in range(span[0], span[1]):
         out = gradient[block.stage[i]]
         for a in range(rows):
             slack, multiplier = block.slack[i, a], block.multiplier[i, a]

@@ -28,6 +28,8 @@ It falls with the distance from a solution. Otherwise lightly loaded contacts co
 """
 GAP = 5.0
 """Complementarity of a row at the start of a motion that nothing is known of."""
+GROUP = 16
+"""Most stages whose Hessians are kept at a time."""
 REST_STIFFNESS = 1e5
 """Stiffness of the proximal term for the final rest; a multiplier makes the rest exact."""
 
@@ -48,7 +50,7 @@ class Prices(NamedTuple):
     """Prices of n single variables: linear * v + quadratic * (v - wanted)^2.
 
     Attributes:
-        stage, variable: (n,) its stage and its number there.
+        stage, variable: (n,) its stage, in ascending order, and its number there.
         linear, quadratic, wanted: (n,).
     """
 
@@ -60,15 +62,17 @@ class Prices(NamedTuple):
 
     @classmethod
     def joined(cls, parts: Iterable[Prices]) -> Prices:
-        """All of these prices."""
-        return cls(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        """All of these prices, in the order of the stages."""
+        arrays = [np.concatenate(part) for part in zip(*parts, strict=True)]
+        order = np.argsort(arrays[0], kind="stable")
+        return cls(*(array[order] for array in arrays))
 
 
 class Squares(NamedTuple):
     """Prices of n sums of k variables: weight * (factors . v - wanted)^2.
 
     Attributes:
-        stage: (n,) their stage.
+        stage: (n,) their stage, in ascending order.
         variables, factors: (n, k) numbers of the variables there, and their factors.
         weight, wanted: (n,).
     """
@@ -89,12 +93,16 @@ class Work(NamedTuple):
     """Room for the model of an iteration, for T stages of at most m variables, n of them states.
 
     Attributes:
-        hessian: (T, m, m); gradient: (T, m) of the objective; condensed: (T, m) with the rows'.
+        first: (k, T + 1) first application in a stage of each block, then of single prices and of squares.
+        hessian: (j, m, m) of stages t modulo j, which are made and factored in groups of at most j: all of them would
+            not fit into a processor's cache.
+        gradient: (T, m) of the objective; condensed: (T, m) with the rows'.
         following: (T - 1, n, m) derivative of the next state; defect: (T - 1, n).
         change: (T, m) Newton step.
         sweep: Factors of the Newton step.
     """
 
+    first: np.ndarray
     hessian: np.ndarray
     gradient: np.ndarray
     condensed: np.ndarray
@@ -108,7 +116,8 @@ class Work(NamedTuple):
         """Room for so many stages of at most so many variables."""
         t, n, m = stages, states, variables
         return cls(
-            hessian=np.zeros((t, m, m)),
+            first=np.zeros((len(Blocks._fields) + 2, t + 1), np.int64),
+            hessian=np.zeros((min(t, GROUP), m, m)),
             gradient=np.zeros((t, m)),
             condensed=np.zeros((t, m)),
             following=np.zeros((t - 1, n, m)),
@@ -143,37 +152,66 @@ class Options(NamedTuple):
 
 
 @compiled(reordered=True)
-def evaluate(steps, prices, squares, all_blocks, size, y, floor, kept, work):
-    """Fill the model at y; returns the objective. `floor` is explained in `rows.fill_contacts`.
+def prepare(prices, squares, all_blocks, work):
+    """Fill the slopes of linear rows, and what is where."""
+    rows.prepare_contacts(all_blocks.contacts)
+    count = 0
+    for block in all_blocks:
+        blocks.find_stages(block.stage, work.first[count])
+        count += 1
+    blocks.find_stages(prices.stage, work.first[count])
+    blocks.find_stages(squares.stage, work.first[count + 1])
 
-    Where the rows of the body are `kept`, they are left as they are.
+
+@compiled(reordered=True)
+def span(first, begin, end):
+    """First and one after the last of a block's applications in the stages from `begin` to before `end`."""
+    return first[begin], first[end]
+
+
+@compiled(reordered=True)
+def evaluate(steps, prices, squares, all_blocks, begin, end, size, y, floor, kept, work):
+    """Fill the model at y of the stages from `begin` to before `end`; returns their objective, after `prepare`.
+
+    `floor` is explained in `rows.fill_contacts`. Where the rows of the body are `kept`, they are left as they are.
     """
-    work.hessian[:] = 0.0
-    work.gradient[:] = 0.0
-    value = dynamics.linearise(steps, size, y, work.hessian, work.gradient, work.following, work.defect)
-    value += rows.add_prices(prices, y, work.hessian, work.gradient)
-    value += rows.add_squares(squares, y, work.hessian, work.gradient)
-    value += rows.fill_contacts(all_blocks.contacts, y, floor, work.hessian, work.gradient)
+    hessian, gradient, first = work.hessian, work.gradient, work.first
+    for t in range(begin, end):
+        hessian[t % len(hessian)] = 0.0
+        gradient[t] = 0.0
+    value = dynamics.linearise(steps, begin, end, size, y, hessian, gradient, work.following, work.defect)
+    value += rows.add_prices(prices, span(first[7], begin, end), y, hessian, gradient)
+    value += rows.add_squares(squares, span(first[8], begin, end), y, hessian, gradient)
+    contacts, legs, torques, distances, heights, final, bounds = all_blocks
+    value += rows.fill_contacts(contacts, span(first[0], begin, end), y, floor, hessian, gradient)
     if kept:
         return value
-    value += rows.fill_legs(all_blocks.legs, y, work.hessian, work.gradient)
-    value += rows.fill_distances(all_blocks.distances, y, work.hessian, work.gradient)
-    value += rows.fill_final(all_blocks.final, y, work.hessian, work.gradient)
-    rows.fill_torques(all_blocks.torques, y)
-    rows.fill_heights(all_blocks.heights, y)
-    rows.fill_bounds(all_blocks.bounds, y)
+    value += rows.fill_legs(legs, span(first[1], begin, end), y, hessian, gradient)
+    value += rows.fill_distances(distances, span(first[3], begin, end), y, hessian, gradient)
+    value += rows.fill_final(final, span(first[5], begin, end), y, hessian, gradient)
+    rows.fill_torques(torques, span(first[2], begin, end), y)
+    rows.fill_heights(heights, span(first[4], begin, end), y)
+    rows.fill_bounds(bounds, span(first[6], begin, end), y)
     return value
 
 
 @compiled(reordered=True)
-def direction(all_blocks, size, goal, corrected, work):
-    """Newton step towards complementarities of `goal`; also fills the changes of slacks and multipliers."""
-    for t in range(work.gradient.shape[0]):
-        for k in range(work.gradient.shape[1]):
+def backward(all_blocks, begin, end, size, goal, corrected, work):
+    """Sweep the stages from `begin` to before `end` back, for complementarities of `goal`."""
+    number = 0
+    for t in range(begin, end):
+        for k in range(size[t]):
             work.condensed[t, k] = work.gradient[t, k]
     for block in all_blocks:
-        blocks.add_gradient(block, goal, corrected, work.condensed)
-    newton.solve(size, work.following, work.defect, work.condensed, work.sweep, work.change)
+        blocks.add_gradient(block, span(work.first[number], begin, end), goal, corrected, work.condensed)
+        number += 1
+    newton.backward(begin, end, size, work.following, work.defect, work.condensed, work.sweep)
+
+
+@compiled(reordered=True)
+def forward(all_blocks, size, goal, corrected, work):
+    """Newton step after `backward`, with the changes of slacks and multipliers."""
+    newton.forward(size, work.following, work.defect, work.sweep, work.change)
     for block in all_blocks:
         blocks.set_changes(block, goal, corrected, work.change)
 
@@ -190,11 +228,11 @@ def longest_steps(all_blocks, keep):
 
 @compiled(reordered=True)
 def violations(all_blocks, y, rest, work):
-    """Largest violation of dynamics, rows, and rest at the end if wanted, and what slacks that differ may cost.
+    """Largest violation of dynamics, rows, and rest at the end if wanted; complementarity; cost of slacks that differ.
 
     A slack that differs from a row that holds violates nothing.
     """
-    worst, cost = 0.0, 0.0
+    worst, gap, mismatch = 0.0, 0.0, 0.0
     for t in range(work.defect.shape[0]):
         for k in range(work.defect.shape[1]):
             worst = max(worst, abs(work.defect[t, k]))
@@ -202,9 +240,9 @@ def violations(all_blocks, y, rest, work):
         for a in range(3):
             worst = max(worst, abs(y[-1, 3 + a]))
     for block in all_blocks:
-        worst = max(worst, blocks.largest_violation(block))
-        cost += blocks.mismatch(block)
-    return worst, cost
+        found = blocks.state(block)
+        worst, gap, mismatch = max(worst, found[0]), gap + found[1], mismatch + found[2]
+    return worst, gap, mismatch
 
 
 @compiled(kept=True, reordered=True, allocates=True)
@@ -229,32 +267,38 @@ def minimise(steps, prices, squares, all_blocks, size, y, work, options):
     for block in all_blocks:
         count += block.value.size
     force = np.zeros(3)  # multiplier of the final rest
-    rows.prepare_contacts(all_blocks.contacts)
+    prepare(prices, squares, all_blocks, work)
     far = 1.0  # from a solution: the largest violation or, where it is larger, the mean complementarity
-    value = evaluate(steps, prices, squares, all_blocks, size, y, FLOOR, False, work)
+    stages, group = last + 1, len(work.hessian)
+    for begin in range(0, stages, group):
+        end = min(begin + group, stages)
+        evaluate(steps, prices, squares, all_blocks, begin, end, size, y, FLOOR, False, work)
     for block in all_blocks:
         blocks.start(block, options.least, options.gap)
     blocks.start(all_blocks.bounds, 0.1 * options.least, options.gap)
+    value = np.inf
     for iteration in range(options.iterations):
-        kept = options.linear and iteration > 0
-        value = evaluate(steps, prices, squares, all_blocks, size, y, FLOOR * min(far, 1.0), kept, work)
-        (worst, mismatch), gap = violations(all_blocks, y, options.at_rest, work), 0.0
-        for block in all_blocks:
-            gap += blocks.complementarity(block)
-            blocks.add_curvature(block, work.hessian)
-        far = max(worst, gap / count)
+        kept, floor, value = options.linear and iteration > 0, FLOOR * min(far, 1.0), 0.0
+        for end in range(stages, 0, -group):
+            begin, number = max(end - group, 0), 0
+            value += evaluate(steps, prices, squares, all_blocks, begin, end, size, y, floor, kept, work)
+            for block in all_blocks:
+                blocks.add_curvature(block, span(work.first[number], begin, end), work.hessian)
+                number += 1
+            if options.at_rest and end == stages:
+                for a in range(3, 6):
+                    work.gradient[last, a] += force[a - 3] + REST_STIFFNESS * y[last, a]
+                    work.hessian[last % group, a, a] += REST_STIFFNESS
+            newton.factor(begin, end, size, work.hessian, work.following, work.sweep)
+            backward(all_blocks, begin, end, size, 0.0, False, work)
+        worst, gap, mismatch = violations(all_blocks, y, options.at_rest, work)
         if not (value < np.inf and gap < np.inf):
             return False, iteration, value
-        if options.at_rest:
-            for a in range(3, 6):
-                work.gradient[last, a] += force[a - 3] + REST_STIFFNESS * y[last, a]
-                work.hessian[last, a, a] += REST_STIFFNESS
-        newton.factor(size, work.hessian, work.following, work.sweep)
+        far = max(worst, gap / count)
 
-        goal = 0.0
-        direction(all_blocks, size, goal, goal > 0.0, work)
+        forward(all_blocks, size, 0.0, False, work)
         accepted, decrease = options.tolerance * (abs(value) + options.small), 0.0
-        for t in range(last + 1):
+        for t in range(stages):
             for k in range(size[t]):
                 decrease += work.gradient[t, k] * work.change[t, k]
         if worst < options.feasible and gap + mismatch < accepted and abs(decrease) < accepted:
@@ -265,12 +309,13 @@ def minimise(steps, prices, squares, all_blocks, size, y, work, options):
             after += blocks.product_after(block, primal, dual)
         goal = max(min(1.0, (after / gap) ** 3) * gap, 0.1 * accepted) / count
 
-        direction(all_blocks, size, goal, goal > 0.0, work)
+        backward(all_blocks, 0, stages, size, goal, True, work)
+        forward(all_blocks, size, goal, True, work)
         primal, dual = longest_steps(all_blocks, max(0.99, 1.0 - gap / count))
         if options.at_rest:
             for a in range(3):
                 force[a] += primal * REST_STIFFNESS * (y[last, 3 + a] + work.change[last, 3 + a])
-        for t in range(last + 1):
+        for t in range(stages):
             for k in range(size[t]):
                 y[t, k] += primal * work.change[t, k]
         for block in all_blocks:

@@ -46,17 +46,18 @@ def allocate(stages: int, states: int, variables: int) -> Sweep:
 
 
 @compiled(reordered=True, allocates=True)
-def factor(size, hessian, following, sweep):
-    """Factor the Hessians (T, m, m) of stages with `size` (T,) variables and dynamics (T - 1, n, m).
+def factor(begin, end, size, hessian, following, sweep):
+    """Factor the stages from `begin` to before `end`, of T with `size` (T,) variables and dynamics (T - 1, n, m).
 
-    The Hessians' lower triangles count, and are overwritten.
+    Those from `end` on have been factored. Stage t's Hessian is number t modulo k of (k, m, m); its lower triangle
+    counts, and is overwritten.
     """
     stages, n = sweep.slope.shape
     m = hessian.shape[1]
     product = np.empty((n, m))
-    for t in range(stages - 1, -1, -1):
+    for t in range(end - 1, begin - 1, -1):
         k = size[t]
-        full = hessian[t]
+        full = hessian[t % len(hessian)]
         if t < stages - 1:
             map_, value = following[t], sweep.value[t + 1]
             product[:, :k] = 0.0
@@ -113,14 +114,11 @@ def factor(size, hessian, following, sweep):
 
 
 @compiled(reordered=True, allocates=True)
-def solve(size, following, defect, gradient, sweep, change):
-    """Newton step for gradients (T, m), which are overwritten, and defects (T - 1, n), after `factor`.
-
-    Fills `change` (T, m); the first state does not change.
-    """
+def backward(begin, end, size, following, defect, gradient, sweep):
+    """Sweep gradients (T, m), which are overwritten, and defects (T - 1, n) over the stages, like `factor` before."""
     stages, n = sweep.slope.shape
     ahead = np.empty(n)
-    for t in range(stages - 1, -1, -1):
+    for t in range(end - 1, begin - 1, -1):
         k, q = size[t], gradient[t]
         if t < stages - 1:
             value = sweep.value[t + 1]
@@ -145,6 +143,12 @@ def solve(size, following, defect, gradient, sweep, change):
             v = offset[i]
             for a in range(n):
                 sweep.slope[t, a] -= gain[i, a] * v
+
+
+@compiled(reordered=True)
+def forward(size, following, defect, sweep, change):
+    """Fill the Newton step (T, m) after `backward`; the first state does not change."""
+    stages, n = sweep.slope.shape
     for a in range(n):
         change[0, a] = 0.0
     for t in range(stages):

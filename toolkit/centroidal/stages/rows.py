@@ -1,8 +1,9 @@
 """The constraints of contacts, legs and arms with their derivatives, as blocks (see `blocks.Block`).
 
-Every `fill_...` fills the rows and slopes of a block at the variables y (T, m), and adds what the block has of the
-objective, and of convex curvature, to Hessians (T, m, m) and gradients (T, m). It returns that part of the objective.
-The laws are those of `toolkit.physics`.
+Every `fill_...` fills the rows and slopes of a block at the variables y (T, m), from the first to before the last of a
+`span` of applications. It adds what they have of the objective, and of convex curvature, to gradients (T, m) and to
+Hessians (k, m, m), where stage t has number t modulo k, and returns that part of the objective. The laws are those of
+`toolkit.physics`.
 
 The wanted margins may be taken back by slacks, at a price and down to the least margins. The excess of a step goes
 beyond those and beyond the physical limit, and costs much more, as does a body's slack above 1. So the program always
@@ -98,7 +99,7 @@ def prepare_contacts(block):
 
 
 @compiled(reordered=True, allocates=True)
-def fill_contacts(block, y, floor, hessian, gradient):
+def fill_contacts(block, span, y, floor, hessian, gradient):
     """Friction cone, patch and yaw moment (Caron et al., ICRA 2015) of contacts, and their objective.
 
     A lateral force f may be as large as what friction can hold, h. The row is h - f^2 / h, which is concave where h is
@@ -108,7 +109,7 @@ def fill_contacts(block, y, floor, hessian, gradient):
     v, d_held, row = np.empty(9), np.zeros(9), np.empty(9)
     local, force = np.empty((9, 9)), np.empty(9)
     total = 0.0
-    for i in range(block.stage.shape[0]):
+    for i in range(span[0], span[1]):
         p, slope, index = block.parameters[i], block.slope[i], block.variables[i]
         for k in range(9):
             v[k] = y[block.stage[i], index[k]]
@@ -139,7 +140,7 @@ def fill_contacts(block, y, floor, hessian, gradient):
             row[axis] += 1.0
             add_local(0.5 * bent, 0.0, row, local, force)
         total += contact_objective(p, v, row, local, force)
-        scatter(local, force, index, hessian[block.stage[i]], gradient[block.stage[i]])
+        scatter(local, force, index, hessian[block.stage[i] % len(hessian)], gradient[block.stage[i]])
     return total
 
 
@@ -242,7 +243,7 @@ def limited(values):
 
 
 @compiled(reordered=True, allocates=True)
-def fill_legs(block, y, hessian, gradient):
+def fill_legs(block, span, y, hessian, gradient):
     """Limits of stance legs at knots.
 
     Variables: CoM (3), slack of the body, displacement of the sole (2 or none). Parameters: the posture's, lower and
@@ -250,9 +251,9 @@ def fill_legs(block, y, hessian, gradient):
     """
     hip, row = np.empty(3), np.zeros(block.variables.shape[1])
     local, force = np.empty((row.shape[0], row.shape[0])), np.zeros(row.shape[0])
-    for i in range(block.stage.shape[0]):
+    for i in range(span[0], span[1]):
         p, t, index = block.parameters[i], block.stage[i], block.variables[i]
-        turn, offset = p[_TURN : _TURN + 9].reshape(3, 3), index[4:]
+        turn, offset, full = p[_TURN : _TURN + 9].reshape(3, 3), index[4:], hessian[t % len(hessian)]
         hip_of(p, turn, y, t, y[t, :3], offset, hip)
         (here, slopes), kept = posture(p, turn, hip), 1.0 - y[t, index[3]]
         found, moved = limited(quantities(here)), limited(quantity_slopes(here, slopes, TINY))
@@ -269,7 +270,7 @@ def fill_legs(block, y, hessian, gradient):
                 for k in range(offset.shape[0]):
                     along = moved[q][0] * turn[0, k] + moved[q][1] * turn[1, k] + moved[q][2] * turn[2, k]
                     out[4 + k] = -sign * along
-        bend_length(block, i, 2 * _LENGTH + 1, found[_LENGTH], row, local, force, hessian[t], gradient[t])
+        bend_length(block, i, 2 * _LENGTH + 1, found[_LENGTH], row, local, force, full, gradient[t])
     return 0.0
 
 
@@ -310,7 +311,7 @@ def gradient_of_reach(block, i, a, row):
 
 
 @compiled(reordered=True, allocates=True)
-def fill_distances(block, y, hessian, gradient):
+def fill_distances(block, span, y, hessian, gradient):
     """Bounds on the distance from a hip or shoulder to a tip, some time after a knot.
 
     Variables: CoM (3), velocity (3), slack of the body, displacements of the two ends of a swing (4 or none).
@@ -319,7 +320,7 @@ def fill_distances(block, y, hessian, gradient):
     """
     reach, row = np.empty(3), np.zeros(block.variables.shape[1])
     local, force = np.empty((row.shape[0], row.shape[0])), np.zeros(row.shape[0])
-    for i in range(block.stage.shape[0]):
+    for i in range(span[0], span[1]):
         p, t, index = block.parameters[i], block.stage[i], block.variables[i]
         square = TINY
         for a in range(3):
@@ -339,12 +340,12 @@ def fill_distances(block, y, hessian, gradient):
         for k in range(row.shape[0]):
             upper[k] = -lower[k]
         lower[6] = upper[6] = STRETCH * p[9]
-        bend_length(block, i, 1, length, row, local, force, hessian[t], gradient[t])
+        bend_length(block, i, 1, length, row, local, force, hessian[t % len(hessian)], gradient[t])
     return 0.0
 
 
 @compiled(reordered=True, allocates=True)
-def fill_torques(block, y):
+def fill_torques(block, span, y):
     """Joint torques of stance legs in the middle of steps.
 
     Variables: CoM (3), velocity (3), wrench (6), slack of the body, displacement of the sole (2 or none). Parameters:
@@ -352,7 +353,7 @@ def fill_torques(block, y):
     the limits that are wanted, and allowed, at most.
     """
     slopes, here, hip, com = np.empty((_TORQUES, 9)), np.empty(_TORQUES), np.empty(3), np.empty(3)
-    for i in range(block.stage.shape[0]):
+    for i in range(span[0], span[1]):
         p, half, t, index = block.parameters[i, 1:], block.parameters[i, 0], block.stage[i], block.variables[i]
         turn, offset, wrench = p[_TURN : _TURN + 9].reshape(3, 3), index[13:], y[t, index[6] :]
         sole, limits = p[POSTURE:_LIMITS], p[_LIMITS : _LIMITS + _TORQUES]
@@ -390,13 +391,13 @@ def fill_torques(block, y):
 
 
 @compiled(reordered=True)
-def fill_heights(block, y):
+def fill_heights(block, span, y):
     """Least height of the CoM.
 
     Variables: z, slack of the body, displacement of the lowest foot (2 or none). Parameters: that height in the world,
     wanted margin, how the height rises with the displacement (2 or none).
     """
-    for i in range(block.stage.shape[0]):
+    for i in range(span[0], span[1]):
         p, t, index = block.parameters[i], block.stage[i], block.variables[i]
         value = y[t, index[0]] - p[0] - p[1] * (1.0 - y[t, index[1]])
         block.slope[i, 0, 0], block.slope[i, 0, 1] = STRETCH, STRETCH * p[1]
@@ -407,7 +408,7 @@ def fill_heights(block, y):
 
 
 @compiled(reordered=True, allocates=True)
-def fill_final(block, y, hessian, gradient):
+def fill_final(block, span, y, hessian, gradient):
     """Box of the last CoM along the axes of the last heading, and what the last state costs.
 
     Variables: the state (12), displacements of both feet (4 or none). Parameters: centre (3), half sizes (3), cosine
@@ -418,7 +419,7 @@ def fill_final(block, y, hessian, gradient):
     row, off = np.empty(size), np.empty(3)
     local, force = np.zeros((size, size)), np.zeros(size)
     total = 0.0
-    for i in range(block.stage.shape[0]):
+    for i in range(span[0], span[1]):
         p, t, index = block.parameters[i], block.stage[i], block.variables[i]
         c, s = p[6], p[7]
         for a in range(3):
@@ -439,17 +440,17 @@ def fill_final(block, y, hessian, gradient):
                 total += add_local(p[8], value, row, local, force)
             total += add_single(p[9], y[t, 9 + a], 0.0, 9 + a, local, force)
             total += add_single(p[10], y[t, 6 + a], 0.0, 6 + a, local, force)
-        scatter(local, force, index, hessian[t], gradient[t])
+        scatter(local, force, index, hessian[t % len(hessian)], gradient[t])
         local[:] = 0.0
         force[:] = 0.0
     return total
 
 
 @compiled(reordered=True)
-def fill_bounds(block, y):
+def fill_bounds(block, span, y):
     """Lower bounds of sums of variables; parameters: the variables' factors, and the bound."""
     count = block.variables.shape[1]
-    for i in range(block.stage.shape[0]):
+    for i in range(span[0], span[1]):
         p, value = block.parameters[i], -block.parameters[i, count]
         for k in range(count):
             value += p[k] * y[block.stage[i], block.variables[i, k]]
@@ -458,23 +459,23 @@ def fill_bounds(block, y):
 
 
 @compiled(reordered=True)
-def add_prices(prices, y, hessian, gradient):
-    """Add linear and quadratic prices of single variables; returns their sum."""
+def add_prices(prices, span, y, hessian, gradient):
+    """Add linear and quadratic prices of a span of single variables; returns their sum."""
     total = 0.0
-    for i in range(prices.stage.shape[0]):
+    for i in range(span[0], span[1]):
         t, k = prices.stage[i], prices.variable[i]
         off = y[t, k] - prices.wanted[i]
         total += prices.linear[i] * y[t, k] + prices.quadratic[i] * off * off
         gradient[t, k] += prices.linear[i] + 2 * prices.quadratic[i] * off
-        hessian[t, k, k] += 2 * prices.quadratic[i]
+        hessian[t % len(hessian), k, k] += 2 * prices.quadratic[i]
     return total
 
 
 @compiled(reordered=True)
-def add_squares(squares, y, hessian, gradient):
-    """Add prices of the squares of sums of variables; returns their sum."""
+def add_squares(squares, span, y, hessian, gradient):
+    """Add prices of the squares of a span of sums of variables; returns their sum."""
     total, count = 0.0, squares.variables.shape[1]
-    for i in range(squares.stage.shape[0]):
+    for i in range(span[0], span[1]):
         t, index, factors = squares.stage[i], squares.variables[i], squares.factors[i]
         off = -squares.wanted[i]
         for k in range(count):
@@ -485,5 +486,5 @@ def add_squares(squares, y, hessian, gradient):
             if pull != 0.0:
                 gradient[t, index[b]] += pull * off
                 for c in range(count):
-                    hessian[t, index[b], index[c]] += pull * factors[c]
+                    hessian[t % len(hessian), index[b], index[c]] += pull * factors[c]
     return total

@@ -101,16 +101,22 @@ def terms(steps, t, before, acceleration, spin_rate, after):
 
 
 @compiled(reordered=True, allocates=True)
-def linearise(steps, size, y, hessian, gradient, following, defect):
-    """Enter the steps into Hessians (N + 1, m, m), gradients (N + 1, m), dynamics (N, n, m) and defects (N, n).
+def linearise(steps, begin, end, size, y, hessian, gradient, following, defect):
+    """Enter the steps into the model of the stages from `begin` to before `end`.
 
-    Hessians are Gauss and Newton's. Returns the objective.
+    That are gradients (N + 1, m), dynamics (N, n, m), defects (N, n) and Hessians (k, m, m), which are Gauss and
+    Newton's; stage t has number t modulo k. Returns the objective of the steps that begin in these stages.
     """
     total = 0.0
     acceleration, spin_rate = np.empty(3), np.empty(3)
     row = np.empty(hessian.shape[1])
-    for t in range(steps.dt.shape[0]):
-        h, weights, now, after = steps.dt[t], steps.weights[t], y[t], y[t + 1]
+    for t in range(begin, end):
+        now, full, slope = y[t], hessian[t % len(hessian)], gradient[t]
+        if t > 0:
+            enter_state(steps, t - 1, now, full, slope)
+        if t == steps.dt.shape[0]:
+            continue
+        h, weights, after = steps.dt[t], steps.weights[t], y[t + 1]
         force = rates(steps, t, now, acceleration, spin_rate)
         successor(steps, t, now, acceleration, spin_rate, defect[t])
         for a in range(defect.shape[1]):
@@ -124,23 +130,26 @@ def linearise(steps, size, y, hessian, gradient, following, defect):
             for c in range(size[t]):
                 row[c] = following[t, SPIN + a, c]
             row[SPIN + a] = 0.0
-            add_square(weight, h * (spin_rate[a] - steps.turning[t, a]), row, size[t], hessian[t], gradient[t])
+            add_square(weight, h * (spin_rate[a] - steps.turning[t, a]), row, size[t], full, slope)
             if weights[JERK] != 0.0:
                 for c in range(size[t]):
                     row[c] = following[t, ACCELERATION + a, c]
                 row[ACCELERATION + a] = -1.0
                 change = acceleration[a] - now[ACCELERATION + a]
-                add_square(weights[JERK], change, row, size[t], hessian[t], gradient[t])
-            for part, weight in (
-                (V, weights[MOMENTUM]),
-                (ACCELERATION, weights[MOMENTUM_RATE]),
-                (SPIN, weights[ANGULAR]),
-            ):
-                gradient[t + 1, part + a] += 2 * weight * after[part + a]
-                hessian[t + 1, part + a, part + a] += 2 * weight
-        gradient[t + 1, R + 2] += 2 * weights[HEIGHT] * (after[R + 2] - steps.height[t])
-        hessian[t + 1, R + 2, R + 2] += 2 * weights[HEIGHT]
+                add_square(weights[JERK], change, row, size[t], full, slope)
     return total
+
+
+@compiled(reordered=True)
+def enter_state(steps, t, after, hessian, gradient):
+    """Add the prices of the state (m,) after step t to a Hessian and a gradient."""
+    weights = steps.weights[t]
+    for part, weight in ((V, weights[MOMENTUM]), (ACCELERATION, weights[MOMENTUM_RATE]), (SPIN, weights[ANGULAR])):
+        for a in range(3):
+            gradient[part + a] += 2 * weight * after[part + a]
+            hessian[part + a, part + a] += 2 * weight
+    gradient[R + 2] += 2 * weights[HEIGHT] * (after[R + 2] - steps.height[t])
+    hessian[R + 2, R + 2] += 2 * weights[HEIGHT]
 
 
 @compiled(reordered=True)
