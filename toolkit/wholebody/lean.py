@@ -2,7 +2,8 @@
 
 Velocity dampers see what is near now. Where a leg passes another one or an edge fast, they turn the base within a few
 ticks, with accelerations that joints cannot give. The same motion is then solved again with a wanted lean: the greatest
-turn of the base in the time around each moment, smoothed. The dampers only add to it what is still missing.
+turn of the base in the time around each moment, smoothed. The dampers only add to it what is still missing. Where that
+is not enough, the lean of the next solution goes as far again beyond what they added.
 """
 
 from __future__ import annotations
@@ -37,12 +38,16 @@ class Lean:
         return np.array([np.interp(time, self.times, component) for component in self.turn.T])
 
 
-def lean_ahead(paths: LimbPaths, times: np.ndarray, qpos: np.ndarray, pace: float = 1.0) -> Lean | None:
+def lean_ahead(
+    paths: LimbPaths, times: np.ndarray, qpos: np.ndarray, pace: float = 1.0, before: Lean | None = None
+) -> Lean | None:
     """The lean that anticipates the turns of the base in a motion (T, 7 + n) at uniform times (T,) in s.
 
-    None where the base hardly turns. `pace` is the factor on the robot's times.
+    None where the base hardly turns. `pace` is the factor on the robot's times, `before` the lean that the motion had.
     """
     turn = np.array([_turn(paths, time, state) for time, state in zip(times, qpos, strict=True)])
+    if before is not None:
+        turn += turn - before.turn
     size = np.linalg.norm(turn, axis=1)
     if not size.max() > WORTH:
         return None

@@ -28,6 +28,7 @@ from toolkit.wholebody.swing_task import LIFT
 from toolkit.wholebody.trajectory import WholeBodyTrajectory
 
 RATE = 50.0  # Hz for a body of the usual size (`toolkit.robot.scale`); samples of the trajectory
+PASSES = 4  # most solutions, each of which leans ahead of the one before, until one passes its checks
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ def _trajectory(
     robot = plan.robot
     blocked, trajectory = _blocked(plan.schedule, paths), _without_postures(robot, paths, times)
     try:
-        passes = [manner] if blocked else [manner, manner, manner, replace(manner, links=CLOSE)]
+        passes = [manner] if blocked else [*PASSES * [manner], replace(manner, links=CLOSE)]
         qpos, report = _checked(plan, scene, paths, times, passes)
     except PlanningError as error:
         return replace(trajectory, failure=Failure("; ".join([*(each.reason for each in blocked), str(error)])))
@@ -181,11 +182,12 @@ def _checked(
     for manner in passes:
         if manner is before and lean is None and (ahead is None or len(found) > 1):
             continue
-        qpos = solve_ik(robot, paths, motion, times, scene, lean if manner is before else None, manner, ahead)
+        lean = lean if manner is before else None
+        qpos = solve_ik(robot, paths, motion, times, scene, lean, manner, ahead)
         found.append((qpos, check(robot, scene, paths, motion, times, qpos)))
         if not found[-1][1].findings:
             return found[-1]
-        lean, before = lean_ahead(paths, times, qpos, robot.scale.time), manner
+        lean, before = lean_ahead(paths, times, qpos, robot.scale.time, lean), manner
         if len(found) == 1 and (arms := ArmsAhead(robot, scene, times, qpos)).touch:
             ahead = arms
     return found[0]
