@@ -9,7 +9,7 @@ noticed earlier, and may come nearer as fast as a steady braking can still stop:
 displacements dq are those of the joints between a geom and its root, whose own motion is taken from the last tick. Arms
 keep clear of the world as seen from the base, and get out of the way of legs, whose motion is taken from the last tick
 too. All other links keep clear as seen from a standing foot, so that the base turns and leans for them. The last links
-of the feet, and of palms that reach, are left to the paths of these limbs.
+of the feet, and of palms at a surface, are left to the paths of these limbs.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ class Avoidance:
         self.height = self._heights()
 
     def dampers(
-        self, qpos: np.ndarray, drift: np.ndarray, tick: float, reaching: set[Limb], standing: Limb | None
+        self, qpos: np.ndarray, drift: np.ndarray, tick: float, touching: set[Limb], standing: Limb | None
     ) -> Dampers:
         """The dampers of one tick.
 
@@ -152,11 +152,11 @@ class Avoidance:
             qpos: (7 + n,) present state.
             drift: (6 + n,) displacement in the last tick, as MuJoCo's qvel times the tick.
             tick: s.
-            reaching: Palms that approach, hold or leave a contact; their hands may touch the world.
+            touching: Palms that come to a contact, hold or leave one; their hands may touch the world.
             standing: A foot that stands; None where there is none.
         """
         self._place(qpos)
-        pairs = self._near(reaching)
+        pairs = self._near(touching)
         world, arms = self._of_world(pairs.geoms), self._of_arms(pairs.geoms)
         at_home = self._home_distance(pairs)
         safe, room = np.empty((2, len(arms)))
@@ -215,10 +215,10 @@ class Avoidance:
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_collision(self.model, self.data)
 
-    def _near(self, reaching: set[Limb]) -> NearPairs:
+    def _near(self, touching: set[Limb]) -> NearPairs:
         """Pairs of geoms within their notice, without those whose distance is left to the paths of limbs."""
         contact, free = self.data.contact, self.static.copy()
-        for limb in reaching.union(FEET):
+        for limb in touching.union(FEET):
             free |= self.of[limb]
         geoms, distance = contact.geom, contact.dist
         noticed = distance < self._notice(geoms)

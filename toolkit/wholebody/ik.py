@@ -281,9 +281,10 @@ class WholeBodyIK:
             self.dampers = None
         if self.avoidance is None:
             return set()
-        reaching = {palm for palm in self.palms if paths.authority(palm, time) > 0.0}
-        found = self.avoidance.dampers(qpos, self.drift, self.tick, reaching, standing)
+        touching = {palm for palm in self.palms if paths.at_surface(palm, time)}
+        found = self.avoidance.dampers(qpos, self.drift, self.tick, touching, standing)
         if self.ahead is not None:
+            reaching = {palm for palm in self.palms if paths.authority(palm, time) > 0.0}
             found = found.joined(self.ahead.dampers(time, angles, self.tick, reaching))
         if len(found.bound):
             matrix, share = np.zeros((len(found.bound), len(qpos))), np.sqrt(found.weight)

@@ -22,6 +22,7 @@ from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
 
 LEADING = 0.4  # authority of a palm's path in its middle
+LEFT, COMING = 0.3, 0.5  # parts of a palm's swing: until it has left its contact, and from when on it comes to the next
 
 
 @dataclass(frozen=True)
@@ -89,12 +90,20 @@ class LimbPaths:
         if limb.is_foot:
             return 1.0
         # In between, a palm's path has little authority, so that it does not drag the trunk along or twist the arm.
-        u = (time - segment.path.begin) / segment.path.duration
-        if u < 0.5:
-            left = Window(0.0, 0.3).step(u)[0]
+        u = segment.share(time)
+        if u < COMING:
+            left = Window(0.0, LEFT).step(u)[0]
             return LEADING * left if segment.free_start else 1.0 - (1.0 - LEADING) * left
-        near = Window(0.5, 0.95).step(u)[0]
+        near = Window(COMING, 0.95).step(u)[0]
         return LEADING * (1.0 - near) if segment.free_end else LEADING + (1.0 - LEADING) * near
+
+    def at_surface(self, palm: Limb, time: float) -> bool:
+        """Whether the palm has a contact, leaves one or comes to one."""
+        segment = self.segment(palm, time)
+        if segment.path is None:
+            return segment.pose is not None
+        u = segment.share(time)
+        return (u < LEFT and not segment.free_start) or (u > COMING and not segment.free_end)
 
     @property
     def blocked(self) -> tuple[tuple[Limb, int], ...]:
