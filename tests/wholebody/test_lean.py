@@ -43,6 +43,16 @@ def test_a_hurried_turn_is_begun_early_and_reached_in_full(robot, paths):
     assert np.abs(np.diff(lean.turn[:, 1])).max() < 0.3 / 10  # spread over many samples
 
 
+def test_a_lean_that_was_not_enough_goes_as_far_again(robot, paths):
+    """The base had to turn by another 0.1 rad beyond a lean of 0.2 rad."""
+    times = np.linspace(0.0, 2.0, 101)
+    turn = np.tile([0.0, 0.3, 0.0], (101, 1))
+    before = Lean(times, np.tile([0.0, 0.2, 0.0], (101, 1)))
+    lean = lean_ahead(paths, times, postures(robot, paths, times, turn), before=before)
+    assert lean is not None
+    np.testing.assert_allclose(lean.turn, np.tile([0.0, 0.4, 0.0], (101, 1)), atol=1e-9)
+
+
 def test_a_base_that_hardly_turns_leans_enough(robot, paths):
     times = np.linspace(0.0, 1.0, 51)
     turn = np.zeros((51, 3))
@@ -77,7 +87,7 @@ def test_passes_end_with_the_first_that_holds(robot, flat_walk, monkeypatch):
     monkeypatch.setattr("toolkit.wholebody.check.COM_ERROR", 0.0)
     monkeypatch.setattr("toolkit.wholebody.lean.WORTH", 0.0)
     assert not whole_body(flat_walk, scene).trajectory.feasible
-    assert passes == [(False, BODY), (True, BODY), (True, BODY), (False, CLOSE)]
+    assert passes == [(False, BODY), *(wholebody.PASSES - 1) * [(True, BODY)], (False, CLOSE)]
     passes.clear()
     monkeypatch.setattr("toolkit.wholebody.lean.WORTH", np.inf)  # no lean is worth it
     whole_body(flat_walk, scene)

@@ -145,6 +145,18 @@ def test_free_palms_have_no_target(robot, palm_walk):
     assert not paths.blocked
 
 
+def test_a_palm_is_at_a_surface_but_for_the_middle_of_its_swings(robot, palm_walk):
+    paths, palm = limb_paths(robot, palm_walk.world, palm_walk.schedule, palm_walk.motion), Limb.LEFT_PALM
+    assert not paths.at_surface(palm, 0.0)
+    swings = [item for item in paths.segments[palm] if item.path is not None]
+    assert any(item.free_start for item in swings) and any(item.free_end for item in swings)
+    for item in swings:
+        begin, middle, end = (paths.at_surface(palm, item.begin + u * (item.end - item.begin)) for u in (0.1, 0.4, 0.9))
+        assert (begin, middle, end) == (not item.free_start, False, not item.free_end)
+    held = next(item for item in paths.segments[palm] if item.pose is not None)
+    assert paths.at_surface(palm, held.begin)
+
+
 def test_paths_are_continuous_over_the_schedule(robot, planned):
     walk, _ = planned
     paths = limb_paths(robot, walk.world, walk.schedule, walk.motion)

@@ -10,7 +10,7 @@ from toolkit.wholebody import swing_planner, swing_task
 from toolkit.wholebody.detour import corners, gaps
 from toolkit.wholebody.limb_paths import box_collide
 from toolkit.wholebody.swing_planner import plan_swing
-from toolkit.wholebody.swing_task import EASY, GAP, LIFT, MARGIN, STEEP, SwingTask
+from toolkit.wholebody.swing_task import EASY, GAP, LIFT, MARGIN, SAMPLES, STEEP, StandingLeg, SwingTask
 
 HALF = np.array([0.11, 0.065])
 
@@ -164,6 +164,30 @@ def test_foot_goes_around_the_shin_where_it_leans_over_the_standing_foot():
     gap = [gaps(corners(p.positions(u), p.rotations(u), HALF), leaning).min() for p in (level, path)]
     assert gap[0] < 0.6 * GAP
     assert gap[1] > GAP - 2e-3
+
+
+def test_a_raised_foot_goes_around_the_knee_of_the_standing_leg():
+    """Over a block it is as high as the knee, which is ahead of the ankle; a foot that stays low passes beneath."""
+    start, end = [-0.3, -0.12, 0.0], [0.6, -0.12, 0.0]
+    knee = np.array([0.2, -0.02, 0.35])
+    points = np.tile([[0.0, 0.1, 0.09], knee, [0.05, 0.1, 0.75]], (SAMPLES, 1, 1))
+    beside = StandingLeg(points, np.array([0.04, 0.05]))
+    other = Pose.from_yaw(np.array([0.0, 0.1, 0.0]), 0.0), HALF
+    block = box_collide(world_of('<geom type="box" size="0.05 1 0.14" pos="0.2 0 0.14"/>'))
+    u = np.linspace(0.0, 1.0, 201)
+
+    def apart(path):
+        places = path.positions(u)
+        passing = (places[:, 2] < knee[2]) & (places[:, 2] + 0.08 > knee[2])
+        sides = corners(places, path.rotations(u), HALF)[passing]
+        square = knee[:2] + 0.04 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+        return gaps(sides, square).min() if passing.any() else np.inf
+
+    straight = plan_swing(task_of(start, end, other=other), block)
+    path = plan_swing(task_of(start, end, other=other, beside=beside), block)
+    assert path.clear and apart(straight) < 0.5 * GAP and apart(path) > GAP - 5e-3
+    low = [plan_swing(task_of(start, end, other=other, beside=each), free(None)) for each in (None, beside)]
+    np.testing.assert_allclose(low[0].positions(u), low[1].positions(u))
 
 
 def test_palm_retracts_and_approaches_along_the_normal():

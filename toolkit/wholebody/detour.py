@@ -1,4 +1,4 @@
-"""How a swinging foot gets around the standing one and the shin above it, seen from above."""
+"""How a swinging foot gets around the standing one and the leg above it, seen from above."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from toolkit.wholebody.swing import SwingPath
-from toolkit.wholebody.swing_task import SAMPLES, SwingTask
+from toolkit.wholebody.swing_task import SAMPLES, THICKNESS, StandingLeg, SwingTask
 
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 STEP, MOST = 0.02, 0.16  # m; the detour grows by STEP until the way is free, at most to MOST
@@ -27,8 +27,12 @@ def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath]) -> np.nd
 
     def gap(bump: np.ndarray) -> tuple[float, float]:
         path = path_of(bump)
-        moving = corners(path.positions(u), path.rotations(u), task.half_size)
+        places = path.positions(u)
+        moving = corners(places, path.rotations(u), task.half_size)
         apart = np.min([gaps(moving, each) for each in standing], axis=0)
+        if task.beside is not None:
+            for height in task.scale.length * THICKNESS * np.array([0.0, 0.5, 1.0]):
+                apart = np.fmin(apart, _gap_of_leg(task.beside, moving, places[:, 2] + height))
         return float(apart.min()), float(min(apart[0], apart[-1]))
 
     free, at_ends = gap(np.zeros(3))
@@ -52,6 +56,13 @@ def detour(task: SwingTask, path_of: Callable[[np.ndarray], SwingPath]) -> np.nd
     return best
 
 
+def _gap_of_leg(leg: StandingLeg, moving: np.ndarray, height: np.ndarray) -> np.ndarray:
+    """(k,) m; separation of convex quadrilaterals `moving` (k, 4, 2) from a leg at heights (k,); NaN where none is."""
+    place, radius = leg.at(height)
+    square = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], float)
+    return gaps(moving, place[:, None] + radius[:, None, None] * square)
+
+
 def corners(positions: np.ndarray, rotations: np.ndarray, half_size: np.ndarray) -> np.ndarray:
     """(k, 4, 2) corners of patches seen from above, in order around."""
     signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], float)
@@ -62,7 +73,7 @@ def corners(positions: np.ndarray, rotations: np.ndarray, half_size: np.ndarray)
 def gaps(moving: np.ndarray, standing: np.ndarray) -> np.ndarray:
     """(k,) m; largest separation of convex quadrilaterals along any edge normal, negative where they overlap.
 
-    Corners in m, in order around: `moving` (k, 4, 2) and `standing` (4, 2).
+    Corners in m, in order around: `moving` (k, 4, 2) and `standing` (4, 2) or (k, 4, 2).
     """
     standing = np.broadcast_to(standing, moving.shape)
     gaps = np.full(len(moving), -np.inf)

@@ -12,12 +12,15 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.schedule import ContactSchedule, Phase
 from toolkit.contacts.stance import Contact, Stance
+from toolkit.geometry.heading import mean_heading, wrapped
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, mean_pose
+from toolkit.physics.leg import leg_posture
+from toolkit.robot.leg_radii import leg_radii
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.swing import LimbSample, SwingPath, Window
 from toolkit.wholebody.swing_planner import Collide, plan_swing
-from toolkit.wholebody.swing_task import LIFT, SAMPLES, SwingingLeg, SwingTask
+from toolkit.wholebody.swing_task import LIFT, SAMPLES, StandingLeg, SwingingLeg, SwingTask
 from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
 
@@ -184,7 +187,7 @@ def _swing(
 
     start = old.pose if old is not None else free(index - 1 if index > 0 else index, phase.start)
     end = new.pose if new is not None else free(min(index + 1, len(phases) - 1), phase.end)
-    other, leg, shin = None, None, np.zeros(3)
+    other, leg, shin, beside = None, None, np.zeros(3), None
     standing = _contact(phase, limb.mirrored) if limb.is_foot else None
     if standing is not None:
         other = standing.pose, robot.half_sizes[limb.mirrored]
@@ -192,12 +195,23 @@ def _swing(
         u = np.linspace(0.0, 1.0, SAMPLES)
         com = np.array([motion.sample(phase.start + share * phase.duration)[0] for share in u])
         leg = SwingingLeg(robot.legs[limb], u, com, standing.pose.yaw)
+        beside = _standing_leg(robot, standing, com, start.yaw + u * wrapped(end.yaw - start.yaw))
     free_start, free_end = old is None, new is None
     size, scale = robot.half_sizes[limb], robot.scale
     lift = scale.length * (foot_lift if limb.is_foot else LIFT)
     ends = start, end, size, limb.is_foot, limb.outward, free_start, free_end
-    task = SwingTask(phase.start, phase.duration, *ends, other, leg, lift, scale, robot.passing_gap, shin)
+    task = SwingTask(phase.start, phase.duration, *ends, other, leg, lift, scale, robot.passing_gap, shin, beside)
     return Segment(phase.start, phase.end, phase.transition, None, plan_swing(task, collide), free_start, free_end)
+
+
+def _standing_leg(robot: RobotModel, standing: Contact, com: np.ndarray, yaw: np.ndarray) -> StandingLeg:
+    """The leg on a contact, for CoMs (k, 3) m and headings (k,) rad of the other foot."""
+    count, pose = len(com), standing.pose
+    position, rotation = np.tile(pose.position, (count, 1)), np.tile(pose.rotation, (count, 1, 1))
+    posture = leg_posture(robot.legs[standing.limb], com, mean_heading(pose.yaw, yaw), position, rotation)
+    joints = (posture.ankle_point, posture.knee_point, posture.hip_point)
+    points = [np.stack(np.broadcast_arrays(*point), axis=-1) for point in joints]
+    return StandingLeg(np.stack(points, axis=1), leg_radii(robot)[::-1])
 
 
 def _feet(phase: Phase) -> Pose:

@@ -10,14 +10,13 @@ import numpy as np
 
 from toolkit.wholebody.detour import detour
 from toolkit.wholebody.swing import Move, SwingPath, Window
-from toolkit.wholebody.swing_task import EARLY, EASY, LATE, SAMPLES, STEEP, SwingTask, SwingTiming
+from toolkit.wholebody.swing_task import EARLY, EASY, LATE, SAMPLES, STEEP, THICKNESS, SwingTask, SwingTiming
 
 Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool, whether a box touches the world."""
 
 # Lengths and speeds are those of a body of the usual size (`toolkit.robot.scale`).
 SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
-THICKNESS = 0.08  # m; height of the swept box above the patch, to hold the foot or the hand
 SPACING = 0.01  # m; largest way between two poses that are checked, so that none passes an edge unseen
 # m per m of way along the surface on which a swing ends that is higher by more than CLIMB (m): the least padding below
 NEAR, CLIMB = 0.4, 0.02
@@ -48,8 +47,13 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector))
     sides = _free_sides(task, collide)
     easy = _raised(task, EASY, task.rise + task.scale.length * EASY_RAISE)
-    path, timing = _least_raised(task, collide, easy + _raised(task, STEEP), bump, sides)
-    if not _fast_foot(task) or timing is EASY:
+    candidates = easy + _raised(task, STEEP)
+    path, raised = _least_raised(task, collide, candidates, bump, sides)
+    around = detour(task, lambda vector: _path(task, *raised, vector))  # at that height the leg may be elsewhere
+    if np.any(around != bump):
+        bump = around
+        path, raised = _least_raised(task, collide, candidates, bump, sides)
+    if not _fast_foot(task) or raised[2] is EASY:
         return path
     others = (_least_raised(task, collide, _raised(task, timing), bump, sides)[0] for timing in (LATE, EARLY))
     return min([path, *others], key=lambda each: (not each.clear, each.peak_acceleration))
@@ -61,8 +65,10 @@ def _least_raised(
     candidates: Sequence[tuple[float, float, SwingTiming]],
     bump: np.ndarray,
     sides: tuple[float, float],
-) -> tuple[SwingPath, SwingTiming]:
-    """The first of some candidates, with a sideways bump, that is clear; the last one with `clear` False if none is.
+) -> tuple[SwingPath, tuple[float, float, SwingTiming]]:
+    """The first of some candidates, with a sideways bump, that is clear, and how it is raised.
+
+    It is the last one with `clear` False if none is.
 
     Moderate heights are tried first with the whole margin, then with half and a quarter of it. Great heights follow in
     the same way. No margin at all is the last resort, but not of fast feet: they do not follow their path so closely.
@@ -76,8 +82,8 @@ def _least_raised(
             for before, after, timing in group:
                 path = _within_ankle_range(task, _path(task, before, after, timing, bump))
                 if not collide(*_swept_boxes(task, path, share * task.margin, sides)).any():
-                    return path, timing
-    return replace(_path(task, *candidates[-1], bump), clear=False), candidates[-1][2]
+                    return path, (before, after, timing)
+    return replace(_path(task, *candidates[-1], bump), clear=False), candidates[-1]
 
 
 def _raised(task: SwingTask, timing: SwingTiming, most: float = np.inf) -> list[tuple[float, float, SwingTiming]]:

@@ -17,6 +17,7 @@ from toolkit.wholebody.swing import SwingPath, Window
 LIFT = 0.05  # m; guarded motion along the surface normal at both ends of a swing
 MARGIN = 0.02  # m; kept free around the swept patch, where the start and the end leave that much
 GAP = 0.02  # m; kept between the soles of the swinging and the standing foot
+THICKNESS = 0.08  # m; height of the swept box above the patch, to hold the foot or the hand
 SAMPLES = 33  # least number of poses per swing that are checked
 
 
@@ -85,6 +86,30 @@ class SwingingLeg:
 
 
 @dataclass(frozen=True)
+class StandingLeg:
+    """The leg beside a swinging foot: capsules around the lines between its joints.
+
+    Attributes:
+        points: (k, 3, 3) m; ankle, knee and hip at `SAMPLES` even fractions of the swing.
+        radius: (2,) m; of shin and thigh.
+    """
+
+    points: np.ndarray
+    radius: np.ndarray
+
+    def at(self, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where the leg is at heights (k,) m in the world, (k, 2) m, and how thick, (k,) m; NaN where it is not."""
+        place, radius = np.full((len(height), 2), np.nan), np.full(len(height), np.nan)
+        for link in range(2):
+            low, high = self.points[:, link], self.points[:, link + 1]
+            part = (height - low[:, 2]) / np.maximum(high[:, 2] - low[:, 2], 1e-9)
+            here = (part >= 0.0) & (part <= 1.0)
+            place[here] = (low + part[:, None] * (high - low))[here, :2]
+            radius[here] = self.radius[link]
+        return place, radius
+
+
+@dataclass(frozen=True)
 class SwingTask:
     """What a swing has to connect.
 
@@ -102,6 +127,7 @@ class SwingTask:
         passing: Gap in m between the soles at which the legs pass each other.
         shin: (3,) m; horizontal way of the standing leg's shin from where it is over a level sole: it keeps the gap
             too, since a foot passes it there, and not the sole.
+        beside: The standing leg, which a foot may pass at any height; None for palms and where no other foot stands.
     """
 
     begin: float
@@ -119,6 +145,7 @@ class SwingTask:
     scale: Scale = USUAL
     passing: float = 0.0
     shin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    beside: StandingLeg | None = None
 
     @property
     def way(self) -> float:

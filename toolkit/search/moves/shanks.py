@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from toolkit.compiled import compiled
-from toolkit.geometry.limb import FEET, Limb
 from toolkit.physics.leg import distance
+from toolkit.robot.leg_radii import leg_radii
 from toolkit.robot.model import RobotModel
 
 _FREE = (0.6, 0.75)  # part of thigh and shin, from the knee on, that is checked
@@ -25,7 +24,7 @@ class Shanks(NamedTuple):
     """Capsules inside the legs.
 
     Attributes:
-        radius: (2,) m; of thighs and shins: half the thinner side of the thickest long geom there.
+        radius: (2,) m; of thighs and shins; see `leg_radii`.
         slack: m by which the legs may overlap, since the base may turn to help.
     """
 
@@ -35,26 +34,7 @@ class Shanks(NamedTuple):
 
 def shanks_of(robot: RobotModel) -> Shanks:
     """The capsules inside a robot's legs."""
-    return Shanks(np.min([_radii(robot, limb) for limb in FEET], axis=0), robot.scale.length * _SLACK)
-
-
-def _radii(robot: RobotModel, limb: Limb) -> np.ndarray:
-    """(2,) m; radius of a leg's thigh and shin, 0 where nothing there collides."""
-    model, leg = robot.mujoco_model, robot.legs[limb]
-    body = model.body(robot.limbs[limb].body).id
-    joints: list[int] = []
-    while body > 0:
-        first = int(model.body_jntadr[body])
-        own = range(first, first + int(model.body_jntnum[body]))
-        joints = [joint for joint in own if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE] + joints
-        body = int(model.body_parentid[body])
-    radius = np.zeros(2)
-    for link, (joint, length) in enumerate(((joints[2], leg.thigh), (joints[3], leg.shin))):  # see `leg_geometry`
-        for geom in np.flatnonzero(model.geom_bodyid == model.jnt_bodyid[joint]).tolist():
-            half = np.sort(model.geom_aabb[geom, 3:])
-            if (model.geom_contype[geom] or model.geom_conaffinity[geom]) and half[2] > 0.25 * length:
-                radius[link] = max(radius[link], float(half[0]))
-    return radius
+    return Shanks(leg_radii(robot), robot.scale.length * _SLACK)
 
 
 @compiled
