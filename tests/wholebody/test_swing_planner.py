@@ -186,6 +186,12 @@ def test_a_raised_foot_goes_around_the_knee_of_the_standing_leg():
     straight = plan_swing(task_of(start, end, other=other), block)
     path = plan_swing(task_of(start, end, other=other, beside=beside), block)
     assert path.clear and apart(straight) < 0.5 * GAP and apart(path) > GAP - 5e-3
+    wide = '<geom type="box" size="0.4 0.01 0.5" pos="0.2 -0.2 0.5"/>'  # no room to go around
+
+    def walled(*boxes):
+        return block(*boxes) | box_collide(world_of(wide))(*boxes)
+
+    assert plan_swing(task_of(start, end, other=other, beside=beside), walled).clear
     low = [plan_swing(task_of(start, end, other=other, beside=each), free(None)) for each in (None, beside)]
     np.testing.assert_allclose(low[0].positions(u), low[1].positions(u))
 

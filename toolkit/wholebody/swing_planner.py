@@ -51,8 +51,9 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     path, raised = _least_raised(task, collide, candidates, bump, sides)
     around = detour(task, lambda vector: _path(task, *raised, vector))  # at that height the leg may be elsewhere
     if np.any(around != bump):
-        bump = around
-        path, raised = _least_raised(task, collide, candidates, bump, sides)
+        other, other_raised = _least_raised(task, collide, candidates, around, sides)
+        if other.clear or not path.clear:
+            path, raised, bump = other, other_raised, around
     if not _fast_foot(task) or raised[2] is EASY:
         return path
     others = (_least_raised(task, collide, _raised(task, timing), bump, sides)[0] for timing in (LATE, EARLY))
