@@ -6,9 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from toolkit.contacts.failure import Failure
 from toolkit.geometry.pose import Pose, rotation_exponential
 from toolkit.wholebody import plan as wholebody
 from toolkit.wholebody.avoidance import BODY, CLOSE
+from toolkit.wholebody.check import CheckReport
 from toolkit.wholebody.ik import WholeBodyIK, momentum_at
 from toolkit.wholebody.lean import AROUND, WORTH, Lean, lean_ahead
 from toolkit.wholebody.limb_paths import limb_paths
@@ -88,6 +90,12 @@ def test_passes_end_with_the_first_that_holds(robot, flat_walk, monkeypatch):
     monkeypatch.setattr("toolkit.wholebody.lean.WORTH", 0.0)
     assert not whole_body(flat_walk, scene).trajectory.feasible
     assert passes == [(False, BODY), *(wholebody.PASSES - 1) * [(True, BODY)], (False, CLOSE)]
+    passes.clear()
+    with monkeypatch.context() as patch:
+        touch = CheckReport(0.0, 0.0, np.zeros(0), True, (Failure("an arm touches a wall", 0.5, at_any_pace=True),))
+        patch.setattr(wholebody, "check", lambda *_: touch)
+        whole_body(flat_walk, scene)
+        assert passes == [(False, BODY), *(wholebody.PASSES - 2) * [(True, BODY)], (False, CLOSE)]
     passes.clear()
     monkeypatch.setattr("toolkit.wholebody.lean.WORTH", np.inf)  # no lean is worth it
     whole_body(flat_walk, scene)

@@ -182,6 +182,8 @@ def _checked(
     for manner in passes:
         if manner is before and lean is None and (ahead is None or len(found) > 1):
             continue
+        if manner is before and len(found) == PASSES - 1 and _hard_or_touching(found[-1][1].findings):
+            continue  # the last one is for legs that meet
         lean = lean if manner is before else None
         qpos = solve_ik(robot, paths, motion, times, scene, lean, manner, ahead)
         found.append((qpos, check(robot, scene, paths, motion, times, qpos)))
@@ -191,6 +193,11 @@ def _checked(
         if len(found) == 1 and (arms := ArmsAhead(robot, scene, times, qpos)).touch:
             ahead = arms
     return found[0]
+
+
+def _hard_or_touching(findings: Sequence[Failure]) -> bool:
+    """Whether joints that turn too hard and links that touch the world are all that was found."""
+    return all(each.too_fast or each.at_any_pace for each in findings)
 
 
 def _blocked(schedule: ContactSchedule, paths: LimbPaths) -> list[Failure]:
@@ -214,8 +221,7 @@ def _joined(blocked: Sequence[Failure], found: Sequence[Failure], schedule: Cont
     findings, touches = [*blocked, *found], [each for each in found if each.at_any_pace]
     if not findings:
         return None
-    only_hard_besides = all(each.too_fast or each.at_any_pace for each in found)
-    causes = blocked or (only_hard_besides and touches) or findings
+    causes = blocked or (_hard_or_touching(found) and touches) or findings
     time, reason = causes[0].time, "; ".join(each.reason for each in findings)
     transition = None if time is None else schedule.phase_at(time).transition
     too_fast, at_any_pace = all(each.too_fast for each in causes), all(each.at_any_pace for each in causes)
