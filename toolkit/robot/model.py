@@ -310,6 +310,19 @@ class RobotModel:
         return not any(self.limbs[foot].rolls for foot in FEET)
 
     @cached_property
+    def leg_radii(self) -> np.ndarray:
+        """(2,) m; radius of thighs and shins: half the thinner side of the thickest long geom there, 0 without one."""
+        model, radius = self.mujoco_model, np.zeros((len(FEET), 2))
+        for foot in FEET:
+            leg, joints = self.legs[foot], self.joints_to(foot)
+            for link, (joint, length) in enumerate(((joints[2], leg.thigh), (joints[3], leg.shin))):
+                for geom in np.flatnonzero(model.geom_bodyid == model.jnt_bodyid[joint + 1]).tolist():
+                    half = np.sort(model.geom_aabb[geom, 3:])
+                    if (model.geom_contype[geom] or model.geom_conaffinity[geom]) and half[2] > 0.25 * length:
+                        radius[foot, link] = max(radius[foot, link], float(half[0]))
+        return radius.min(axis=0)
+
+    @cached_property
     def passing_gap(self) -> float:
         """Gap in m between the soles at which the legs pass each other (`toolkit.robot.legroom.passing_gap`)."""
         from toolkit.robot.legroom import passing_gap  # here, since it needs a robot

@@ -16,7 +16,6 @@ from toolkit.geometry.heading import mean_heading, wrapped
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose, mean_pose
 from toolkit.physics.leg import leg_posture
-from toolkit.robot.leg_radii import leg_radii
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.swing import LimbSample, SwingPath, Window
 from toolkit.wholebody.swing_planner import Collide, plan_swing
@@ -211,7 +210,7 @@ def _standing_leg(robot: RobotModel, standing: Contact, com: np.ndarray, yaw: np
     posture = leg_posture(robot.legs[standing.limb], com, mean_heading(pose.yaw, yaw), position, rotation)
     joints = (posture.ankle_point, posture.knee_point, posture.hip_point)
     points = [np.stack(np.broadcast_arrays(*point), axis=-1) for point in joints]
-    return StandingLeg(np.stack(points, axis=1), leg_radii(robot)[::-1])
+    return StandingLeg(np.stack(points, axis=1), robot.leg_radii[::-1])
 
 
 def _feet(phase: Phase) -> Pose:

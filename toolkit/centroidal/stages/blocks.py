@@ -56,16 +56,6 @@ class Block(NamedTuple):
 
 
 @compiled(reordered=True)
-def find_stages(stage, first):
-    """Fill (T + 1,) the first of some stages (n,) in ascending order that is not before each of T, and n at the end."""
-    i = 0
-    for t in range(first.shape[0]):
-        while i < stage.shape[0] and stage[i] < t:
-            i += 1
-        first[t] = i
-
-
-@compiled(reordered=True)
 def start(block, least, gap):
     """Slacks as large as the rows, at least `least`; multipliers such that s z = gap."""
     for i in range(block.value.shape[0]):

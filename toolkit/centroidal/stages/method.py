@@ -151,16 +151,15 @@ class Options(NamedTuple):
     linear: bool = False
 
 
-@compiled(reordered=True)
+@compiled(reordered=True, allocates=True)
 def prepare(prices, squares, all_blocks, work):
     """Fill the slopes of linear rows, and what is where."""
     rows.prepare_contacts(all_blocks.contacts)
-    count = 0
-    for block in all_blocks:
-        blocks.find_stages(block.stage, work.first[count])
-        count += 1
-    blocks.find_stages(prices.stage, work.first[count])
-    blocks.find_stages(squares.stage, work.first[count + 1])
+    stages, count = np.arange(work.first.shape[1]), len(all_blocks)
+    for number, block in enumerate(all_blocks):
+        work.first[number] = np.searchsorted(block.stage, stages)
+    work.first[count] = np.searchsorted(prices.stage, stages)
+    work.first[count + 1] = np.searchsorted(squares.stage, stages)
 
 
 @compiled(reordered=True)
@@ -198,13 +197,11 @@ def evaluate(steps, prices, squares, all_blocks, begin, end, size, y, floor, kep
 @compiled(reordered=True)
 def backward(all_blocks, begin, end, size, goal, corrected, work):
     """Sweep the stages from `begin` to before `end` back, for complementarities of `goal`."""
-    number = 0
     for t in range(begin, end):
         for k in range(size[t]):
             work.condensed[t, k] = work.gradient[t, k]
-    for block in all_blocks:
+    for number, block in enumerate(all_blocks):
         blocks.add_gradient(block, span(work.first[number], begin, end), goal, corrected, work.condensed)
-        number += 1
     newton.backward(begin, end, size, work.following, work.defect, work.condensed, work.sweep)
 
 
@@ -280,11 +277,10 @@ def minimise(steps, prices, squares, all_blocks, size, y, work, options):
     for iteration in range(options.iterations):
         kept, floor, value = options.linear and iteration > 0, FLOOR * min(far, 1.0), 0.0
         for end in range(stages, 0, -group):
-            begin, number = max(end - group, 0), 0
+            begin = max(end - group, 0)
             value += evaluate(steps, prices, squares, all_blocks, begin, end, size, y, floor, kept, work)
-            for block in all_blocks:
+            for number, block in enumerate(all_blocks):
                 blocks.add_curvature(block, span(work.first[number], begin, end), work.hessian)
-                number += 1
             if options.at_rest and end == stages:
                 for a in range(3, 6):
                     work.gradient[last, a] += force[a - 3] + REST_STIFFNESS * y[last, a]

@@ -13,7 +13,6 @@ import numpy as np
 
 from toolkit.compiled import compiled
 from toolkit.physics.leg import distance
-from toolkit.robot.leg_radii import leg_radii
 from toolkit.robot.model import RobotModel
 
 _FREE = (0.6, 0.75)  # part of thigh and shin, from the knee on, that is checked
@@ -24,7 +23,7 @@ class Shanks(NamedTuple):
     """Capsules inside the legs.
 
     Attributes:
-        radius: (2,) m; of thighs and shins; see `leg_radii`.
+        radius: (2,) m; of thighs and shins; see `RobotModel.leg_radii`.
         slack: m by which the legs may overlap, since the base may turn to help.
     """
 
@@ -34,7 +33,7 @@ class Shanks(NamedTuple):
 
 def shanks_of(robot: RobotModel) -> Shanks:
     """The capsules inside a robot's legs."""
-    return Shanks(leg_radii(robot), robot.scale.length * _SLACK)
+    return Shanks(robot.leg_radii, robot.scale.length * _SLACK)
 
 
 @compiled
