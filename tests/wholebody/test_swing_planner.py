@@ -10,7 +10,7 @@ from toolkit.wholebody import swing_planner, swing_task
 from toolkit.wholebody.detour import corners, gaps
 from toolkit.wholebody.limb_paths import box_collide
 from toolkit.wholebody.swing_planner import plan_swing
-from toolkit.wholebody.swing_task import EASY, GAP, LIFT, MARGIN, SAMPLES, STEEP, StandingLeg, SwingTask
+from toolkit.wholebody.swing_task import EASY, GAP, LIFT, MARGIN, SAMPLES, STEEP, STRAY, StandingLeg, SwingTask
 
 HALF = np.array([0.11, 0.065])
 
@@ -166,13 +166,18 @@ def test_foot_goes_around_the_shin_where_it_leans_over_the_standing_foot():
     assert gap[1] > GAP - 2e-3
 
 
-def test_a_raised_foot_goes_around_the_knee_of_the_standing_leg():
-    """Over a block it is as high as the knee, which is ahead of the ankle; a foot that stays low passes beneath."""
+@pytest.mark.parametrize("duration", [0.8, 0.45])
+def test_a_raised_foot_goes_around_the_knee_of_the_standing_leg(duration):
+    """Over a block it is as high as the knee, which is ahead of the ankle; a foot that stays low passes beneath.
+
+    The knee of a leg that leans with the base has room, also where the foot is so fast that it crosses late or early.
+    """
     start, end = [-0.3, -0.12, 0.0], [0.6, -0.12, 0.0]
     knee = np.array([0.2, -0.02, 0.35])
     points = np.tile([[0.0, 0.1, 0.09], knee, [0.05, 0.1, 0.75]], (SAMPLES, 1, 1))
     beside = StandingLeg(points, np.array([0.04, 0.05]))
     other = Pose.from_yaw(np.array([0.0, 0.1, 0.0]), 0.0), HALF
+    timed = replace(task_of(start, end, other=other), duration=duration)
     block = box_collide(world_of('<geom type="box" size="0.05 1 0.14" pos="0.2 0 0.14"/>'))
     u = np.linspace(0.0, 1.0, 201)
 
@@ -183,17 +188,35 @@ def test_a_raised_foot_goes_around_the_knee_of_the_standing_leg():
         square = knee[:2] + 0.04 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
         return gaps(sides, square).min() if passing.any() else np.inf
 
-    straight = plan_swing(task_of(start, end, other=other), block)
-    path = plan_swing(task_of(start, end, other=other, beside=beside), block)
-    assert path.clear and apart(straight) < 0.5 * GAP and apart(path) > GAP - 5e-3
+    straight = plan_swing(timed, block)
+    path = plan_swing(replace(timed, beside=beside), block)
+    room = GAP + STRAY * (knee[2] - points[0, 0, 2])
+    assert path.clear and apart(straight) < 0.5 * GAP and apart(path) > room - 5e-3
     wide = '<geom type="box" size="0.4 0.01 0.5" pos="0.2 -0.2 0.5"/>'  # no room to go around
 
     def walled(*boxes):
         return block(*boxes) | box_collide(world_of(wide))(*boxes)
 
-    assert plan_swing(task_of(start, end, other=other, beside=beside), walled).clear
-    low = [plan_swing(task_of(start, end, other=other, beside=each), free(None)) for each in (None, beside)]
+    assert plan_swing(replace(timed, beside=beside), walled).clear
+    low = [plan_swing(replace(timed, beside=each), free(None)) for each in (None, beside)]
     np.testing.assert_allclose(low[0].positions(u), low[1].positions(u))
+
+
+@pytest.mark.parametrize("under", [0.0, 0.015, 0.03])
+def test_a_foot_that_stands_under_an_edge_draws_back_from_there(under):
+    """The nose of a step is over the toes: straight up they would hit it, and back on the ground nothing is in the way.
+
+    Where the toes are not under it, the foot goes up straight.
+    """
+    nose, height = 0.3, 0.25
+    step = f'''<geom type="box" size="0.4 1 0.02" pos="{nose + 0.4} 0 {height - 0.02}"/>'''
+    start = np.array([nose + under - HALF[0] - 0.002, 0.1, 0.0])
+    task = task_of(start, [nose + 0.2, 0.1, height])
+    path = plan_swing(task, box_collide(world_of(step)))
+    u = np.linspace(0.0, 1.0, 201)
+    back = start[0] - path.positions(u)[:, 0].min()
+    assert path.clear and (back > under + 0.005 if under else back < 1e-9)
+    np.testing.assert_allclose(path.positions(u)[[0, -1]], [start, task.end.position], atol=1e-12)
 
 
 def test_palm_retracts_and_approaches_along_the_normal():

@@ -33,6 +33,8 @@ SLOW, FAST = 1.0, 2.5  # m/s; the easy windows hold up to a mean speed of SLOW, 
 # each other: until OUTWARD, a fraction of the swing, unless that asks for more than TURN_RATE (rad/s) in the mean.
 OUTWARD, LEAST_TURN, TURN_RATE = 0.5, 0.1, 4.0
 
+RETREATS, RETREATING = (0.03, 0.06), Window(0.0, 0.6)  # m by which feet draw back, in the order of trying; and when
+
 # A foot that trails the standing one by more than PITCH_FROM (m) pitches its toes down by PITCH_GAIN (rad/m), and by
 # more where the ankle would come closer than ANKLE_MARGIN (rad) to an end of its range. MAX_PITCH (rad) is the most.
 PITCH_GAIN, PITCH_FROM, MAX_PITCH, ANKLE_MARGIN = 1.5, 0.2, 0.9, 0.15
@@ -42,22 +44,44 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     """The least raised path that is clear; where none is, the highest one with `clear` False.
 
     Fast swings that have to rise are also tried with late and with early crossings: the one whose peak acceleration is
-    least is taken.
+    least is taken. A foot without a clear way that has to climb may stand at the riser: it draws back from there.
     """
-    bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector))
-    sides = _free_sides(task, collide)
+    path = _plan(task, collide)
+    if path.clear or not task.is_foot or task.end.position[2] <= task.start.position[2]:
+        return path
+    back = (replace(task, retreat=task.scale.length * each) for each in RETREATS)
+    return next((other for each in back if (other := _plan(each, collide)).clear), path)
+
+
+def _plan(task: SwingTask, collide: Collide) -> SwingPath:
+    """The path of a foot that draws back as the task says; see `plan_swing`."""
+    bump, sides = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector)), _free_sides(task, collide)
     easy = _raised(task, EASY, task.rise + task.scale.length * EASY_RAISE)
-    candidates = easy + _raised(task, STEEP)
+    path, timing = _around_leg(task, collide, easy + _raised(task, STEEP), bump, sides)
+    if not _fast_foot(task) or timing is EASY:
+        return path
+    others = (_around_leg(task, collide, _raised(task, timing), bump, sides)[0] for timing in (LATE, EARLY))
+    return min([path, *others], key=lambda each: (not each.clear, each.peak_acceleration))
+
+
+def _around_leg(
+    task: SwingTask,
+    collide: Collide,
+    candidates: Sequence[tuple[float, float, SwingTiming]],
+    bump: np.ndarray,
+    sides: tuple[float, float],
+) -> tuple[SwingPath, SwingTiming]:
+    """What `_least_raised` finds, with the sideways bump that its height needs, and its timing.
+
+    The standing leg is elsewhere at that height.
+    """
     path, raised = _least_raised(task, collide, candidates, bump, sides)
-    around = detour(task, lambda vector: _path(task, *raised, vector))  # at that height the leg may be elsewhere
+    around = detour(task, lambda vector: _within_ankle_range(task, _path(task, *raised, vector)))
     if np.any(around != bump):
         other, other_raised = _least_raised(task, collide, candidates, around, sides)
         if other.clear or not path.clear:
-            path, raised, bump = other, other_raised, around
-    if not _fast_foot(task) or raised[2] is EASY:
-        return path
-    others = (_least_raised(task, collide, _raised(task, timing), bump, sides)[0] for timing in (LATE, EARLY))
-    return min([path, *others], key=lambda each: (not each.clear, each.peak_acceleration))
+            path, raised = other, other_raised
+    return path, raised[2]
 
 
 def _least_raised(
@@ -127,10 +151,17 @@ def _path(task: SwingTask, before: float, after: float, timing: SwingTiming, bum
         Move(-after * up, timing.descend),
         Move(onto, land),
         Move(bump, across, returns=True),
+        Move(_back(task), RETREATING, returns=True),
     ]
     moves = tuple(move for move in moves if np.any(move.vector))
     path = SwingPath(task.begin, task.duration, task.start, task.end, moves, across)
     return _pitched(task, replace(path, turn=_turning(task, path)), _pitch(task))
+
+
+def _back(task: SwingTask) -> np.ndarray:
+    """(3,) m; how far a foot draws back, against its way as seen from above."""
+    way = (task.end.position - task.start.position) * [1.0, 1.0, 0.0]
+    return -task.retreat * way / max(float(np.linalg.norm(way)), 1e-6)
 
 
 def _turning(task: SwingTask, path: SwingPath) -> Window:

@@ -19,6 +19,7 @@ MARGIN = 0.02  # m; kept free around the swept patch, where the start and the en
 GAP = 0.02  # m; kept between the soles of the swinging and the standing foot
 THICKNESS = 0.08  # m; height of the swept box above the patch, to hold the foot or the hand
 SAMPLES = 33  # least number of poses per swing that are checked
+STRAY = 0.1  # m per m above the ankle by which the standing leg may be elsewhere than an upright base would have it
 
 
 @dataclass(frozen=True)
@@ -98,14 +99,17 @@ class StandingLeg:
     radius: np.ndarray
 
     def at(self, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where the leg is at heights (k,) m in the world, (k, 2) m, and how thick, (k,) m; NaN where it is not."""
+        """Where the leg is at heights (k,) m in the world, (k, 2) m, and how thick, (k,) m; NaN where it is not.
+
+        It counts as thicker farther up, where it may be elsewhere: it leans with the base.
+        """
         place, radius = np.full((len(height), 2), np.nan), np.full(len(height), np.nan)
         for link in range(2):
             low, high = self.points[:, link], self.points[:, link + 1]
             part = (height - low[:, 2]) / np.maximum(high[:, 2] - low[:, 2], 1e-9)
             here = (part >= 0.0) & (part <= 1.0)
             place[here] = (low + part[:, None] * (high - low))[here, :2]
-            radius[here] = self.radius[link]
+            radius[here] = self.radius[link] + STRAY * (height - self.points[:, 0, 2])[here]
         return place, radius
 
 
@@ -128,6 +132,7 @@ class SwingTask:
         shin: (3,) m; horizontal way of the standing leg's shin from where it is over a level sole: it keeps the gap
             too, since a foot passes it there, and not the sole.
         beside: The standing leg, which a foot may pass at any height; None for palms and where no other foot stands.
+        retreat: m; by which a foot draws back while it rises.
     """
 
     begin: float
@@ -146,6 +151,7 @@ class SwingTask:
     passing: float = 0.0
     shin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     beside: StandingLeg | None = None
+    retreat: float = 0.0
 
     @property
     def way(self) -> float:
