@@ -44,10 +44,10 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     """The least raised path that is clear; where none is, the highest one with `clear` False.
 
     Fast swings that have to rise are also tried with late and with early crossings: the one whose peak acceleration is
-    least is taken. A foot without a clear way that has to climb may stand at the riser: it draws back from there.
+    least is taken. A foot without a clear way may stand at what it has to rise over: it draws back from there.
     """
     path = _plan(task, collide)
-    if path.clear or not task.is_foot or task.end.position[2] <= task.start.position[2]:
+    if path.clear or not task.is_foot:
         return path
     back = (replace(task, retreat=task.scale.length * each) for each in RETREATS)
     return next((other for each in back if (other := _plan(each, collide)).clear), path)
