@@ -209,7 +209,7 @@ def test_a_foot_that_stands_under_an_edge_draws_back_from_there(under):
     Where the toes are not under it, the foot goes up straight.
     """
     nose, height = 0.3, 0.25
-    step = f'''<geom type="box" size="0.4 1 0.02" pos="{nose + 0.4} 0 {height - 0.02}"/>'''
+    step = f'<geom type="box" size="0.4 1 0.02" pos="{nose + 0.4} 0 {height - 0.02}"/>'
     start = np.array([nose + under - HALF[0] - 0.002, 0.1, 0.0])
     task = task_of(start, [nose + 0.2, 0.1, height])
     path = plan_swing(task, box_collide(world_of(step)))

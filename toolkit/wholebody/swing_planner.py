@@ -46,42 +46,36 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     Fast swings that have to rise are also tried with late and with early crossings: the one whose peak acceleration is
     least is taken. A foot without a clear way may stand at what it has to rise over: it draws back from there.
     """
-    path = _plan(task, collide)
+    sides = _free_sides(task, collide)
+    path = _plan(task, collide, sides)
     if path.clear or not task.is_foot:
         return path
-    back = (replace(task, retreat=task.scale.length * each) for each in RETREATS)
-    return next((other for each in back if (other := _plan(each, collide)).clear), path)
+    way = (task.end.position - task.start.position) * [1.0, 1.0, 0.0]
+    length = max(float(np.linalg.norm(way)), 1e-6)
+    back = (replace(task, retreat=-task.scale.length * each * way / length) for each in RETREATS)
+    return next((other for each in back if (other := _plan(each, collide, sides)).clear), path)
 
 
-def _plan(task: SwingTask, collide: Collide) -> SwingPath:
-    """The path of a foot that draws back as the task says; see `plan_swing`."""
-    bump, sides = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector)), _free_sides(task, collide)
+def _plan(task: SwingTask, collide: Collide, sides: tuple[float, float]) -> SwingPath:
+    """The path of a limb that draws back as the task says, with what is free at its sides; see `plan_swing`."""
+    bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector))
+
+    def around_leg(candidates: Sequence[tuple[float, float, SwingTiming]]) -> tuple[SwingPath, SwingTiming]:
+        """What is found among candidates, and its timing; the standing leg is elsewhere at that height."""
+        path, raised = _least_raised(task, collide, candidates, bump, sides)
+        around = detour(task, lambda vector: _within_ankle_range(task, _path(task, *raised, vector)))
+        if np.any(around != bump):
+            other, other_raised = _least_raised(task, collide, candidates, around, sides)
+            if other.clear or not path.clear:
+                return other, other_raised[2]
+        return path, raised[2]
+
     easy = _raised(task, EASY, task.rise + task.scale.length * EASY_RAISE)
-    path, timing = _around_leg(task, collide, easy + _raised(task, STEEP), bump, sides)
+    path, timing = around_leg(easy + _raised(task, STEEP))
     if not _fast_foot(task) or timing is EASY:
         return path
-    others = (_around_leg(task, collide, _raised(task, timing), bump, sides)[0] for timing in (LATE, EARLY))
+    others = (around_leg(_raised(task, timing))[0] for timing in (LATE, EARLY))
     return min([path, *others], key=lambda each: (not each.clear, each.peak_acceleration))
-
-
-def _around_leg(
-    task: SwingTask,
-    collide: Collide,
-    candidates: Sequence[tuple[float, float, SwingTiming]],
-    bump: np.ndarray,
-    sides: tuple[float, float],
-) -> tuple[SwingPath, SwingTiming]:
-    """What `_least_raised` finds, with the sideways bump that its height needs, and its timing.
-
-    The standing leg is elsewhere at that height.
-    """
-    path, raised = _least_raised(task, collide, candidates, bump, sides)
-    around = detour(task, lambda vector: _within_ankle_range(task, _path(task, *raised, vector)))
-    if np.any(around != bump):
-        other, other_raised = _least_raised(task, collide, candidates, around, sides)
-        if other.clear or not path.clear:
-            path, raised = other, other_raised
-    return path, raised[2]
 
 
 def _least_raised(
@@ -151,17 +145,11 @@ def _path(task: SwingTask, before: float, after: float, timing: SwingTiming, bum
         Move(-after * up, timing.descend),
         Move(onto, land),
         Move(bump, across, returns=True),
-        Move(_back(task), RETREATING, returns=True),
+        Move(task.retreat, RETREATING, returns=True),
     ]
     moves = tuple(move for move in moves if np.any(move.vector))
     path = SwingPath(task.begin, task.duration, task.start, task.end, moves, across)
     return _pitched(task, replace(path, turn=_turning(task, path)), _pitch(task))
-
-
-def _back(task: SwingTask) -> np.ndarray:
-    """(3,) m; how far a foot draws back, against its way as seen from above."""
-    way = (task.end.position - task.start.position) * [1.0, 1.0, 0.0]
-    return -task.retreat * way / max(float(np.linalg.norm(way)), 1e-6)
 
 
 def _turning(task: SwingTask, path: SwingPath) -> Window:

@@ -132,7 +132,7 @@ class SwingTask:
         shin: (3,) m; horizontal way of the standing leg's shin from where it is over a level sole: it keeps the gap
             too, since a foot passes it there, and not the sole.
         beside: The standing leg, which a foot may pass at any height; None for palms and where no other foot stands.
-        retreat: m; by which a foot draws back while it rises.
+        retreat: (3,) m; by which a foot draws back while it rises.
     """
 
     begin: float
@@ -151,7 +151,7 @@ class SwingTask:
     passing: float = 0.0
     shin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     beside: StandingLeg | None = None
-    retreat: float = 0.0
+    retreat: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def way(self) -> float:
