@@ -12,6 +12,8 @@ from toolkit.centroidal.build import initial_com
 from toolkit.centroidal.problem import ComRoom
 from toolkit.centroidal.program import Program
 from toolkit.centroidal.sequence import SequenceConfig, guess, optimise
+from toolkit.geometry.limb import Limb
+from toolkit.physics.leg import leg_posture
 from toolkit.robot.loader import load_robot
 from validation.reference.sequence import solve
 
@@ -43,6 +45,40 @@ class Passage:
         normals, bounds = (np.array(part) for part in zip(*rows, strict=True))
         count = len(inside)
         return ComRoom(sink, np.tile(inside, len(rows)), normals.repeat(count, 0), bounds.repeat(count))
+
+    def leans(self, problem):
+        return None
+
+
+class Risers:
+    """The shin over the third foot in contact may lean by `lean` rad at most."""
+
+    def __init__(self, lean):
+        self.lean = lean
+
+    def sink(self, stance):
+        return 0.0
+
+    def room(self, problem):
+        return None
+
+    def leans(self, problem):
+        leans = np.full((problem.steps, 2), np.inf)
+        leans[on_third(problem), 0] = self.lean
+        return leans
+
+
+def on_third(problem):
+    """(k,) int; steps in which the left foot stands where it lands first."""
+    places = problem.position[:, 0, 0]
+    return np.flatnonzero(problem.active[:, 0] & (places == np.unique(places)[1]))
+
+
+def greatest_lean(robot, motion):
+    """Greatest lean in rad of the shin over that foot at the knots after the steps in which it stands."""
+    p, step = motion.problem, on_third(motion.problem)
+    place = motion.com[step + 1], p.yaw[step + 1], p.position[step, 0], p.rotation[step, 0]
+    return float(-leg_posture(robot.legs[Limb.LEFT_FOOT], *place).ankle_pitch.min())
 
 
 def guess_of(problem):
@@ -97,6 +133,9 @@ def test_surroundings_without_limits_change_nothing(walker):
         def room(self, problem):
             return None
 
+        def leans(self, problem):
+            return None
+
     one, other = motions(walker, None), motions(walker, Open())
     np.testing.assert_array_equal(one.com, other.com)
 
@@ -125,3 +164,23 @@ def test_solver_and_reference_agree_on_a_room(walker):
     assert motion.feasible and theirs.feasible, (motion.outcome, theirs.outcome)
     np.testing.assert_allclose(motion.objective, theirs.objective, rtol=1e-2)
     assert motion.problem.room is not None and motion.problem.room.excess(theirs.com).max() < 1e-6
+
+
+def test_shins_lean_no_farther_than_what_stands_before_the_feet_lets_them(walker):
+    free = motions(walker, None)
+    most = greatest_lean(walker, free)
+    held = motions(walker, Risers(most - 0.1))
+    assert free.feasible and held.feasible, held.outcome
+    assert greatest_lean(walker, held) <= most - 0.1 + 1e-6
+    residuals = body_residuals(replace(free, problem=held.problem), walker)
+    assert residuals.worst[0] == "room of the shin" and residuals.worst[2] == Limb.LEFT_FOOT
+    assert residuals.largest == pytest.approx(0.1, abs=1e-6)
+
+
+def test_solver_and_reference_agree_on_the_room_of_shins(walker):
+    most = greatest_lean(walker, motions(walker, None))
+    motion = motions(walker, Risers(most - 0.1))
+    program = Program(motion.problem, walker, CONFIG.body, CONFIG.regularisers)
+    theirs = solve(program, guess(program))
+    assert motion.feasible and theirs.feasible, (motion.outcome, theirs.outcome)
+    np.testing.assert_allclose(motion.objective, theirs.objective, rtol=1e-2)

@@ -6,7 +6,7 @@ from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z, rotation_on_surface
 from toolkit.physics.leg import LIMITS, ReachMargins, leg_clearances
 from toolkit.robot.loader import load_robot
-from toolkit.search.moves.legs import legs_of, reach, stances_violated
+from toolkit.search.moves.legs import any_lean, legs_of, reach, stances_violated
 from toolkit.search.moves.reasons import OF_LIMIT, Reason
 from toolkit.search.moves.shanks import shanks_of
 
@@ -45,9 +45,9 @@ def test_a_lower_com_brings_long_strides_into_reach():
     left, right = np.array([[stride, y, 0.0]]), np.array([[-stride, -y, 0.0]])
     com, turn = np.array([[0.0, 0.0, robot.com_height]]), np.eye(3)[None]
     shanks = shanks_of(robot)
-    high = stances_violated(legs, shanks, com, np.array([0.0]), np.zeros(1), left, turn, right, turn)
+    high = stances_violated(legs, shanks, com, np.array([0.0]), np.zeros(1), left, turn, right, turn, any_lean(1))
     low = stances_violated(
-        legs, shanks, com, np.array([0.0, 0.05, 0.1, 0.15, 0.2]), np.zeros(1), left, turn, right, turn
+        legs, shanks, com, np.array([0.0, 0.05, 0.1, 0.15, 0.2]), np.zeros(1), left, turn, right, turn, any_lean(1)
     )
     assert high[0] == Reason.LEG_LENGTH and low[0] == 0
 
@@ -61,7 +61,9 @@ def test_legs_in_each_others_way_are_no_stance():
     def verdict(turn, apart):
         left, right = (np.array([[0.0, sign * apart / 2, 0.0]]) for sign in (1, -1))
         turns = [rotation_about_z(np.array([-sign * turn])) for sign in (1, -1)]
-        return int(stances_violated(legs, shanks, com, drop, np.zeros(1), left, turns[0], right, turns[1])[0])
+        return int(
+            stances_violated(legs, shanks, com, drop, np.zeros(1), left, turns[0], right, turns[1], any_lean(1))[0]
+        )
 
     assert verdict(0.0, 0.2) == 0 and verdict(0.5, 0.24) == Reason.KNEES and verdict(0.5, 0.5) == 0
 
@@ -75,6 +77,8 @@ def test_feet_turned_towards_each_other_need_the_yaw_of_both_hips():
     def verdict(inwards):
         left, right = (np.array([[0.0, sign * 0.2, 0.0]]) for sign in (1, -1))
         turns = [rotation_about_z(np.array([-sign * inwards / 2])) for sign in (1, -1)]
-        return int(stances_violated(legs, shanks, com, drop, np.zeros(1), left, turns[0], right, turns[1])[0])
+        return int(
+            stances_violated(legs, shanks, com, drop, np.zeros(1), left, turns[0], right, turns[1], any_lean(1))[0]
+        )
 
     assert verdict(most - 0.05) == 0 and verdict(most + 0.05) == Reason.HIP_YAW

@@ -15,7 +15,7 @@ import numpy as np
 from toolkit.centroidal.problem import CentroidalMotion, CentroidalProblem
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
-from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins, leg_clearances, leg_torques
+from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins, leg_clearances, leg_posture, leg_torques
 from toolkit.robot.model import RobotModel
 
 
@@ -76,12 +76,14 @@ class BodyResiduals:
 POSTURES = tuple(limit.name for limit in PLANNED)
 TORQUES = tuple(f"{role.replace('_', ' ')} torque" for role in TORQUE_ROLES)
 SWING_LEG, ARM, HEIGHT, ROOM = "swing leg length", "arm reach", "CoM height", "room of the body"
+SHIN = "room of the shin"
 
 
 def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins = BodyMargins()) -> BodyResiduals:
     """How far a motion, feasible or not, exceeds the limits of the robot's legs and arms less the margins."""
     p, n = motion.placed, motion.problem.steps
-    names = *POSTURES, SWING_LEG, *TORQUES, ARM, HEIGHT, *((ROOM,) if p.room is not None else ())
+    world = *((ROOM,) if p.room is not None else ()), *((SHIN,) if p.lean is not None else ())
+    names = *POSTURES, SWING_LEG, *TORQUES, ARM, HEIGHT, *world
     table = np.full((len(names), n + 1, 4), -np.inf)
     _enter_postures(table[: len(POSTURES)], p, motion, robot, margins)
     first = names.index(TORQUES[0])
@@ -110,6 +112,8 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
     enter(HEIGHT, np.arange(n + 1), foot, floor + p.min_height + margins.height - motion.com[:, 2])
     if p.room is not None:
         enter(ROOM, p.room.knot, foot[p.room.knot], p.room.excess(motion.com))
+    if p.lean is not None:
+        _enter_leans(table[names.index(SHIN)], p, motion, robot, margins)
     table[np.isnan(table)] = np.inf
     return BodyResiduals(names, table)
 
@@ -125,6 +129,18 @@ def _enter_postures(
         given = motion.com[at], p.yaw[at], positions[here], rotations[here]
         clearances = leg_clearances(robot.legs[limb], *given, margins)
         table[:, at, limb] = [-clearances[name] for name in POSTURES]
+
+
+def _enter_leans(
+    table: np.ndarray, p: CentroidalProblem, motion: CentroidalMotion, robot: RobotModel, margins: BodyMargins
+) -> None:
+    """Enter how far the shins of the legs in contact lean into what stands before their feet; nan if undefined."""
+    knots, limbs, positions, rotations = p.knot_contacts
+    for limb in FEET:
+        here = np.flatnonzero((limbs == limb) & np.isfinite(p.knot_leans))
+        at = knots[here]
+        posture = leg_posture(robot.legs[limb], motion.com[at], p.yaw[at], positions[here], rotations[here])
+        table[at, limb] = -posture.ankle_pitch - p.knot_leans[here] + margins.ankle
 
 
 def _enter_torques(

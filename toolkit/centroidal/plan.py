@@ -17,6 +17,7 @@ from toolkit.contacts.sequence import ContactSequence
 from toolkit.robot.model import RobotModel
 from toolkit.world.world import World
 
+_LEAN_ROUNDING = 1e-3  # rad
 FRICTION_ROUNDING = 0.01  # smaller differences of the friction factor do not decide between motions
 
 
@@ -125,9 +126,16 @@ def slid(
     sequence = moved_sequence(plan.sequence, schedule, moved.problem.times, moved.solved.position)
     on_ground = laid(sequence, world.surfaces, robot.half_sizes)
     schedule = schedule.through(on_ground)
-    if on_ground is not sequence:
+    if on_ground is not sequence or _leans_less(moved, surroundings):
         moved = optimise(robot, schedule, *given[2:], config=config, surroundings=surroundings)
     return MotionPlan(robot, world, on_ground, schedule, moved)
+
+
+def _leans_less(moved: CentroidalMotion, surroundings: Surroundings | None) -> bool:
+    """Whether shins have less room where the feet of a motion landed than where they were planned."""
+    leans = None if surroundings is None else surroundings.leans(moved.placed)
+    planned = np.inf if moved.problem.lean is None else moved.problem.lean
+    return leans is not None and bool((leans < planned - _LEAN_ROUNDING).any())
 
 
 def keeps_margins(plan: MotionPlan, other: MotionPlan) -> bool:

@@ -135,6 +135,8 @@ class CentroidalProblem:
         landing_position, landing_rotation: (3,) m and (3, 3); that contact, as in `position` and `rotation`. None
             without one.
         room: Where the world lets the CoM be; None where it does not limit it.
+        lean: (N, 2) rad; how far the shin of each foot in contact may lean towards the toes until it meets the world,
+            inf where nothing is there; None where nothing is anywhere.
         swing_lift: m; height of the assumed path of a foot in the air above the line between its contacts.
     """
 
@@ -163,6 +165,7 @@ class CentroidalProblem:
     landing_position: np.ndarray | None = None
     landing_rotation: np.ndarray | None = None
     room: ComRoom | None = None
+    lean: np.ndarray | None = None
     swing_lift: float = SWING_LIFT
 
     @property
@@ -182,18 +185,33 @@ class CentroidalProblem:
 
         They are (n,) knots, (n,) limbs, (n, 3) positions and (n, 3, 3) rotations, each contact once.
         """
-        step, limb = np.nonzero(self.active)
-        first = np.ones(len(step), bool)
-        later = step > 0
-        first[later] = ~self.active[step[later] - 1, limb[later]]
-        knot = np.concatenate([step + 1, step[first]])  # each contact at the end of its steps, and where it begins
-        at, limb = np.concatenate([step, step[first]]), np.concatenate([limb, limb[first]])
-        position, rotation = self.position[at, limb], self.rotation[at, limb]
+        knot, step, limb = self._reached
+        position, rotation = self.position[step, limb], self.rotation[step, limb]
         if self.landing_position is not None and self.landing_rotation is not None:
             knot, limb = np.append(knot, self.steps), np.append(limb, self.landing_limb)
             position = np.concatenate([position, self.landing_position[None]])
             rotation = np.concatenate([rotation, self.landing_rotation[None]])
         return knot, limb, position, rotation
+
+    @cached_property
+    def _reached(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(n,) knots, steps and limbs of the contacts of all steps."""
+        step, limb = np.nonzero(self.active)
+        first = np.ones(len(step), bool)
+        later = step > 0
+        first[later] = ~self.active[step[later] - 1, limb[later]]
+        knot = np.concatenate([step + 1, step[first]])  # each contact at the end of its steps, and where it begins
+        return knot, np.concatenate([step, step[first]]), np.concatenate([limb, limb[first]])
+
+    @cached_property
+    def knot_leans(self) -> np.ndarray:
+        """(n,) rad; how far the shins over `knot_contacts` may lean, inf for palms and at the given first state."""
+        leans = np.full(len(self.knot_contacts[0]), np.inf)
+        if self.lean is not None:
+            knot, step, limb = self._reached
+            feet = np.flatnonzero((limb < len(FEET)) & (knot > 0))
+            leans[feet] = self.lean[step[feet], limb[feet]]
+        return leans
 
     @cached_property
     def lowest_foot(self) -> tuple[np.ndarray, np.ndarray]:

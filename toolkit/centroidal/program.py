@@ -41,6 +41,7 @@ RESERVE, FULL = 0.1, 0.9
 # Where nothing rests all friction is in use, and what a force that comes late leaves undone cannot be made up for. So
 # the price of jerk is so many times as high in motions that slide somewhere, which they are over soon.
 SMOOTH = 10.0
+_LEAN = 2 * [limit.quantity for limit in PLANNED].index("ankle_pitch")  # lower end of it in `leg_limits`
 NARROW, STIFF = 1e-6, 1e12  # m and its price; a landing point with less room along an axis does not move along it
 
 
@@ -230,14 +231,16 @@ class Program:
     def _legs(self) -> Block:
         """Limits of stance legs at the knots."""
         knots, limbs, positions, rotations = self.problem.knot_contacts
-        parts = []
+        leans, parts = self.problem.knot_leans, []
         for limb in FEET:
             leg = self.robot.legs[limb]
             here = np.flatnonzero(limbs == limb)
             at, rotation = knots[here], rotations[here]
             ankle = positions[here] + rotation @ leg.ankle_in_sole
             posture = _posture_parameters(leg, self._heading[at], ankle, rotation)
-            parameters = side_by_side(len(at), *posture, leg_limits(leg, self._body))
+            limits = np.tile(leg_limits(leg, self._body), (len(at), 1))
+            limits[:, _LEAN] = np.maximum(limits[:, _LEAN], -leans[here])
+            parameters = side_by_side(len(at), *posture, limits)
             parts.append((at, self.layout.legs(at, limb), parameters))
         return _joined(parts, LEG_ROWS)
 

@@ -19,7 +19,6 @@ from toolkit.centroidal.problem import (
     STANDARD_GRAVITY,
     CentroidalMotion,
     CentroidalProblem,
-    ComRoom,
     Margins,
     Weights,
 )
@@ -92,7 +91,7 @@ def optimise(
     """
     problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem)
     if surroundings is not None:
-        problem = _confined(problem, surroundings.room(problem))
+        problem = _confined(problem, surroundings)
     landings = None if room is None else _landings(problem, schedule, room)
     motion = _solved(robot, problem, config, landings)
     failure = None if motion.failure is None else _placed(motion.failure, problem, schedule)
@@ -144,8 +143,9 @@ def _solved(
     return replace(motion, iterations=iterations, seconds=time.perf_counter() - start)
 
 
-def _confined(problem: CentroidalProblem, room: ComRoom | None) -> CentroidalProblem:
-    """The problem with the room that the world leaves to the CoM, which also ends as low as it must."""
+def _confined(problem: CentroidalProblem, surroundings: Surroundings) -> CentroidalProblem:
+    """The problem with the room that the world leaves to shins and CoM, which also ends as low as it must."""
+    room, problem = surroundings.room(problem), replace(problem, lean=surroundings.leans(problem))
     if room is None:
         return problem
     return replace(problem, room=room, final_center=problem.final_center - [0.0, 0.0, room.sink[-1]])

@@ -21,6 +21,10 @@ class Surroundings(Protocol):
         """The room of the CoM in a motion over the contacts of a problem; None where the world does not limit it."""
         ...
 
+    def leans(self, problem: CentroidalProblem) -> np.ndarray | None:
+        """How far shins may lean over the contacts of a problem (`CentroidalProblem.lean`); None: nothing is there."""
+        ...
+
     def foot_hits(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
         """(n,) bool; whether feet whose soles are at (n, 3) m and (n, 3, 3) touch what stands beside them."""
         ...

@@ -96,6 +96,7 @@ def _rested(motion: CentroidalMotion, pace: float) -> CentroidalMotion:
         friction=problem.friction[step],
         half_size=problem.half_size[step],
         yaw=np.append(problem.yaw, np.full(rest, problem.yaw[-1])),
+        lean=None if problem.lean is None else problem.lean[step],
         room=None if room is None else replace(room, sink=np.append(room.sink, np.full(rest, room.sink[-1]))),
     )
     return replace(

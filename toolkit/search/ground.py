@@ -24,6 +24,7 @@ from toolkit.search.moves.drawn import DrawnSteps, longest_step
 from toolkit.search.moves.foot_collision import FootCollision
 from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reasons import Reason
+from toolkit.search.moves.shin_room import ShinRoom
 from toolkit.search.moves.start_palms import with_palms
 from toolkit.search.planner_config import PlannerConfig
 from toolkit.search.states.start import place_feet
@@ -57,7 +58,7 @@ class Ground:
         self._projector = self._projected(config.rest_friction)
         half = robot.half_sizes[Limb.LEFT_FOOT]
         self._footholds = Footholds(world.surfaces, half, self._projector.room - half)
-        self._feet = FootCollision.of(robot, world)
+        self._feet, self._shins = FootCollision.of(robot, world), ShinRoom(robot, world)
         self._terrain = self._distances(self._projector)
         walls = config.palms and bool(self._projector.table.palm.any())
         self._arms = {limb: ArmMap.of(robot, limb) for limb in robot.arms if walls}
@@ -77,7 +78,7 @@ class Ground:
         model = self._models[way is not None and way.slides]
         if way is not None and self._config.drawn and not way.slides:
             drawn = DrawnSteps(self._robot, self._projector.table, self._footholds, way.distance, self._longest)
-        places = terrain.occupancy, terrain.box, self._arms, drawn, self._feet
+        places = terrain.occupancy, terrain.box, self._arms, self._shins, drawn, self._feet
         return MoveGenerator(self._robot, self._projector, model, *places)
 
     def start_stance(self) -> Stance:

@@ -18,6 +18,7 @@ from toolkit.search.moves.limits import drops, margins
 from toolkit.search.moves.obstacles import world_triangles
 from toolkit.search.moves.occupancy import BodyBox, Occupancy, body_free, edge_of
 from toolkit.search.moves.shanks import Shanks, leg_free, shanks_of
+from toolkit.search.moves.shin_room import ShinRoom
 from toolkit.world.world import World
 
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
@@ -72,6 +73,7 @@ class BodyRoom:
         self._bounds = np.stack([np.full(3, np.inf), np.full(3, -np.inf)])  # m; of the occupancy
         self._triangles = np.zeros((0, 3, 3))  # m; of the world within these bounds
         self._corners = np.zeros((2, 0, 3))  # m; of the boxes around them
+        self._shins = ShinRoom(robot, world)
 
     def sink(self, stance: Stance) -> float:
         """See `Surroundings`."""
@@ -86,6 +88,10 @@ class BodyRoom:
     def _feet(self) -> FootCollision | None:
         """The collisions of the feet, made when the first landing is to move."""
         return FootCollision.of(self._robot, self._world)
+
+    def leans(self, problem: CentroidalProblem) -> np.ndarray | None:
+        """See `Surroundings`."""
+        return self._shins.leans(problem)
 
     def foot_hits(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
         """See `Surroundings`."""

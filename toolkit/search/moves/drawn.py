@@ -17,7 +17,7 @@ from toolkit.contacts.transition_model import soles_apart
 from toolkit.geometry.limb import Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
-from toolkit.search.moves.legs import legs_of, stances_violated
+from toolkit.search.moves.legs import any_lean, legs_of, stances_violated
 from toolkit.search.moves.limits import SHIFTS, drops, margins
 from toolkit.search.moves.shanks import shanks_of
 
@@ -94,9 +94,9 @@ def longest_step(robot: RobotModel) -> float:
     left = np.column_stack([along, np.full(len(along), beside), np.zeros(len(along))])
     right, turn = np.zeros_like(left), np.tile(np.eye(3), (len(along), 1, 1))
     legs, shanks = legs_of(robot, margins(robot)), shanks_of(robot)
-    soles, heading = (left, turn, right, turn), np.zeros(len(along))
+    soles, heading, leans = (left, turn, right, turn), np.zeros(len(along)), any_lean(len(along))
     reached = np.zeros(len(along), bool)
     for shift in SHIFTS:
         com = (0.5 + shift) * left + [0.0, 0.0, robot.com_height]
-        reached |= stances_violated(legs, shanks, com, drops(robot), heading, *soles) == 0
+        reached |= stances_violated(legs, shanks, com, drops(robot), heading, *soles, leans) == 0
     return float(along[reached].max(initial=0.0))

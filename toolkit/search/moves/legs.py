@@ -13,6 +13,7 @@ from toolkit.physics.leg import (
     LIMITS,
     ReachMargins,
     ankle_at,
+    between,
     distance,
     hip_at,
     hip_joints,
@@ -108,13 +109,27 @@ def _heading(rotation):
     return np.arctan2(rotation[1, 0], rotation[0, 0])
 
 
+def any_lean(n: int) -> np.ndarray:
+    """Leans of `stances_violated` where nothing stands before the feet of n stances."""
+    return np.full((n, 2), np.inf)
+
+
+@compiled
+def _lean(points, rotation):
+    """Lean in rad towards the toes of the shin of a leg (hip, knee and ankle in m) over a sole's rotation (3, 3)."""
+    x, y, z = between(points[2], points[1])
+    along = rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z
+    return np.arctan2(along, rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z)
+
+
 @compiled(kept=True, allocates=True)
-def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, right_rotation):
+def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, right_rotation, leans):
     """(n,) int; why the legs cannot take each of n stances with the first drop, 0 where they can with some drop.
 
     The CoMs com (n, 3) m may be lower by any of the rising drops (k,) m, and by what the legs need to reach (see
     `least_drop`), which comes first where it lies between them; yaw (n,) rad is the heading of the base. The centres
-    left and right (n, 3) m of the soles come with their rotations (n, 3, 3); shanks: see `Body`.
+    left and right (n, 3) m of the soles come with their rotations (n, 3, 3), and with how far both shins may lean,
+    leans (n, 2) rad; shanks: see `Body`.
     """
     result = np.zeros(len(com), np.int64)
     for row in range(len(com)):
@@ -139,6 +154,10 @@ def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, 
                 reason, b = reach(legs, 1, place, yaw[row], right[row], right_rotation[row])
                 if reason == 0 and not legs_apart(shanks, a, b):
                     reason = Reason.KNEES
+                elif reason == 0 and not (
+                    _lean(a, left_rotation[row]) <= leans[row, 0] and _lean(b, right_rotation[row]) <= leans[row, 1]
+                ):
+                    reason = Reason.SHANK
             if reason == 0:
                 result[row] = 0
                 break

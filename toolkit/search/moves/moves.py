@@ -16,7 +16,7 @@ from toolkit.contacts.projected import Projected
 from toolkit.contacts.projection import Projector
 from toolkit.contacts.transition_model import TransitionModel
 from toolkit.geometry.heading import mean_heading
-from toolkit.geometry.limb import Limb
+from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.drawn import DrawnSteps
@@ -37,6 +37,7 @@ from toolkit.search.moves.screen import (
     screen_swings,
 )
 from toolkit.search.moves.shanks import shanks_of
+from toolkit.search.moves.shin_room import ShinRoom
 from toolkit.search.states.contact_table import ContactTable
 
 _KEPT = 20_000  # entries of each memory
@@ -72,6 +73,7 @@ class MoveGenerator:
         occupancy: Occupied cells of the world.
         box: The body.
         arms: The places where each arm can hold its palm.
+        shins: The room of the shins.
         drawn: Landing places for where the steps lead no farther; None: there are none but those of the steps.
         feet: Finds feet that touch the world beside their soles; None: none do.
 
@@ -90,10 +92,12 @@ class MoveGenerator:
         occupancy: Occupancy,
         box: BodyBox,
         arms: Mapping[Limb, ArmMap],
+        shins: ShinRoom,
         drawn: DrawnSteps | None = None,
         feet: FootCollision | None = None,
     ):
-        self._drawn, self._feet = drawn, feet
+        self._shins, self._drawn, self._feet = shins, drawn, feet
+        self._leans = np.empty(0)  # rad, by number of the contact; nan until it is asked for
         self.robot, self.arms = robot, arms
         self.table = ContactTable(projector.table.friction, robot.scale.length, projector.bearing)
         self._projector, self._model = projector, model
@@ -170,6 +174,18 @@ class MoveGenerator:
         screen_passing(int(limb), *places, *feet, self._limits, self._body, codes)
         return codes
 
+    def leans(self, numbers: np.ndarray) -> np.ndarray:
+        """(n,) rad; how far the shins over contacts (n,) of feet may lean; see `ShinRoom`."""
+        table, missing = self.table, len(self.table) - len(self._leans)
+        if missing > 0:
+            self._leans = np.append(self._leans, np.full(missing + len(self.table), np.nan))
+        new = np.unique(numbers[np.isnan(self._leans[numbers])])
+        for foot in FEET:
+            rows = new[table.limb[new] == foot]
+            if len(rows):
+                self._leans[rows] = self._shins.over(foot, table.position[rows], table.rotation[rows])
+        return self._leans[numbers]
+
     def palms(self, limb: Limb, left: int, right: int) -> Moves:
         """Places for a palm with the feet at `left` and `right`."""
         return _remembered(self._palms, (limb, left, right), self._make_palms)
@@ -181,7 +197,9 @@ class MoveGenerator:
         self.swings(Limb.LEFT_FOOT, one, standing, standing, 1.0)
         table = self.table
         place, turn = table.position[one], table.rotation[one]
-        stances_violated(self.legs, self.shanks, place, self._limits.drops, table.yaw[one], place, turn, place, turn)
+        lean = np.column_stack([self.leans(one), self.leans(one)])
+        soles = place, turn, place, turn
+        stances_violated(self.legs, self.shanks, place, self._limits.drops, table.yaw[one], *soles, lean)
         if self.has_palm_surfaces and self.robot.arms:
             limb = next(iter(self.robot.arms))
             self._projector.project_palms(limb, place[0], np.array([[0.0, 1.0, 0.0]]), 0.0, 1e6)

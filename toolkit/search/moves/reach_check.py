@@ -9,7 +9,7 @@ import numpy as np
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.search.moves.candidates import Candidates, mean_feet
-from toolkit.search.moves.legs import stances_violated
+from toolkit.search.moves.legs import any_lean, stances_violated
 from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reasons import Reason
 from toolkit.world.timing import Timing
@@ -82,8 +82,18 @@ class ReachCheck:
 
     def _violated(self, com: np.ndarray, yaw: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
         moves, table = self._moves, self._table
-        soles = table.position[left], table.rotation[left], table.position[right], table.rotation[right]
-        return stances_violated(moves.legs, moves.shanks, com, self._drops, yaw, *soles)
+
+        def codes(rows: np.ndarray, leans: np.ndarray) -> np.ndarray:
+            a, b = left[rows], right[rows]
+            soles = table.position[a], table.rotation[a], table.position[b], table.rotation[b]
+            return stances_violated(moves.legs, moves.shanks, com[rows], self._drops, yaw[rows], *soles, leans)
+
+        found = codes(np.arange(len(com)), any_lean(len(com)))
+        passed = np.flatnonzero(found == 0)  # few do, and few of those stand before something
+        leans = np.column_stack([moves.leans(left[passed]), moves.leans(right[passed])])
+        near = np.isfinite(leans).any(1)
+        found[passed[near]] = codes(passed[near], leans[near])
+        return found
 
 
 def _cubic(
