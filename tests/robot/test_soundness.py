@@ -33,6 +33,9 @@ def test_all_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
         load_robot(str(write_robot(tmp_path / "biped", toml=toml)))
     for part in ("[limbs.left_foot] body 'foot'", "[limits.velocity] '*_knees'", "[gains] 'ancle'", "no velocity lim"):
         assert part in str(caught.value)
+    toml = TOML + "[gains]\n" + "".join(f'"none_{number}" = [1.0, 1.0]\n' for number in range(9))
+    with pytest.raises(RobotError, match=r"9 things are wrong: \(1\) .* \(6\) \[gains\] 'none_5' .* and 3 more$"):
+        load_robot(str(write_robot(tmp_path / "biped", toml=toml)))
 
 
 def test_armature_is_assumed_where_the_file_has_none(tmp_path: Path) -> None:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from toolkit.errors import RobotError
 
+_SAID = 6  # most problems that one message says; one cause may have many
+
 
 @dataclass(frozen=True)
 class Problems:
@@ -33,5 +35,6 @@ class Problems:
             raise RobotError(f"{path}: {problem}")
         if self.found:
             said = [text if path == self.path else f"{path.name}: {text}" for path, text in self.found]
-            numbered = " ".join(f"({number}) {text}" for number, text in enumerate(said, start=1))
-            raise RobotError(f"{self.path}: {len(said)} things are wrong: {numbered}")
+            numbered = " ".join(f"({number}) {text}" for number, text in enumerate(said[:_SAID], start=1))
+            more = f" and {len(said) - _SAID} more" if len(said) > _SAID else ""
+            raise RobotError(f"{self.path}: {len(said)} things are wrong: {numbered}{more}")
