@@ -97,10 +97,11 @@ def body_residuals(motion: CentroidalMotion, robot: RobotModel, margins: BodyMar
     base = rotation_about_z(p.yaw)
     com = motion.com[swing_knots] + swing_delays[:, None] * motion.linear_momentum[swing_knots] / p.mass
     hips = np.array([robot.legs[limb].hip_in_com for limb in FEET])
-    longest = np.array([robot.legs[limb].max_length for limb in FEET])
+    shortest, longest = np.array([[robot.legs[limb].min_length, robot.legs[limb].max_length] for limb in FEET]).T
     hip = com + (base[swing_knots] @ hips[swing_limbs, :, None])[..., 0]
     length = np.linalg.norm(hip - swing_tips, axis=-1)
-    enter(SWING_LEG, swing_knots, swing_limbs, length - longest[swing_limbs] + margins.length)
+    outside = np.maximum(shortest[swing_limbs] - length, length - longest[swing_limbs]) + margins.length
+    enter(SWING_LEG, swing_knots, swing_limbs, outside)
     for limb, arm in robot.arms.items():
         here = np.flatnonzero(limbs == limb)
         if len(here):

@@ -29,6 +29,9 @@ from toolkit.physics.momentum import ballistic
 from toolkit.robot.scale import USUAL, Scale
 
 CROSSING = (0.02, 0.95)  # part of a swing in which the foot moves horizontally from contact to contact
+# Feet that land higher are at their highest after this part of a swing, `OVER` times as high above where they land as
+# others are, from a way up of `STEEP` times that height on.
+RISEN, OVER, STEEP = 0.4, 1.7, 1.7
 SWING_LIFT = 0.06  # m for a body of the usual size (`toolkit.robot.scale`); see `CentroidalProblem.swing_lift`
 STANDARD_GRAVITY = 9.81  # m/s^2
 GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
@@ -263,8 +266,9 @@ class CentroidalProblem:
                 s = ((times[inside] + delay - times[lift]) / (times[land] - times[lift]))[:, None]
                 crossed = np.clip((s - CROSSING[0]) / (CROSSING[1] - CROSSING[0]), 0.0, 1.0)
                 along = crossed * crossed * (3 - 2 * crossed)
-                path = tip[lift - 1] + along * (end - tip[lift - 1])
-                path[:, 2] += self.swing_lift * (4 * s * (1 - s))[:, 0]
+                way = end - tip[lift - 1]
+                path = tip[lift - 1] + along * way
+                path[:, 2] = tip[lift - 1, 2] + self._risen(s[:, 0], along[:, 0], float(way[2]))
                 share, left = along[..., None], self.rotation[lift - 1, limb]
                 tangent = np.concatenate([share * turn[:, :2], (1 - share) * left[:, :2]], 2)
                 parts.append((inside, delay, np.full(len(inside), int(limb)), path, tangent))
@@ -272,6 +276,18 @@ class CentroidalProblem:
             return np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros((0, 3)), np.zeros((0, 3, 4))
         knots, delays, limbs, ankles, tangents = (np.concatenate(part) for part in zip(*parts, strict=True))
         return knots, delays, limbs, ankles, tangents
+
+    def _risen(self, s: np.ndarray, along: np.ndarray, way: float) -> np.ndarray:
+        """(n,) m; how high a foot is above the contact that it left, at parts of its swing and of its way, which rises.
+
+        Feet that climb go up before they go on, and over what they climb.
+        """
+        steep = min(max(way / (STEEP * self.swing_lift), 0.0), 1.0)
+        lift = (1.0 + steep * (OVER - 1.0)) * self.swing_lift
+        flat = along * way + 4.0 * self.swing_lift * s * (1.0 - s)
+        up, down = np.clip(s / RISEN, 0.0, 1.0), np.clip((s - RISEN) / (1.0 - RISEN), 0.0, 1.0)
+        over = up * up * (3.0 - 2.0 * up) * (way + lift) - down * down * (3.0 - 2.0 * down) * lift
+        return (1.0 - steep) * flat + steep * over
 
     @property
     def reduced_half_size(self) -> np.ndarray:

@@ -264,7 +264,7 @@ class Program:
         for limb in FEET:
             leg, here = self.robot.legs[limb], limbs == limb
             root = (self._heading @ leg.hip_in_com)[knots[here]]
-            span = 0.0, leg.max_length
+            span = leg.min_length, leg.max_length
             parts.append(self._distance(knots[here], delays[here], root, tips[here], span, limb, tangents[here]))
         knots, limbs, tips, _ = self.problem.knot_contacts
         for limb, arm in self.robot.arms.items():

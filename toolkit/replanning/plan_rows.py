@@ -94,7 +94,7 @@ class PlanRows:
         table = self.distances
         rows = slice(*np.searchsorted(table.stage, [knots.start, knots.stop]))
         knot, foot, parameters = table.stage[rows] - knots.start + 1, self.foot[rows], table.parameters[rows]
-        arm = parameters[:, 7] > 0.0
+        arm = ~parameters[:, _TANGENTS:].any(1)
         kept = (parameters[:, 0] == 0.0) & (arm | ~contacts.active[knot - 1, foot])
         parameters = parameters[kept] if layout.moving else parameters[kept, :_TANGENTS]
         return Block.of(knot[kept], layout.distances(knot[kept], foot[kept]), parameters, DISTANCE_ROWS)
