@@ -12,7 +12,7 @@ from tests.physics.test_leg import random_legs
 from tests.shipped_robots import OWN
 from toolkit.centroidal.body import BodyMargins, body_residuals
 from toolkit.centroidal.build import initial_com, sequence_problem
-from toolkit.centroidal.problem import GRAVITY, CentroidalMotion
+from toolkit.centroidal.problem import GRAVITY, OVER, RISEN, CentroidalMotion
 from toolkit.centroidal.program import leg_limits
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.physics.leg import PLANNED, TORQUE_ROLES, ReachMargins, leg_clearances, leg_torques
@@ -151,6 +151,30 @@ def test_worst_names_where(walker, motion):
     com[7, 2] += 0.4
     name, knot, limb = body_residuals(replace(motion, com=com), walker).worst
     assert name.endswith("leg length") and knot == 7 and limb in FEET
+
+
+def test_legs_in_the_air_fold_no_farther_than_their_knees(walker, motion):
+    knots, delays, limbs, _, _ = motion.problem.swing_ankles
+    leg = walker.legs[Limb(int(limbs[0]))]
+    low = replace(motion, com=motion.com - [0.0, 0.0, walker.com_height + leg.hip_in_com[2] - 0.5 * leg.min_length])
+    folded = body_residuals(low, walker).violation["swing leg length"]
+    assert folded[knots[delays == 0.0]].max() > 0.1 * leg.min_length
+
+
+@pytest.mark.parametrize("climb", [-0.2, 0.0, 0.05, 0.25, 0.5])
+def test_feet_that_climb_go_up_before_they_go_on(walker, motion, climb):
+    """The path begins and ends at the contacts; a climb is over what it climbs before half of the swing has passed."""
+    problem, s = motion.problem, np.linspace(0.0, 1.0, 101)
+    height = problem._risen(s, s, climb)
+    np.testing.assert_allclose(height[[0, -1]], [0.0, climb], atol=1e-12)
+    over = height.max() - max(climb, 0.0)
+    if climb <= 0.0:
+        np.testing.assert_allclose(height, s * climb + 4 * problem.swing_lift * s * (1 - s))
+    elif climb >= 0.25:
+        assert over == pytest.approx(OVER * problem.swing_lift, rel=1e-3)
+        assert (height[s > 0.35] > climb).mean() > 0.95 and s[np.argmax(height)] == pytest.approx(RISEN)
+    else:
+        assert problem.swing_lift / 2 < over < OVER * problem.swing_lift
 
 
 def test_margins_tighten(walker, motion):
