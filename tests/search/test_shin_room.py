@@ -14,6 +14,7 @@ from toolkit.robot.loader import load_robot
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.moves.body_room import BodyRoom
 from toolkit.search.moves.candidates import Candidates
+from toolkit.search.moves.occupancy import Occupancy
 from toolkit.search.moves.reach_check import ReachCheck
 from toolkit.search.moves.reasons import Reason
 from toolkit.search.moves.shin_room import _CLEAR, _HELP, ShinRoom
@@ -79,6 +80,16 @@ def test_what_is_behind_beside_or_low_leaves_shins_alone(robot):
         riser(0.8),
     ):
         assert lean_over(robot, [geom], np.zeros(3), np.eye(3)) == np.inf
+
+
+def test_soles_beside_which_nothing_is_high_are_told_from_the_occupied_cells(robot):
+    world = make_world(FLOOR, riser(1.0), riser(2.5, 0.05), goal=(4, 0, 0))
+    occupancy = Occupancy.of(world.mujoco_model, np.array([-1.0, -1.0, -0.5]), np.array([4.0, 1.0, 2.0]))
+    room = ShinRoom(robot, world)
+    place = np.column_stack([np.linspace(-0.5, 0.9, 29), np.zeros(29), np.zeros(29)])
+    turn = np.tile(np.eye(3), (29, 1, 1))
+    beside, leans = room.beside(FOOT, place, occupancy), room.over(FOOT, place, turn)
+    assert beside[np.isfinite(leans)].all() and np.isfinite(leans).any() and not beside.all()
 
 
 def test_problems_know_their_leans(robot):

@@ -179,9 +179,11 @@ class MoveGenerator:
         table, missing = self.table, len(self.table) - len(self._leans)
         if missing > 0:
             self._leans = np.append(self._leans, np.full(missing + len(self.table), np.nan))
-        new = np.unique(numbers[np.isnan(self._leans[numbers])])
+        new = numbers[np.isnan(self._leans[numbers])]
+        self._leans[new] = np.inf
         for foot in FEET:
             rows = new[table.limb[new] == foot]
+            rows = rows[self._shins.beside(foot, table.position[rows], self._body.occupancy)]
             if len(rows):
                 self._leans[rows] = self._shins.over(foot, table.position[rows], table.rotation[rows])
         return self._leans[numbers]
@@ -197,6 +199,7 @@ class MoveGenerator:
         self.swings(Limb.LEFT_FOOT, one, standing, standing, 1.0)
         table = self.table
         place, turn = table.position[one], table.rotation[one]
+        self._shins.over(Limb.LEFT_FOOT, place, turn)
         lean = np.column_stack([self.leans(one), self.leans(one)])
         soles = place, turn, place, turn
         stances_violated(self.legs, self.shanks, place, self._limits.drops, table.yaw[one], *soles, lean)

@@ -15,22 +15,24 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-import shapely
+from scipy.spatial import cKDTree
 
 from toolkit.centroidal.problem import CentroidalProblem
 from toolkit.compiled import compiled
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.obstacles import world_triangles
+from toolkit.search.moves.occupancy import Occupancy
 from toolkit.world.world import World
 
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _CLEAR = 0.02  # m; kept free around shins
 _HELP = 0.1  # rad; what the base helps by where it leans back
 _ABOVE = 0.02  # m above the ankle; what is lower is left to the feet
+_SIZES = (0.1, 0.4, 2.0)  # m; half of the diagonal of the triangles in each class; few are larger
 _AROUND = 2.0  # m around start, goal and all bounded geoms, as far as planes count
 _KEPT = 50_000  # leans that are remembered
-_POINTS, _STRIPS = 12, 4  # points of an edge that are looked at; strips along the shin
+_POINTS, _STRIPS = 12, 4  # points that are looked at of an edge as long as the shin; strips along the shin
 _CORNERS = 16  # most corners of a triangle that five planes have cut
 
 
@@ -65,13 +67,21 @@ class ShinRoom:
             self._known[keys[row]] = lean
         return [self._known[key] for key in keys]
 
+    def beside(self, foot: Limb, position: np.ndarray, occupancy: Occupancy) -> np.ndarray:
+        """(n,) bool; whether anything as high as an ankle is near soles at (n, 3) m, by the occupied cells: quickly."""
+        leg, found = self._robot.legs[foot], np.zeros(len(position), bool)
+        _fill_beside(occupancy, position, leg.ankle_in_sole[2] + self._above, leg.shin + self._radius, found)
+        return found
+
     def over(self, foot: Limb, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
         """(n,) rad; how far the shin may lean over soles at (n, 3) m with world_from_sole (n, 3, 3); inf: any angle."""
         leg, leans = self._robot.legs[foot], np.full(len(position), np.inf)
+        if not len(position):
+            return leans
         ankle = position + rotation @ leg.ankle_in_sole
-        reach = leg.shin + self._radius
-        low, high = (ankle[:, :2] - reach).T, (ankle[:, :2] + reach).T
-        sole, near = self._tree.query(shapely.box(*low, *high))
+        far = leg.shin + self._radius  # what a shin meets lies in a quarter of a disc
+        middle, reach = ankle + rotation @ [far / 2, 0.0, far / 2], np.hypot(far / np.sqrt(2.0), self._radius)
+        sole, near = self._index.near(middle, reach)
         _fill_leans(self._triangles, sole, near, ankle, rotation, (self._radius, self._above, leg.shin), leans)
         return leans + _HELP
 
@@ -84,10 +94,50 @@ class ShinRoom:
         return np.ascontiguousarray(world_triangles(model, places.min(0) - reach, places.max(0) + reach))
 
     @cached_property
-    def _tree(self) -> shapely.STRtree:
-        """The triangles' boxes seen from above."""
-        xy = self._triangles[:, :, :2]
-        return shapely.STRtree(shapely.box(*xy.min(1).T, *xy.max(1).T))
+    def _index(self) -> _Index:
+        """Where the triangles are."""
+        return _Index(self._triangles)
+
+
+class _Index:
+    """Finds the triangles (t, 3, 3) m that are near points, in classes of about the same size."""
+
+    def __init__(self, triangles: np.ndarray):
+        low, high = triangles.min(1), triangles.max(1)
+        middle, half = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
+        size = np.searchsorted(_SIZES, half)
+        classes = [np.flatnonzero(size == number) for number in range(len(_SIZES))]
+        self._trees = [(rows, float(half[rows].max()), cKDTree(middle[rows])) for rows in classes if len(rows)]
+        self._large = np.flatnonzero(size == len(_SIZES))
+        self._low, self._high = low[self._large], high[self._large]
+
+    def near(self, points: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of a point of (n, 3) m and a triangle that may be within a reach in m, (k,) int each."""
+        beside = np.maximum(points[:, None] - self._high, self._low - points[:, None]).max(2)
+        point, large = np.nonzero(beside < reach)
+        pairs = [(point, self._large[large])]
+        for rows, most, tree in self._trees:
+            found = tree.query_ball_point(points, reach + most)
+            count = [len(each) for each in found]
+            pairs.append((np.repeat(np.arange(len(points)), count), rows[np.concatenate(found).astype(int)]))
+        sole, near = (np.concatenate(part) for part in zip(*pairs, strict=True))
+        return sole, near
+
+
+@compiled(kept=True)
+def _fill_beside(occupancy, position, above, reach, found):
+    """Fill found (n,) bool: whether a cell within a reach in m of soles (n, 3) m is more than so many m above them."""
+    corner, cell, below = occupancy.corner, occupancy.cell, occupancy.below
+    last = below.shape[2] - 1
+    for row in range(len(position)):
+        x, y, z = position[row]
+        k = min(max(int(np.floor((z + above - corner[2]) / cell)), 0), last)
+        i0, i1 = int(np.floor((x - reach - corner[0]) / cell)), int(np.floor((x + reach - corner[0]) / cell))
+        j0, j1 = int(np.floor((y - reach - corner[1]) / cell)), int(np.floor((y + reach - corner[1]) / cell))
+        for i in range(max(i0, 0), min(i1, below.shape[0] - 1) + 1):
+            for j in range(max(j0, 0), min(j1, below.shape[1] - 1) + 1):
+                if below[i, j, last] != below[i, j, k]:
+                    found[row] = True
 
 
 @compiled(kept=True, allocates=True)
@@ -102,11 +152,11 @@ def _fill_leans(triangles, sole, near, ankle, rotation, sizes, leans):
     a, b, c = np.empty((_CORNERS, 3)), np.empty((_CORNERS, 3)), np.empty((_CORNERS, 3))
     for pair in range(len(sole)):
         n, t = sole[pair], near[pair]
-        for corner in range(3):
-            for axis in range(3):
-                a[corner, axis] = 0.0
-                for k in range(3):
-                    a[corner, axis] += rotation[n, k, axis] * (triangles[t, corner, k] - ankle[n, k])
+        if _seen_along(triangles[t], ankle[n], rotation[n], 2, a) < above:
+            continue
+        if _seen_along(triangles[t], ankle[n], rotation[n], 0, a) < 0.0:
+            continue
+        _seen_along(triangles[t], ankle[n], rotation[n], 1, a)
         count = _cut(a, 3, b, 2, -1.0, -above)
         count = _cut(b, count, a, 0, -1.0, 0.0)
         count = _cut(a, count, b, 2, 1.0, shin + radius)
@@ -116,6 +166,18 @@ def _fill_leans(triangles, sole, near, ankle, rotation, sizes, leans):
             part = _cut(a, part, c, 1, 1.0, left + 2.0 * radius / _STRIPS)
             for corner in range(part):
                 leans[n] = min(leans[n], _lean_along(c[corner], c[(corner + 1) % part], radius, shin))
+
+
+@compiled
+def _seen_along(triangle, ankle, rotation, axis, seen):
+    """Fill a coordinate of the corners of a triangle (3, 3) m in the sole's frame, and return the greatest."""
+    most = -np.inf
+    for corner in range(3):
+        seen[corner, axis] = 0.0
+        for k in range(3):
+            seen[corner, axis] += rotation[k, axis] * (triangle[corner, k] - ankle[k])
+        most = max(most, seen[corner, axis])
+    return most
 
 
 @compiled
@@ -139,13 +201,13 @@ def _cut(corners, count, cut, axis, sign, bound):
 
 @compiled
 def _lean_along(here, there, radius, shin):
-    """The least lean in rad at which a shin meets points of an edge between two corners (3,) m."""
+    """The least lean in rad at which a shin meets points of an edge from one corner (3,) m up to the next."""
+    u, v, w = there[0] - here[0], there[1] - here[1], there[2] - here[2]
+    points = int(np.sqrt(u * u + v * v + w * w) / shin * _POINTS) + 1
     least = np.inf
-    for k in range(_POINTS):
-        part = k / _POINTS
-        x = here[0] + part * (there[0] - here[0])
-        y = here[1] + part * (there[1] - here[1])
-        least = min(least, _lean_at(x, y, here[2] + part * (there[2] - here[2]), radius, shin))
+    for k in range(points):
+        part = k / points
+        least = min(least, _lean_at(here[0] + part * u, here[1] + part * v, here[2] + part * w, radius, shin))
     return least
 
 
