@@ -15,7 +15,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from toolkit.centroidal.problem import CentroidalProblem
 from toolkit.compiled import compiled
@@ -107,7 +107,7 @@ class _Index:
         middle, half = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
         size = np.searchsorted(_SIZES, half)
         classes = [np.flatnonzero(size == number) for number in range(len(_SIZES))]
-        self._trees = [(rows, float(half[rows].max()), cKDTree(middle[rows])) for rows in classes if len(rows)]
+        self._trees = [(rows, float(half[rows].max()), KDTree(middle[rows])) for rows in classes if len(rows)]
         self._large = np.flatnonzero(size == len(_SIZES))
         self._low, self._high = low[self._large], high[self._large]
 
