@@ -15,7 +15,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from toolkit.centroidal.problem import CentroidalProblem
 from toolkit.compiled import compiled
@@ -103,6 +102,8 @@ class _Index:
     """Finds the triangles (t, 3, 3) m that are near points, in classes of about the same size."""
 
     def __init__(self, triangles: np.ndarray):
+        from scipy.spatial import KDTree  # here, since it takes long to import
+
         low, high = triangles.min(1), triangles.max(1)
         middle, half = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
         size = np.searchsorted(_SIZES, half)
