@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.centroidal.problem import CentroidalProblem
+from toolkit.centroidal.problem import CentroidalProblem, smooth_step
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.robot.model import RobotModel
@@ -45,16 +45,10 @@ def ankles(problem: CentroidalProblem) -> tuple[np.ndarray, np.ndarray]:
             climb = np.array([0.0, 0.0, problem.swing_lift + max(way[2], 0.0)])
             place[swing, foot], velocity[swing, foot] = start, 0.0
             for move, window in ((way * [1, 1, 0], ACROSS), (climb, RISE), (way * [0, 0, 1] - climb, SINK)):
-                part, rate = _step(s, *window)
+                part, rate = smooth_step(s, *window)
                 place[swing, foot] += part[:, None] * move
                 velocity[swing, foot] += rate[:, None] * move / duration
     return place, velocity
-
-
-def _step(s: np.ndarray, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
-    """A smooth step from 0 to 1 between two parts of a swing, and its rate, at parts s (k,)."""
-    x = np.clip((s - start) / (end - start), 0.0, 1.0)
-    return x * x * (3 - 2 * x), 6 * x * (1 - x) / (end - start)
 
 
 def leg_spin(problem: CentroidalProblem, robot: RobotModel, com: np.ndarray, velocity: np.ndarray) -> np.ndarray:

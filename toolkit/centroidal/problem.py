@@ -37,6 +37,12 @@ STANDARD_GRAVITY = 9.81  # m/s^2
 GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 
 
+def smooth_step(s: np.ndarray, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+    """A smooth step from 0 to 1 between two parts of a swing, and its rate, at parts s of any shape."""
+    x = np.clip((s - start) / (end - start), 0.0, 1.0)
+    return x * x * (3 - 2 * x), 6 * x * (1 - x) / (end - start)
+
+
 @dataclass(frozen=True)
 class Weights:
     """Objective weights; the defaults are the paper's (Sec. VII). Compiled code takes them in this order."""
@@ -264,8 +270,7 @@ class CentroidalProblem:
                 delay = np.zeros(len(inside))
                 delay[-2:] = self.dt[inside[-2:]] / 2
                 s = ((times[inside] + delay - times[lift]) / (times[land] - times[lift]))[:, None]
-                crossed = np.clip((s - CROSSING[0]) / (CROSSING[1] - CROSSING[0]), 0.0, 1.0)
-                along = crossed * crossed * (3 - 2 * crossed)
+                along, _ = smooth_step(s, *CROSSING)
                 way = end - tip[lift - 1]
                 path = tip[lift - 1] + along * way
                 path[:, 2] = tip[lift - 1, 2] + self._risen(s[:, 0], along[:, 0], float(way[2]))
@@ -285,8 +290,8 @@ class CentroidalProblem:
         steep = min(max(way / (STEEP * self.swing_lift), 0.0), 1.0)
         lift = (1.0 + steep * (OVER - 1.0)) * self.swing_lift
         flat = along * way + 4.0 * self.swing_lift * s * (1.0 - s)
-        up, down = np.clip(s / RISEN, 0.0, 1.0), np.clip((s - RISEN) / (1.0 - RISEN), 0.0, 1.0)
-        over = up * up * (3.0 - 2.0 * up) * (way + lift) - down * down * (3.0 - 2.0 * down) * lift
+        (up, _), (down, _) = smooth_step(s, 0.0, RISEN), smooth_step(s, RISEN, 1.0)
+        over = up * (way + lift) - down * lift
         return (1.0 - steep) * flat + steep * over
 
     @property

@@ -22,14 +22,15 @@ from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.model import RobotModel
 from toolkit.search.moves.obstacles import world_triangles
 from toolkit.search.moves.occupancy import Occupancy
+from toolkit.search.moves.shanks import ball_free
 from toolkit.world.world import World
 
+_SIZES = (0.1, 0.4, 2.0)  # m; half of the diagonal of the triangles in each class; few are larger
+_AROUND = 2.0  # m around start, goal and all bounded geoms, as far as planes count
 # Lengths are those of a body of the usual size (`toolkit.robot.scale`).
 _CLEAR = 0.02  # m; kept free around shins
 _HELP = 0.1  # rad; what the base helps by where it leans back
 _ABOVE = 0.02  # m above the ankle; what is lower is left to the feet
-_SIZES = (0.1, 0.4, 2.0)  # m; half of the diagonal of the triangles in each class; few are larger
-_AROUND = 2.0  # m around start, goal and all bounded geoms, as far as planes count
 _KEPT = 50_000  # leans that are remembered
 _POINTS, _STRIPS = 12, 4  # points that are looked at of an edge as long as the shin; strips along the shin
 _CORNERS = 16  # most corners of a triangle that five planes have cut
@@ -128,17 +129,9 @@ class _Index:
 @compiled(kept=True)
 def _fill_beside(occupancy, position, above, reach, found):
     """Fill found (n,) bool: whether a cell within a reach in m of soles (n, 3) m is more than so many m above them."""
-    corner, cell, below = occupancy.corner, occupancy.cell, occupancy.below
-    last = below.shape[2] - 1
     for row in range(len(position)):
         x, y, z = position[row]
-        k = min(max(int(np.floor((z + above - corner[2]) / cell)), 0), last)
-        i0, i1 = int(np.floor((x - reach - corner[0]) / cell)), int(np.floor((x + reach - corner[0]) / cell))
-        j0, j1 = int(np.floor((y - reach - corner[1]) / cell)), int(np.floor((y + reach - corner[1]) / cell))
-        for i in range(max(i0, 0), min(i1, below.shape[0] - 1) + 1):
-            for j in range(max(j0, 0), min(j1, below.shape[1] - 1) + 1):
-                if below[i, j, last] != below[i, j, k]:
-                    found[row] = True
+        found[row] = not ball_free(occupancy, x, y, z + above + reach, reach + occupancy.cell / 2)
 
 
 @compiled(kept=True, allocates=True)
