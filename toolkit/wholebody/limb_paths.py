@@ -19,7 +19,7 @@ from toolkit.physics.leg import leg_posture
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.swing import LimbSample, SwingPath, Window
 from toolkit.wholebody.swing_planner import Collide, plan_swing
-from toolkit.wholebody.swing_task import LIFT, SAMPLES, StandingLeg, SwingingLeg, SwingTask
+from toolkit.wholebody.swing_task import LIFT, SAMPLES, SPARE, StandingLeg, SwingingLeg, SwingTask
 from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
 
@@ -193,7 +193,7 @@ def _swing(
         shin[:2] = robot.legs[limb.mirrored].ankle_in_sole[2] * standing.pose.normal[:2]
         u = np.linspace(0.0, 1.0, SAMPLES)
         com = np.array([motion.sample(phase.start + share * phase.duration)[0] for share in u])
-        leg = SwingingLeg(robot.legs[limb], u, com, standing.pose.yaw)
+        leg = SwingingLeg(robot.legs[limb], u, com, standing.pose.yaw, robot.scale.length * SPARE)
         beside = _standing_leg(robot, standing, com, start.yaw + u * wrapped(end.yaw - start.yaw))
     free_start, free_end = old is None, new is None
     size, scale = robot.half_sizes[limb], robot.scale

@@ -103,6 +103,7 @@ class SwingPath:
         pitch: rad; largest phi.
         pitching: When the toes go down and come up again.
         clear: Whether the swept patch touches nothing of the world, as the planner of the path found.
+        fits: Whether the leg can fold as much as the path asks for, as that planner found.
     """
 
     begin: float
@@ -114,6 +115,7 @@ class SwingPath:
     pitch: float = 0.0
     pitching: Window = Window(0.0, 0.8)
     clear: bool = True
+    fits: bool = True
 
     @cached_property
     def rotation_vector(self) -> np.ndarray:

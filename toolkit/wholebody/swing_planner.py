@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -12,6 +13,8 @@ from toolkit.wholebody.detour import detour
 from toolkit.wholebody.swing import Move, SwingPath, Window
 from toolkit.wholebody.swing_task import EARLY, EASY, LATE, SAMPLES, STEEP, THICKNESS, SwingTask, SwingTiming
 
+Raised = tuple[float, float, SwingTiming]
+"""Extra heights (m) before and after the crossing, and the timing."""
 Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Maps box centres (k, 3), rotations (k, 3, 3) and half sizes (k, 3) to (k,) bool, whether a box touches the world."""
 
@@ -41,32 +44,46 @@ PITCH_GAIN, PITCH_FROM, MAX_PITCH, ANKLE_MARGIN = 1.5, 0.2, 0.9, 0.15
 
 
 def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
-    """The least raised path that is clear; where none is, the highest one with `clear` False.
+    """The least raised path that is clear and that the leg can follow; where none is, the highest, `clear` False.
 
     Fast swings that have to rise are also tried with late and with early crossings: the one whose peak acceleration is
-    least is taken. A foot without a clear way may stand at what it has to rise over: it draws back from there.
+    least is taken. A foot that has no such path keeps its toes up, or draws back from what it has to rise over. A path
+    that only asks the leg to fold too much comes before one that meets the world.
     """
     sides = _free_sides(task, collide)
-    path = _plan(task, collide, sides)
-    if path.clear or not task.is_foot:
-        return path
+    found = []
+    for each in _manners(task) if task.is_foot else (task,):
+        path = _plan(each, collide, sides)
+        if path.clear and path.fits:
+            return path
+        found.append(path)
+    return min(found, key=_faults)
+
+
+def _manners(task: SwingTask) -> Iterator[SwingTask]:
+    """The task of a foot, then with the toes up, then such that the foot draws back."""
     way = (task.end.position - task.start.position) * [1.0, 1.0, 0.0]
     length = max(float(np.linalg.norm(way)), 1e-6)
-    back = (replace(task, retreat=-task.scale.length * each * way / length) for each in RETREATS)
-    return next((other for each in back if (other := _plan(each, collide, sides)).clear), path)
+    yield from (task, replace(task, level=True))
+    yield from (replace(task, retreat=-task.scale.length * each * way / length) for each in RETREATS)
+
+
+def _faults(path: SwingPath) -> tuple[bool, bool]:
+    """What is wrong with a path, to compare paths."""
+    return not path.clear, not path.fits
 
 
 def _plan(task: SwingTask, collide: Collide, sides: tuple[float, float]) -> SwingPath:
     """The path of a limb that draws back as the task says, with what is free at its sides; see `plan_swing`."""
     bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector))
 
-    def around_leg(candidates: Sequence[tuple[float, float, SwingTiming]]) -> tuple[SwingPath, SwingTiming]:
+    def around_leg(candidates: Sequence[Raised]) -> tuple[SwingPath, SwingTiming]:
         """What is found among candidates, and its timing; the standing leg is elsewhere at that height."""
         path, raised = _least_raised(task, collide, candidates, bump, sides)
         around = detour(task, lambda vector: _within_ankle_range(task, _path(task, *raised, vector)))
         if np.any(around != bump):
             other, other_raised = _least_raised(task, collide, candidates, around, sides)
-            if other.clear or not path.clear:
+            if _faults(other) <= _faults(path):
                 return other, other_raised[2]
         return path, raised[2]
 
@@ -75,37 +92,49 @@ def _plan(task: SwingTask, collide: Collide, sides: tuple[float, float]) -> Swin
     if not _fast_foot(task) or timing is EASY:
         return path
     others = (around_leg(_raised(task, timing))[0] for timing in (LATE, EARLY))
-    return min([path, *others], key=lambda each: (not each.clear, each.peak_acceleration))
+    return min([path, *others], key=lambda each: (*_faults(each), each.peak_acceleration))
 
 
 def _least_raised(
     task: SwingTask,
     collide: Collide,
-    candidates: Sequence[tuple[float, float, SwingTiming]],
+    candidates: Sequence[Raised],
     bump: np.ndarray,
     sides: tuple[float, float],
-) -> tuple[SwingPath, tuple[float, float, SwingTiming]]:
+) -> tuple[SwingPath, Raised]:
     """The first of some candidates, with a sideways bump, that is clear, and how it is raised.
 
     It is the last one with `clear` False if none is.
 
-    Moderate heights are tried first with the whole margin, then with half and a quarter of it. Great heights follow in
-    the same way. No margin at all is the last resort, but not of fast feet: they do not follow their path so closely.
+    Moderate heights are tried first with the whole margin, then with half and a quarter of it; before all others come
+    those for which the leg can fold. Great heights follow in the same way. No margin at all is the last resort, but not
+    of fast feet: they do not follow their path so closely.
     """
+
+    @cache
+    def path_of(raised: Raised) -> SwingPath:
+        path = _within_ankle_range(task, _path(task, *raised, bump))
+        return replace(path, fits=task.leg is None or task.leg.fits(path))
+
+    @cache
+    def clear(raised: Raised, share: float) -> bool:
+        return not collide(*_swept_boxes(task, path_of(raised), share * task.margin, sides)).any()
+
     most = task.rise + task.scale.length * MODERATE_RAISE
-    moderate = [item for item in candidates if max(item[:2]) <= most]
-    great = [item for item in candidates if max(item[:2]) > most]
+    moderate = [raised for raised in candidates if max(raised[:2]) <= most]
+    great = [raised for raised in candidates if max(raised[:2]) > most]
+    fitting = [raised for raised in moderate if path_of(raised).fits]
     last_resort = () if _fast_foot(task) else (0.0,)
-    for shares in (MARGIN_SHARES, last_resort):
-        for group, share in product((moderate, great), shares):
-            for before, after, timing in group:
-                path = _within_ankle_range(task, _path(task, before, after, timing, bump))
-                if not collide(*_swept_boxes(task, path, share * task.margin, sides)).any():
-                    return path, (before, after, timing)
-    return replace(_path(task, *candidates[-1], bump), clear=False), candidates[-1]
+    every = moderate, great
+    for groups, shares in (((fitting,), MARGIN_SHARES), (every, MARGIN_SHARES), (every, last_resort)):
+        for group, share in product(groups, shares):
+            for raised in group:
+                if clear(raised, share):
+                    return path_of(raised), raised
+    return replace(path_of(candidates[-1]), clear=False), candidates[-1]
 
 
-def _raised(task: SwingTask, timing: SwingTiming, most: float = np.inf) -> list[tuple[float, float, SwingTiming]]:
+def _raised(task: SwingTask, timing: SwingTiming, most: float = np.inf) -> list[Raised]:
     """Extra heights (m) before and after the crossing, from the least to `most`, with a timing."""
     return [(*pair, timing) for pair in _raises(task) if max(pair) <= most]
 
@@ -183,7 +212,7 @@ def _within_ankle_range(task: SwingTask, path: SwingPath) -> SwingPath:
 
 def _pitch(task: SwingTask) -> float:
     """Angle (rad) by which the toes go down on the way; it grows with how far the foot trails the standing one."""
-    if task.other is None:
+    if task.other is None or task.level:
         return 0.0
     trail = (task.other[0].position - task.start.position) @ task.start.rotation[:, 0]
     ahead = (task.end.position - task.start.position) @ task.start.rotation[:, 0]

@@ -8,7 +8,7 @@ import numpy as np
 
 from toolkit.geometry.heading import mean_heading
 from toolkit.geometry.pose import Pose, yaw_of
-from toolkit.physics.leg import leg_posture
+from toolkit.physics.leg import LegPosture, leg_posture
 from toolkit.robot.model import LegGeometry
 from toolkit.robot.scale import USUAL, Scale
 from toolkit.wholebody.swing import SwingPath, Window
@@ -19,6 +19,7 @@ MARGIN = 0.02  # m; kept free around the swept patch, where the start and the en
 GAP = 0.02  # m; kept between the soles of the swinging and the standing foot
 THICKNESS = 0.08  # m; height of the swept box above the patch, to hold the foot or the hand
 SAMPLES = 33  # least number of poses per swing that are checked
+SPARE = 0.005  # m; see `SwingingLeg.spare`
 STRAY = 0.1  # m per m above the ankle by which the standing leg may be elsewhere than an upright base would have it
 
 
@@ -60,12 +61,24 @@ class SwingingLeg:
         u: (k,) fractions of the swing.
         com: (k, 3) m; planned CoM.
         other_yaw: rad; heading of the standing foot.
+        spare: m; by which hip and ankle may come closer than the knee allows, since the base gives way by as much.
     """
 
     leg: LegGeometry
     u: np.ndarray
     com: np.ndarray
     other_yaw: float
+    spare: float = SPARE
+
+    def fits(self, path: SwingPath) -> bool:
+        """Whether the knee can bend so much that the foot follows a path; else the base would have to give way."""
+        posture = self._posture(path, path.rotations(self.u))
+        return bool((self.leg.min_length - posture.length).max() < self.spare)
+
+    def _posture(self, path: SwingPath, rotations: np.ndarray) -> LegPosture:
+        """Postures (k,) of the leg on a path with world_from_contact rotations (k, 3, 3)."""
+        middle = mean_heading(self.other_yaw, yaw_of(rotations))
+        return leg_posture(self.leg, self.com, middle, path.positions(self.u), rotations)
 
     def extra_pitch(self, path: SwingPath, margin: float) -> float:
         """Change of the path's pitch (rad, toes down positive) that brings the ankle into its range less a margin.
@@ -73,8 +86,7 @@ class SwingingLeg:
         The pitch acts as a bump over the swing. Where the bump is small the ankle is left alone.
         """
         rotations = path.rotations(self.u)
-        middle = mean_heading(self.other_yaw, yaw_of(rotations))
-        ankle = leg_posture(self.leg, self.com, middle, path.positions(self.u), rotations).ankle_pitch
+        ankle = self._posture(path, rotations).ankle_pitch
         step = path.pitching.value(self.u)
         bump = 4.0 * step * (1.0 - step)
         inside = bump > 0.2
@@ -133,6 +145,7 @@ class SwingTask:
             too, since a foot passes it there, and not the sole.
         beside: The standing leg, which a foot may pass at any height; None for palms and where no other foot stands.
         retreat: (3,) m; by which a foot draws back while it rises.
+        level: Whether a trailing foot pitches its toes down by no more than its ankle needs.
     """
 
     begin: float
@@ -152,6 +165,7 @@ class SwingTask:
     shin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     beside: StandingLeg | None = None
     retreat: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    level: bool = False
 
     @property
     def way(self) -> float:

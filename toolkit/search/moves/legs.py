@@ -13,7 +13,6 @@ from toolkit.physics.leg import (
     LIMITS,
     ReachMargins,
     ankle_at,
-    between,
     distance,
     hip_at,
     hip_joints,
@@ -62,11 +61,12 @@ def legs_of(robot: RobotModel, margins: ReachMargins) -> Legs:
 
 
 @compiled(kept=True)
-def reach(legs, side, com, yaw, position, rotation):
+def reach(legs, side, com, yaw, position, rotation, lean=np.inf):
     """The first limit that a leg breaks, as a `Reason`, and its hip, knee and ankle in m, zeros where it is too long.
 
     The leg of a side (0 left, 1 right) lies between the CoM com, three numbers in m in the world, and a sole with the
-    centre position (3,) m and the rotation (3, 3) world_from_sole. The heading of the base is yaw in rad.
+    centre position (3,) m and the rotation (3, 3) world_from_sole. The heading of the base is yaw in rad. The world
+    lets the shin lean towards the toes by so many rad.
     """
     heading, ranges = (np.cos(yaw), np.sin(yaw)), legs.ranges[side]
     hip, ankle = hip_at(com, heading, legs.hip[side]), ankle_at(position, rotation, legs.ankle[side])
@@ -82,6 +82,8 @@ def reach(legs, side, com, yaw, position, rotation):
         value = values[LIMITED[k]]
         if value < ranges[k, 0] or value > ranges[k, 1]:
             return OF_LIMIT[k], points
+    if posture.ankle_pitch < -lean:
+        return Reason.SHANK, points
     return 0, points
 
 
@@ -114,14 +116,6 @@ def any_lean(n: int) -> np.ndarray:
     return np.full((n, 2), np.inf)
 
 
-@compiled
-def _lean(points, rotation):
-    """Lean in rad towards the toes of the shin of a leg (hip, knee and ankle in m) over a sole's rotation (3, 3)."""
-    x, y, z = between(points[2], points[1])
-    along = rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z
-    return np.arctan2(along, rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z)
-
-
 @compiled(kept=True, allocates=True)
 def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, right_rotation, leans):
     """(n,) int; why the legs cannot take each of n stances with the first drop, 0 where they can with some drop.
@@ -149,15 +143,11 @@ def stances_violated(legs, shanks, com, drops, yaw, left, left_rotation, right, 
             if k >= 0 and drop <= first:
                 continue
             place = (com[row, 0], com[row, 1], com[row, 2] - drop)
-            reason, a = reach(legs, 0, place, yaw[row], left[row], left_rotation[row])
+            reason, a = reach(legs, 0, place, yaw[row], left[row], left_rotation[row], leans[row, 0])
             if reason == 0:
-                reason, b = reach(legs, 1, place, yaw[row], right[row], right_rotation[row])
+                reason, b = reach(legs, 1, place, yaw[row], right[row], right_rotation[row], leans[row, 1])
                 if reason == 0 and not legs_apart(shanks, a, b):
                     reason = Reason.KNEES
-                elif reason == 0 and not (
-                    _lean(a, left_rotation[row]) <= leans[row, 0] and _lean(b, right_rotation[row]) <= leans[row, 1]
-                ):
-                    reason = Reason.SHANK
             if reason == 0:
                 result[row] = 0
                 break

@@ -179,7 +179,7 @@ class MoveGenerator:
         table, missing = self.table, len(self.table) - len(self._leans)
         if missing > 0:
             self._leans = np.append(self._leans, np.full(missing + len(self.table), np.nan))
-        new = numbers[np.isnan(self._leans[numbers])]
+        new = np.unique(numbers[np.isnan(self._leans[numbers])])  # many stances share a contact
         self._leans[new] = np.inf
         for foot in FEET:
             rows = new[table.limb[new] == foot]
