@@ -123,13 +123,15 @@ def _least_raised(
     most = task.rise + task.scale.length * MODERATE_RAISE
     moderate = [raised for raised in candidates if max(raised[:2]) <= most]
     great = [raised for raised in candidates if max(raised[:2]) > most]
-    fitting = [raised for raised in moderate if path_of(raised).fits]
-    last_resort = () if _fast_foot(task) else (0.0,)
-    every = moderate, great
-    for groups, shares in (((fitting,), MARGIN_SHARES), (every, MARGIN_SHARES), (every, last_resort)):
+    every, last_resort = (moderate, great), () if _fast_foot(task) else (0.0,)
+    for fitting, groups, shares in (
+        (True, (moderate,), MARGIN_SHARES),
+        (False, every, MARGIN_SHARES),
+        (False, every, last_resort),
+    ):
         for group, share in product(groups, shares):
             for raised in group:
-                if clear(raised, share):
+                if (path_of(raised).fits or not fitting) and clear(raised, share):
                     return path_of(raised), raised
     return replace(path_of(candidates[-1]), clear=False), candidates[-1]
 
