@@ -130,8 +130,8 @@ def test_not_a_number_fails(robot, flat_walk, good):
 def test_a_link_in_the_world_is_to_blame_rather_than_joints_that_turn_too_hard(flat_walk):
     hard, touch, off = Failure("hard", 2.0, too_fast=True), Failure("in", 1.0, at_any_pace=True), Failure("off", 0.5)
 
-    def joined(*findings, blocked=()):
-        return _joined(blocked, findings, flat_walk.schedule)
+    def joined(*findings, blocked=(), folded=()):
+        return _joined(blocked, folded, findings, flat_walk.schedule)
 
     both = joined(hard, touch)
     assert (both.reason, both.time, both.too_fast, both.at_any_pace) == ("hard; in", 1.0, False, True)
@@ -141,6 +141,19 @@ def test_a_link_in_the_world_is_to_blame_rather_than_joints_that_turn_too_hard(f
     assert joined(off, blocked=[palm]).at_any_pace and joined(touch, blocked=[palm]).time == 3.0
     assert not joined(touch, blocked=[foot]).at_any_pace
     assert joined() is None
+
+
+def test_a_leg_that_cannot_fold_so_much_is_to_blame_for_what_else_was_found(flat_walk):
+    swings = [phase for phase in flat_walk.schedule.phases if phase.swing is not None]
+    begin, other = swings[0].start, swings[1].start
+    leg, touch, foot = Failure("leg", begin), Failure("in", begin + 0.1, at_any_pace=True), Failure("foot", other)
+    found = _joined([], [leg], [touch], flat_walk.schedule)
+    assert found is not None and (found.reason, found.time, found.at_any_pace) == ("leg; in", begin, False)
+    blocked = _joined([foot], [leg], [touch], flat_walk.schedule)
+    assert blocked is not None and blocked.time == other
+    elsewhere = _joined([], [dataclasses.replace(leg, time=other)], [touch], flat_walk.schedule)
+    assert elsewhere == dataclasses.replace(touch, transition=swings[0].transition)
+    assert _joined([], [leg], [], flat_walk.schedule) is None  # the base gave way, and nothing was wrong
 
 
 def test_a_blocked_swing_is_reported(robot, flat_walk):

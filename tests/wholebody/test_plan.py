@@ -142,7 +142,7 @@ def test_free_palms_have_no_target(robot, palm_walk):
     sample = paths.sample(Limb.LEFT_PALM, 0.0)
     assert sample.pose is None and not sample.in_contact and np.isnan(sample.velocity).all()
     assert paths.authority(Limb.LEFT_PALM, 0.0) == 0.0
-    assert not paths.blocked
+    assert not paths.blocked and not paths.folded
 
 
 def test_a_palm_is_at_a_surface_but_for_the_middle_of_its_swings(robot, palm_walk):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -110,11 +111,19 @@ class LimbPaths:
     @property
     def blocked(self) -> tuple[tuple[Limb, int], ...]:
         """Limb and transition of each path for which no clear way was found."""
+        return self._swings(lambda path: not path.clear)
+
+    @property
+    def folded(self) -> tuple[tuple[Limb, int], ...]:
+        """Limb and transition of each path on which the leg would have to fold more than it can."""
+        return self._swings(lambda path: not path.fits)
+
+    def _swings(self, wanted: Callable[[SwingPath], bool]) -> tuple[tuple[Limb, int], ...]:
         return tuple(
             (Limb(limb), segment.transition)
             for limb, segments in enumerate(self.segments)
             for segment in segments
-            if segment.path is not None and not segment.path.clear
+            if segment.path is not None and wanted(segment.path)
         )
 
 

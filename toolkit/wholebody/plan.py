@@ -150,7 +150,7 @@ def _trajectory(
 ) -> WholeBodyTrajectory:
     """The postures with the results of their checks."""
     robot = plan.robot
-    blocked, trajectory = _blocked(plan.schedule, paths), _without_postures(robot, paths, times)
+    (blocked, folded), trajectory = _faulty(plan.schedule, paths), _without_postures(robot, paths, times)
     try:
         passes = [manner] if blocked else [*PASSES * [manner], replace(manner, links=CLOSE)]
         qpos, report = _checked(plan, scene, paths, times, passes)
@@ -164,7 +164,7 @@ def _trajectory(
         max_position_error=report.max_position_error,
         max_orientation_error=report.max_orientation_error,
         limits_respected=report.limits_respected,
-        failure=_joined(blocked, report.findings, plan.schedule),
+        failure=_joined(blocked, folded, report.findings, plan.schedule),
     )
 
 
@@ -200,10 +200,10 @@ def _hard_or_touching(findings: Sequence[Failure]) -> bool:
     return all(each.too_fast or each.at_any_pace for each in findings)
 
 
-def _blocked(schedule: ContactSchedule, paths: LimbPaths) -> list[Failure]:
-    """A failure for each swing without a clear way."""
+def _faulty(schedule: ContactSchedule, paths: LimbPaths) -> tuple[list[Failure], list[Failure]]:
+    """A failure for each swing without a clear way, and for each whose leg would have to fold too much."""
     starts = {(phase.swing, phase.transition): phase.start for phase in schedule.phases}
-    return [
+    blocked = [
         Failure(
             f"{limb.label} finds no way clear of the world in transition {transition}",
             starts[limb, transition],
@@ -211,19 +211,35 @@ def _blocked(schedule: ContactSchedule, paths: LimbPaths) -> list[Failure]:
         )
         for limb, transition in paths.blocked
     ]
+    folded = [
+        Failure(
+            f"{limb.label} would have to come closer to its hip in transition {transition} than its knee can fold",
+            starts[limb, transition],
+        )
+        for limb, transition in paths.folded
+    ]
+    return blocked, folded
 
 
-def _joined(blocked: Sequence[Failure], found: Sequence[Failure], schedule: ContactSchedule) -> Failure | None:
+def _joined(
+    blocked: Sequence[Failure], folded: Sequence[Failure], found: Sequence[Failure], schedule: ContactSchedule
+) -> Failure | None:
     """All findings as one failure at the place of the first that others may come from.
 
-    Others may come from blocked swings, and joints that turn too hard make no link touch the world.
+    Others may come from blocked swings, and those in a transition from the leg that does not fold so much in it, which
+    is no failure where nothing else is: the base gave way. Joints that turn too hard make no link touch the world.
     """
-    findings, touches = [*blocked, *found], [each for each in found if each.at_any_pace]
+
+    def transition_of(failure: Failure) -> int | None:
+        return None if failure.time is None else schedule.phase_at(failure.time).transition
+
+    harmed = {transition_of(each) for each in found}
+    folded = [each for each in folded if transition_of(each) in harmed]
+    findings, touches = [*blocked, *folded, *found], [each for each in found if each.at_any_pace]
     if not findings:
         return None
-    causes = blocked or (_hard_or_touching(found) and touches) or findings
-    time, reason = causes[0].time, "; ".join(each.reason for each in findings)
-    transition = None if time is None else schedule.phase_at(time).transition
+    causes = blocked or folded or (_hard_or_touching(found) and touches) or findings
+    transition, reason = transition_of(causes[0]), "; ".join(each.reason for each in findings)
     too_fast, at_any_pace = all(each.too_fast for each in causes), all(each.at_any_pace for each in causes)
     return replace(causes[0], reason=reason, transition=transition, too_fast=too_fast, at_any_pace=at_any_pace)
 
