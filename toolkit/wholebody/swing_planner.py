@@ -52,7 +52,7 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     """
     sides = _free_sides(task, collide)
     found = []
-    for each in _manners(task) if task.is_foot else (task,):
+    for each in _variants(task):
         path = _plan(each, collide, sides)
         if path.clear and path.fits:
             return path
@@ -60,11 +60,15 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
     return min(found, key=_faults)
 
 
-def _manners(task: SwingTask) -> Iterator[SwingTask]:
-    """The task of a foot, then with the toes up, then such that the foot draws back."""
+def _variants(task: SwingTask) -> Iterator[SwingTask]:
+    """The task itself; of a foot also with its toes up, where they would go down, and such that it draws back."""
+    yield task
+    if not task.is_foot:
+        return
+    if _pitch(task) > 0.0:
+        yield replace(task, level=True)
     way = (task.end.position - task.start.position) * [1.0, 1.0, 0.0]
     length = max(float(np.linalg.norm(way)), 1e-6)
-    yield from (task, replace(task, level=True))
     yield from (replace(task, retreat=-task.scale.length * each * way / length) for each in RETREATS)
 
 
@@ -74,7 +78,7 @@ def _faults(path: SwingPath) -> tuple[bool, bool]:
 
 
 def _plan(task: SwingTask, collide: Collide, sides: tuple[float, float]) -> SwingPath:
-    """The path of a limb that draws back as the task says, with what is free at its sides; see `plan_swing`."""
+    """The path of one variant of a task, with what is free at the sides of the limb; see `plan_swing`."""
     bump = detour(task, lambda vector: _path(task, 0.0, 0.0, EASY, vector))
 
     def around_leg(candidates: Sequence[Raised]) -> tuple[SwingPath, SwingTiming]:
