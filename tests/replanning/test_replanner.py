@@ -20,6 +20,7 @@ from toolkit.replanning.replan import ReplanProblem
 from toolkit.replanning.replan_program import OPTIONS
 from toolkit.replanning.replanner import ReplanCounts
 from toolkit.replanning.situation import Situation
+from toolkit.robot.model import LINE
 
 
 @pytest.fixture(scope="module")
@@ -179,6 +180,17 @@ def test_a_small_push_moves_no_landing(walking, nominal, problem):
     assert small is not None and not small.landing and not small.ends
     large = problem.solve(situation(walking, nominal, time, velocity=(0.4, 0.0, 0.0), displaced=False))
     assert large is not None and large.landing[0][0] > 0.005
+
+
+def test_soles_that_roll_are_replanned_at_once(walking, nominal, problem):
+    """Soles settle by their centre of pressure what lines, where it cannot move, must meet with the next step."""
+    limbs = walking.robot.limbs | {foot: replace(walking.robot.limbs[foot], rolls=True) for foot in FEET}
+    lines = ReplanProblem(nominal, replace(walking.robot, limbs=limbs), walking.world.surfaces)
+    assert lines.deadband < LINE < problem.deadband < walking.robot.half_sizes[FEET, 1].min()
+    state = situation(walking, nominal, mid_swing(nominal), com=(0.0, 0.006, 0.0), displaced=False)
+    on_soles, on_lines = problem.solve(state), lines.solve(state)
+    np.testing.assert_allclose(on_soles.com[0], 0.0, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(on_lines.com[0], [0.0, 0.006 - lines.deadband, 0.0], rtol=0.0, atol=1e-12)
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import numpy as np
 from toolkit.centroidal.layout import indices
 from toolkit.centroidal.stages.steps import WRENCH
 from toolkit.control.corrector import PENDULUM_RATE
+from toolkit.geometry.limb import FEET
 from toolkit.replanning.landing import Landings
 from toolkit.replanning.nominal import Nominal
 from toolkit.replanning.plan_rows import PlanRows
@@ -19,12 +20,13 @@ from toolkit.robot.model import RobotModel
 from toolkit.world.surface import Surface
 
 MOVABLE = 2  # contacts to be made whose places are free, at most
-# Lengths are those of a body of the usual size (`toolkit.robot.scale`).
-DEADBAND = 0.01  # m; divergence that the controller's gains settle, where every foot is as near to its planned place
-
-# Landing points stay where they are planned while the divergence left when the next foot lands is at most SETTLED m
-# and the body's limits exceeded on the way cost at most EXCESS: the controller's gains suffice for that.
-SETTLED, EXCESS = 0.01, 0.02
+# The controller's gains settle a divergence of so many m, for a body of the usual size (`toolkit.robot.scale`), where
+# every foot is as near to its planned place; but with its centre of pressure, so never more than this part of what a
+# sole extends to its nearer edge: a foot that rolls has only a line to move it on.
+DEADBAND, DEADBAND_PART = 0.01, 0.5
+# Landing points stay where they are planned while the divergence left when the next foot lands is as small and the
+# body's limits exceeded on the way cost at most EXCESS.
+EXCESS = 0.02
 # Swings end early only where the objective exceeds EARLY_OBJECTIVE and falls by EARLY_GAIN; 1 s earlier costs a body of
 # the usual size EARLY.
 EARLY_OBJECTIVE, EARLY_GAIN, EARLY = 0.3, 0.3, 3.0
@@ -61,10 +63,16 @@ class Replan:
 
 
 class ReplanProblem:
-    """Builds and solves the programs of one run."""
+    """Builds and solves the programs of one run.
+
+    Attributes:
+        deadband: m; divergence from the plan that needs no replan.
+    """
 
     def __init__(self, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...]):
         self._nominal = nominal
+        narrow = min(float(robot.limbs[foot].bearing.min()) for foot in FEET)
+        self.deadband = min(robot.scale.length * DEADBAND, DEADBAND_PART * narrow)
         self._landings = Landings(nominal.swings, robot.half_sizes, surfaces, robot.scale)
         self._rows = PlanRows.of(nominal.problem, robot)
 
@@ -77,11 +85,7 @@ class ReplanProblem:
         if not situation.displaced:
             kept = self._solve(situation, {}, movable=0)
             # This suffices if the motion is back at the plan when the next foot lands.
-            if (
-                kept
-                and kept.divergence[kept.next_landing] <= self._nominal.scale.length * SETTLED
-                and kept.excess <= EXCESS
-            ):
+            if kept and kept.divergence[kept.next_landing] <= self.deadband and kept.excess <= EXCESS:
                 return kept
         swings = self._nominal.swings
         decided = {event: time for event, time in situation.landing.items() if time < swings[event].end - 1e-3}
@@ -146,10 +150,9 @@ class ReplanProblem:
         com = situation.com - window.com[0] - situation.com_shift
         velocity = situation.velocity - window.velocity[0]
         rate = PENDULUM_RATE / self._nominal.scale.time
-        deadband = self._nominal.scale.length * DEADBAND
         divergence = float(np.linalg.norm(com + velocity / rate))
         off = np.concatenate([com, velocity, situation.spin - window.spin[0]])
-        off *= max(1.0 - deadband / max(divergence, 1e-9), 0.0)
+        off *= max(1.0 - self.deadband / max(divergence, 1e-9), 0.0)
         off[:3] += situation.com_shift
         return off
 

@@ -15,7 +15,7 @@ from toolkit.control.sampled_plan import Reference, Swing
 from toolkit.control.touchdown import ContactTracker, LimbState
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.replanning.nominal import Nominal
-from toolkit.replanning.replan import DEADBAND, Replan, ReplanProblem
+from toolkit.replanning.replan import Replan, ReplanProblem
 from toolkit.replanning.situation import Situation
 from toolkit.wholebody.plan import WholeBodyPlan
 
@@ -66,7 +66,7 @@ class Replanner:
         self._mass = nominal.problem.mass
         self._weight = self._mass * STANDARD_GRAVITY
         scale = plan.robot.scale
-        self._rate, self._deadband = PENDULUM_RATE / scale.time, scale.length * DEADBAND
+        self._rate, self._deadband = PENDULUM_RATE / scale.time, self._problem.deadband
         self._time, self._pace_rate, self._shortest = scale.time, PACE_RATE / scale.time, scale.time * SHORTEST
         self._due = 0.0
         self._plan: Replan | None = None
