@@ -182,13 +182,14 @@ def test_a_small_push_moves_no_landing(walking, nominal, problem):
     assert large is not None and large.landing[0][0] > 0.005
 
 
-def test_soles_that_roll_are_replanned_at_once(walking, nominal, problem):
+def test_lines_are_replanned_at_once(walking, nominal, problem):
     """Soles settle by their centre of pressure what lines, where it cannot move, must meet with the next step."""
-    limbs = walking.robot.limbs | {foot: replace(walking.robot.limbs[foot], rolls=True) for foot in FEET}
-    lines = ReplanProblem(nominal, replace(walking.robot, limbs=limbs), walking.world.surfaces)
+    narrow = replace(nominal.problem, half_size=np.minimum(nominal.problem.half_size, [np.inf, LINE]))
+    lines = ReplanProblem(replace(nominal, problem=narrow), walking.robot, walking.world.surfaces)
     assert lines.deadband < LINE < problem.deadband < walking.robot.half_sizes[FEET, 1].min()
     state = situation(walking, nominal, mid_swing(nominal), com=(0.0, 0.006, 0.0), displaced=False)
     on_soles, on_lines = problem.solve(state), lines.solve(state)
+    assert on_soles is not None and on_lines is not None
     np.testing.assert_allclose(on_soles.com[0], 0.0, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(on_lines.com[0], [0.0, 0.006 - lines.deadband, 0.0], rtol=0.0, atol=1e-12)
 

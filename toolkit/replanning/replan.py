@@ -21,8 +21,8 @@ from toolkit.world.surface import Surface
 
 MOVABLE = 2  # contacts to be made whose places are free, at most
 # The controller's gains settle a divergence of so many m, for a body of the usual size (`toolkit.robot.scale`), where
-# every foot is as near to its planned place; but with its centre of pressure, so never more than this part of what a
-# sole extends to its nearer edge: a foot that rolls has only a line to move it on.
+# every foot is as near to its planned place; but with the centre of pressure, so never more than this part of what any
+# contact bears from its middle to its nearer edge: a foot that rolls has only a line to move it on.
 DEADBAND, DEADBAND_PART = 0.01, 0.5
 # Landing points stay where they are planned while the divergence left when the next foot lands is as small and the
 # body's limits exceeded on the way cost at most EXCESS.
@@ -71,8 +71,8 @@ class ReplanProblem:
 
     def __init__(self, nominal: Nominal, robot: RobotModel, surfaces: tuple[Surface, ...]):
         self._nominal = nominal
-        narrow = min(float(robot.limbs[foot].bearing.min()) for foot in FEET)
-        self.deadband = min(robot.scale.length * DEADBAND, DEADBAND_PART * narrow)
+        bearing = nominal.problem.half_size[:, FEET][nominal.problem.active[:, FEET]]
+        self.deadband = min(nominal.scale.length * DEADBAND, DEADBAND_PART * float(bearing.min()))
         self._landings = Landings(nominal.swings, robot.half_sizes, surfaces, robot.scale)
         self._rows = PlanRows.of(nominal.problem, robot)
 
