@@ -91,7 +91,8 @@ def _place(robot: RobotModel, quota: Quota, config: CollectConfig, rng: np.rando
     elif which == 1:
         timings = (PLANNED,)
     elif which == 2:
-        timings, paced = own_choice(pace, int(rng.choice(3, p=_CALMER))), True
+        rolls = not robot.stands_on_one_foot
+        timings, paced = own_choice(pace, int(rng.choice(3, p=_CALMER)), rolls=rolls), True
     else:
         count = int(rng.integers(1, config.choices + 1))
         timings = tuple(_random_timing(config.shift, config.swing, pace, rng) for _ in range(count))

@@ -76,13 +76,13 @@ class ContactPlanner:
 
         Where the ground `slides`, standing for longer does not help, so the pace never yields, and is a run's where it
         is the planner's to choose. Judges that know no dynamics begin with the second pace, but not for soles that
-        roll, on which a robot stands the worse the longer it stands on one. Heavy rotors make a world's own timing
-        longer, as they do the planner's.
+        roll, which stride along first: a robot stands the worse the longer it stands on one. Heavy rotors make a
+        world's own timing longer, as they do the planner's.
         """
-        config = self.config
-        pace = 0 if slides else calmer + (config.one_timing and self.robot.stands_on_one_foot)
+        config, stands = self.config, self.robot.stands_on_one_foot
+        pace = 0 if slides else calmer + (config.one_timing and stands)
         own = self.world.timing and self.world.timing.times(self.robot.rotor_factor)
-        timings = timings_of(config.timings, own, self.robot.pace, pace, slides=slides)
+        timings = timings_of(config.timings, own, self.robot.pace, pace, slides=slides, rolls=not stands)
         return timings[:1] if config.one_timing else timings
 
     @property

@@ -14,6 +14,7 @@ _PACES = (  # s, s; shifts and swings to choose from, the calmest first; where a
     ((1.0, 1.0), (0.6, 0.8)),
     ((1.4, 1.4), (1.0, 1.0)),
 )
+_STRIDES = ((0.25, 0.5),)  # s, s; before these where feet roll: what is off by then grows while one of them stands
 _RUN = (0.35, 0.6), (0.04, 0.25)  # s, s; the same where no foot can rest, about the quickest that networks learn
 
 
@@ -38,19 +39,21 @@ Timings = tuple[Timing, ...] | Literal["auto"]
 """Timings to choose from; "auto": those of `own_choice`; empty: the world's, or "auto" where it names none."""
 
 
-def own_choice(factor: float, calmer: int = 0, *, slides: bool = False) -> tuple[Timing, ...]:
+def own_choice(factor: float, calmer: int = 0, *, slides: bool = False, rolls: bool = False) -> tuple[Timing, ...]:
     """The timings that a planner may choose from for every transition, the calmest first.
 
     They scale with the robot's factor on times (`RobotModel.pace`). The more often the pace has yielded (`calmer`),
     the slower they are. On ground that `slides` they are those of a run, whatever has yielded: what counts there is how
-    soon the next foot is down, since strides grow with the speed.
+    soon the next foot is down, since strides grow with the speed. On feet that roll (`rolls`) it is how soon an error
+    is made good by the next step.
     """
-    pace = _RUN if slides else _PACES[min(calmer, len(_PACES) - 1)]
+    paces = (_STRIDES, *_PACES) if rolls else _PACES
+    pace = _RUN if slides else paces[min(calmer, len(paces) - 1)]
     return tuple(Timing(*times).times(factor) for times in pace)
 
 
 def own_timings(factor: float) -> set[Timing]:
-    """All timings that `own_choice` offers at any pace and on any ground."""
+    """All timings that `own_choice` offers at any pace and on any ground to feet that do not roll."""
     walks = {timing for calmer in range(len(_PACES)) for timing in own_choice(factor, calmer)}
     return walks.union(own_choice(factor, slides=True))
 
@@ -63,7 +66,13 @@ def given_timings(asked: Timings, own: Timing | None) -> tuple[Timing, ...]:
 
 
 def timings_of(
-    asked: Timings, own: Timing | None, factor: float, calmer: int = 0, *, slides: bool = False
+    asked: Timings,
+    own: Timing | None,
+    factor: float,
+    calmer: int = 0,
+    *,
+    slides: bool = False,
+    rolls: bool = False,
 ) -> tuple[Timing, ...]:
     """The timings of a search: those `asked` for, else the world's `own`, else the planner's `own_choice`."""
-    return given_timings(asked, own) or own_choice(factor, calmer, slides=slides)
+    return given_timings(asked, own) or own_choice(factor, calmer, slides=slides, rolls=rolls)
