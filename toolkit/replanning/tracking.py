@@ -18,8 +18,9 @@ from toolkit.robot.scale import Scale
 # All are those of a body of the usual size (`toolkit.robot.scale`).
 # Weights of the CoM per m^2 s, and of its velocity per m^2/s, horizontal and vertical (no landing point helps there).
 COM, VELOCITY, CLIMB = 100.0, 2.5, 20.0
-# Weights of the angular momentum per mass, per (m^2/s)^2 s, and of its rate, which arms and trunk must follow.
-SPIN, SPIN_RATE = 50.0, 4.0
+# Weights of the angular momentum per mass, per (m^2/s)^2 s, and of its rate. They are high since arms and trunk, which
+# the controller keeps near their plan, follow little of it; landing points move instead.
+SPIN, SPIN_RATE = 250.0, 20.0
 FINAL = 1000.0  # per m^2 of divergence at the end of the horizon
 FINAL_SPIN = 100.0  # per (m^2/s)^2 of angular momentum per mass at the end of the horizon
 FORCE, MOMENT = 0.5, 2.5  # per s of the wrenches' squared deviations in weights and weights times 1 m
