@@ -14,8 +14,8 @@ _PACES = (  # s, s; shifts and swings to choose from, the calmest first; where a
     ((1.0, 1.0), (0.6, 0.8)),
     ((1.4, 1.4), (1.0, 1.0)),
 )
-_STRIDES = ((0.25, 0.5),)  # s, s; before these where feet roll: what is off by then grows while one of them stands
 _RUN = (0.35, 0.6), (0.04, 0.25)  # s, s; the same where no foot can rest, about the quickest that networks learn
+_STRIDES = ((0.25, 0.5),)  # s, s; before `_PACES` where feet roll: what is off grows while one of them stands
 
 
 @dataclass(frozen=True)
