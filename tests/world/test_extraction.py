@@ -272,6 +272,33 @@ def test_boxes_that_are_not_flush_stay_apart(make_world, second):
         assert area_of(surface) == pytest.approx(1.0, abs=6e-3)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_of_flush_tiles_that_touch_in_corners_is_lost(make_world, seed):
+    """Of a floor of two kinds of tiles as much is ground as there are tiles, however they lie."""
+    slippery = np.random.default_rng(seed).random((10, 6)) < 0.4
+    tiles = "".join(
+        f'<geom name="t{i}{j}" type="box" size="0.2 0.2 0.05" pos="{0.4 * i - 0.4:.1f} {0.4 * j - 1.0:.1f} -0.05" '
+        f'friction="{0.2 if slippery[i, j] else 0.8}"/>'
+        for i in range(10)
+        for j in range(6)
+    )
+    found = tops(make_world(tiles))
+    for friction, count in ((0.2, slippery.sum()), (0.8, (~slippery).sum())):
+        same = [surface for surface in found if surface.friction == friction]
+        assert sum(area_of(surface) for surface in same) == pytest.approx(0.16 * count, rel=1e-3)
+        assert sorted(name for surface in same for name in surface.geom.split("+")) == sorted(
+            f"t{i}{j}" for i, j in np.argwhere(slippery == (friction == 0.2)).tolist()
+        )
+
+
+def test_flush_tiles_that_touch_in_a_corner_both_bear(make_world):
+    world = make_world(
+        '<geom name="a" type="box" size="0.5 0.5 0.1" pos="0 0 -0.1"/>'
+        '<geom name="b" type="box" size="0.5 0.5 0.1" pos="1 1 -0.1"/>'
+    )
+    assert sum(area_of(surface) for surface in tops(world)) == pytest.approx(2.0, rel=1e-5)
+
+
 def test_a_chain_of_small_steps_is_not_one_surface(make_world):
     boxes = "".join(
         f'<geom type="box" size="0.2 0.5 0.1" pos="{0.4 * i} 0 {-0.1 + 0.0009 * i:.4f}"/>' for i in range(6)

@@ -163,12 +163,15 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
                     used[other] = True
                     members.append(other)
                     waiting.append(other)
-        polygon, others = shapes[seed], [shapes[member] for member in members[1:]]
+        parts, others = [shapes[seed]], [shapes[member] for member in members[1:]]
         for batch in [[other] for other in others] if len(others) < _MANY else [others]:
-            polygon = _sealed([polygon, *batch], config.flush)
-        names = dict.fromkeys(faces[member].geom for member in members)
-        flush = Face("+".join(names), faces[seed].friction, frame, polygon)
-        result[min(members)] = flush if others else faces[seed]
+            parts = _sealed([*parts, *batch], config.flush)
+        inside = shapely.point_on_surface([shapes[member] for member in members])
+        for part in parts:
+            own = [members[index] for index in np.flatnonzero(shapely.dwithin(inside, part, config.flush)).tolist()]
+            names = "+".join(dict.fromkeys(faces[member].geom for member in own))
+            flush = Face(names, faces[seed].friction, frame, part)
+            result[min(own)] = flush if len(own) > 1 else faces[own[0]]
     return [result[first] for first in sorted(result)]
 
 
@@ -199,13 +202,13 @@ def _in_frame(face: Face, frame: Pose) -> Polygon:
     return shapely.transform(face.polygon, lambda points: (other @ _with_zeros(points))[:, :2])
 
 
-def _sealed(shapes: list[Polygon], gap: float) -> Polygon:
-    """Union of shapes in which seams up to `gap` m wide are closed."""
+def _sealed(shapes: list[Polygon], gap: float) -> list[Polygon]:
+    """Union of shapes in which seams up to `gap` m wide are closed; parts that touch in corners alone stay apart."""
     union = united(shapes)
     if isinstance(union, Polygon) and not union.interiors:
-        return union
+        return [union]
     closed = union.buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
-    return closed if isinstance(closed, Polygon) else max(shapely.get_parts(closed), key=lambda part: part.area)
+    return shapely.get_parts(closed).tolist()
 
 
 def _open_regions(faces: list[Face], solids: Solids, config: SurfaceConfig) -> list[Face]:
