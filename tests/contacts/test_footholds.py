@@ -77,3 +77,36 @@ def test_a_round_surface_holds_soles_wherever_they_fit(yaw):
         fits = region.covers(shapely.Polygon(wish + CORNERS * (HALF + margin) @ turn))
         at_wish = np.hypot(*(found.position[row, :2] - wish)) < 1e-9
         assert at_wish == fits
+
+
+@pytest.mark.parametrize("width", [0.135, 0.145, 0.15, 0.16])
+def test_a_beam_between_platforms_of_its_height_holds_soles_that_hardly_fit(width):
+    world, holds = footholds(
+        box([0, 0, -0.05], [0.4, 0.4, 0.05]),
+        box([1.0, 0, -0.05], [0.6, width / 2, 0.05]),
+        box([2.0, 0, -0.05], [0.4, 0.4, 0.05]),
+    )
+    top = int(np.argmax([surface.normal[2] for surface in world.surfaces]))
+    assert len(world.surfaces[top].pieces) > 1  # one surface
+    wishes = np.column_stack([np.linspace(-0.3, 2.3, 53), np.full(53, 0.02)])
+    found = holds.nearest([(top, 0.0)], wishes)
+    assert all(covered(world, found, row, 1e-4) for row in range(len(wishes)))
+    assert np.abs(found.position[:, 0] - wishes[:, 0]).max() < 0.05  # also in the middle of the beam
+    on_beam = np.abs(found.position[:, 0] - 1.0) < 0.4
+    assert on_beam.sum() > 10 and np.abs(found.position[on_beam, 1]).max() <= width / 2 - HALF[1]
+
+
+def test_where_there_is_room_for_the_margin_it_is_kept():
+    margin = 0.01
+    world, holds = footholds(
+        box([0, 0, -0.05], [0.4, 0.4, 0.05], [0, 0, 20]), box([0.7, 0.3, -0.05], [0.4, 0.3, 0.05], [0, 0, 20])
+    )
+    top = int(np.argmax([surface.normal[2] for surface in world.surfaces]))
+    surface = world.surfaces[top]
+    assert len(surface.pieces) > 1
+    for yaw in (0.0, np.radians(20), 1.0):
+        found = holds.nearest([(top, yaw)], np.random.default_rng(0).uniform(-1.0, 1.5, (80, 2)))
+        turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+        for place in (found.position - surface.pose.position)[:, :2] @ surface.pose.rotation[:2, :2]:
+            sole = shapely.Polygon(place + CORNERS * (HALF + margin) @ turn @ surface.pose.rotation[:2, :2])
+            assert surface.region.buffer(1e-4).covers(sole)

@@ -7,6 +7,7 @@ centre of a sole may lie is computed exactly, for regions that are not convex or
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import shapely
@@ -20,6 +21,7 @@ from toolkit.world.convex import is_convex
 from toolkit.world.surface import Surface
 
 _SHARES = (1.0, 0.5, 0.05)  # of the margin around a sole, tried in turn: a stone may be hardly larger than a sole
+_NEAR = 3.0  # margins from a place within which another with less margin is of no use
 _MANY = 12  # sides from which on a convex surface is shrunk by its moved copies, and not side by side
 _KEPT = 20_000  # regions that are remembered
 _TURN = np.radians(50.0)  # largest angle between a heading along a surface's edges and the wanted one
@@ -33,7 +35,7 @@ class Footholds:
         surfaces: The surfaces.
         half_size: (2,) m; half extents of the sole.
         margin: Margin around it, or (2,) margins along and across, that should also lie in the surface, in m; less
-            where there is no room for it.
+            where there is no room for it: on a narrow surface, and on the narrow parts of one that is not convex.
     """
 
     def __init__(self, surfaces: Sequence[Surface], half_size: np.ndarray, margin: float | np.ndarray):
@@ -110,14 +112,26 @@ class Footholds:
         if key not in self._regions:
             if len(self._regions) >= _KEPT:
                 self._regions.clear()
-            region = shapely.Polygon()
-            for share in _SHARES:
-                region = eroded(surface, along, self._half + share * self._margin)
-                if not region.is_empty:
-                    break
+            region = self._room(surface, along)
             shapely.prepare(region)
             self._regions[key] = region
         return self._regions[key]
+
+    def _room(self, surface: Surface, along: np.ndarray) -> BaseGeometry:
+        """Where the centre of a sole with this x axis (2,) may be: with less margin where none with more is near."""
+        found, near = shapely.Polygon(), _NEAR * float(np.max(self._margin))
+        rooms = [partial(eroded, surface, along, self._half + share * self._margin) for share in _SHARES]
+        convex = len(surface.pieces) == 1  # narrow everywhere or nowhere
+        narrow = shapely.Polygon() if convex else rooms[-1]()
+        for room in rooms:
+            if found.is_empty:
+                found = room()
+                continue
+            beside = shapely.buffer(found, near, join_style="mitre")
+            if shapely.difference(narrow, beside).is_empty:
+                break
+            found = shapely.union(found, shapely.difference(room(), beside))
+        return found
 
 
 def _sole_axis(normal: np.ndarray, yaw: float) -> np.ndarray:
