@@ -6,8 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.robot.samples import TOML, biped_mjcf, write_robot
 from tests.world.conftest import mjcf_of
 from toolkit.errors import RobotError
+from toolkit.robot.loader import load_robot
 from toolkit.world.loader import load_world
 from toolkit.world.scene import compose_scene, doubts
 
@@ -150,3 +152,38 @@ def test_a_field_too_fine_for_a_sole_is_doubtful(stool, make_world):
     assert lines(21) == []
     (line,) = lines(201)
     assert "'rough'" in line and "MuJoCo keeps 50" in line and "cm apart" in line
+
+
+@pytest.fixture
+def on_cylinders(tmp_path):
+    """A robot whose feet are two lying cylinders each, with a pad between them."""
+    sole = '<geom type="box" size="0.1 0.05 0.01" pos="0.02 0 -0.07" mass="1"/>'
+    lying = "".join(
+        f'<geom type="cylinder" size="0.02 0.11" pos="0.02 {y} -0.06" euler="0 1.5707963267948966 0" mass="0.5"/>'
+        for y in (-0.02, 0.02)
+    )
+    toml = TOML.replace("patch = [0.20, 0.10]", "patch = [0.20, 0.10]\npad = 0.01")
+    assert sole in biped_mjcf()
+    return load_robot(str(write_robot(tmp_path / "cylinders", biped_mjcf().replace(sole, lying), toml)))
+
+
+@pytest.mark.parametrize("stump", [True, False])
+def test_feet_have_no_cylinders_where_the_world_has_some(on_cylinders, make_world, stump):
+    stumps = '<geom type="cylinder" size="0.15 0.5" pos="1 0 -0.5"/>'
+    scene = compose_scene(on_cylinders, make_world(FLOORS + stumps * stump, assets=ASSETS))
+    alone = on_cylinders.mujoco_model
+    for limb in on_cylinders.limbs.values():
+        kinds, sizes = (
+            [getattr(model, name)[model.geom_bodyid == model.body(limb.body).id] for model in (alone, scene)]
+            for name in ("geom_type", "geom_size")
+        )
+        cylinders = kinds[0] == mujoco.mjtGeom.mjGEOM_CYLINDER
+        assert cylinders.sum() == 2
+        if not stump:
+            np.testing.assert_array_equal(kinds[0], kinds[1])
+            continue
+        assert (kinds[1] == mujoco.mjtGeom.mjGEOM_BOX).all()
+        np.testing.assert_allclose(sizes[1][cylinders], [[0.02, 0.02, 0.11]] * 2)
+    for name in ("body_mass", "body_inertia", "body_ipos"):
+        bodies = [scene.body(alone.body(index).name).id for index in range(1, alone.nbody)]
+        np.testing.assert_allclose(getattr(scene, name)[bodies], getattr(alone, name)[1:], atol=1e-9)
