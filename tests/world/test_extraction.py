@@ -207,7 +207,7 @@ def test_box_on_the_floor_leaves_a_hole(make_world):
 
 @pytest.mark.parametrize(
     ("height", "covered"),
-    [(0.14, True), (0.16, False)],
+    [(0.14, True), (0.29, True), (0.31, False)],
 )
 def test_low_ceiling_covers_and_a_high_one_does_not(make_world, height, covered):
     world = make_world(
@@ -219,11 +219,38 @@ def test_low_ceiling_covers_and_a_high_one_does_not(make_world, height, covered)
     assert not any(s.geom == "roof" and s.normal[2] < 0 for s in world.surfaces)
 
 
+@pytest.mark.parametrize("posts", [True, False])
+def test_no_sole_has_room_below_a_bar_to_step_over(make_world, posts):
+    """A foot would pass below it, and its shin would not."""
+    stands = "".join(f'<geom type="box" size="0.02 0.02 0.095" pos="1 {y} 0.095"/>' for y in (-0.48, 0.48) if posts)
+    world = make_world(
+        '<geom name="floor" type="plane" size="0 0 1"/>'
+        f'<geom type="box" size="0.02 0.5 0.015" pos="1 0 0.205"/>{stands}'
+    )
+    floor = next(s for s in world.surfaces if s.geom == "floor")
+    assert area_of(floor) == pytest.approx(42 - 0.04, abs=5e-3)
+    assert not floor.region.covers(shapely.Point(*(floor.pose.inverse() @ np.array([1.0, 0.0, 0.0]))[:2]))
+
+
+@pytest.mark.parametrize("angle", [0.0, 25.0])
+def test_what_stands_on_the_ground_covers_it_up_to_the_clearance(make_world, angle):
+    """A wall beside a slope that falls towards it takes no more of it than what a foot needs."""
+    found = []
+    for height in (0.1499, 1.0):  # m above the slope, along its normal; walls reach below it
+        along = height / np.cos(np.radians(angle))
+        world = make_world(
+            f'<body euler="0 {angle} 0"><geom name="slope" type="box" size="1 1 0.1" pos="0 0 -0.1"/></body>'
+            f'<geom type="box" size="0.1 2 2" pos="0.5 0 {-2.0 - 0.5 * np.tan(np.radians(angle)) + along}"/>'
+        )
+        found.append(max(area_of(s) for s in world.surfaces if s.geom == "slope" and s.serves_foot))
+    assert found[0] == pytest.approx(found[1], abs=0.06 if angle else 1e-6)
+
+
 def test_clearance_is_measured_along_the_normal(make_world):
-    # A roof parallel to a slope of 40 degrees, 0.16 m away along the normal: 0.21 m straight up.
+    # A roof parallel to a slope of 40 degrees, 0.31 m away along the normal: 0.4 m straight up.
     world = make_world(
         '<body euler="0 40 0"><geom name="slope" type="box" size="1 1 0.1" pos="0 0 -0.1"/>'
-        '<geom name="roof" type="box" size="1 1 0.1" pos="0 0 0.26"/></body>'
+        '<geom name="roof" type="box" size="1 1 0.1" pos="0 0 0.41"/></body>'
     )
     slope = next(s for s in world.surfaces if s.geom == "slope" and s.serves_foot)
     assert area_of(slope) == pytest.approx(4.0, rel=1e-6)

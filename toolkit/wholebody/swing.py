@@ -103,6 +103,7 @@ class SwingPath:
         pitch: rad; largest phi.
         pitching: When the toes go down and come up again.
         clear: Whether the swept patch touches nothing of the world, as the planner of the path found.
+        passes: Whether the shin above a foot touches nothing either, as that planner found.
         fits: Whether the leg can fold as much as the path asks for, as that planner found.
     """
 
@@ -115,6 +116,7 @@ class SwingPath:
     pitch: float = 0.0
     pitching: Window = Window(0.0, 0.8)
     clear: bool = True
+    passes: bool = True
     fits: bool = True
 
     @cached_property

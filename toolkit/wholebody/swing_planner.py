@@ -21,6 +21,7 @@ Collide = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 # Lengths and speeds are those of a body of the usual size (`toolkit.robot.scale`).
 SKIN = 2e-3  # m; a resting patch touches its surface and may stand against a wall
 SPACING = 0.01  # m; largest way between two poses that are checked, so that none passes an edge unseen
+SHIN = 0.01  # m; half the width of what must be clear along the middle of the shin
 # m per m of way along the surface on which a swing ends that is higher by more than CLIMB (m): the least padding below
 NEAR, CLIMB = 0.4, 0.02
 
@@ -48,13 +49,14 @@ def plan_swing(task: SwingTask, collide: Collide) -> SwingPath:
 
     Fast swings that have to rise are also tried with late and with early crossings: the one whose peak acceleration is
     least is taken. A foot that has no such path keeps its toes up, or draws back from what it has to rise over. A path
-    that only asks the leg to fold too much comes before one that meets the world.
+    that only asks the leg to fold too much comes before one on which its shin meets the world, and that before one on
+    which the patch does.
     """
     sides = _free_sides(task, collide)
     found = []
     for each in _variants(task):
         path = _plan(each, collide, sides)
-        if path.clear and path.fits:
+        if not any(_faults(path)):
             return path
         found.append(path)
     return min(found, key=_faults)
@@ -72,9 +74,9 @@ def _variants(task: SwingTask) -> Iterator[SwingTask]:
     yield from (replace(task, retreat=-task.scale.length * each * way / length) for each in RETREATS)
 
 
-def _faults(path: SwingPath) -> tuple[bool, bool]:
+def _faults(path: SwingPath) -> tuple[bool, bool, bool]:
     """What is wrong with a path, to compare paths."""
-    return not path.clear, not path.fits
+    return not path.clear, not path.passes, not path.fits
 
 
 def _plan(task: SwingTask, collide: Collide, sides: tuple[float, float]) -> SwingPath:
@@ -112,7 +114,8 @@ def _least_raised(
 
     Moderate heights are tried first with the whole margin, then with half and a quarter of it; before all others come
     those for which the leg can fold. Great heights follow in the same way. No margin at all is the last resort, but not
-    of fast feet: they do not follow their path so closely.
+    of fast feet: they do not follow their path so closely. On all of them the middle of the shin meets nothing, since a
+    foot has room below a bar over which its leg has to go; only where there is no such path it does not count.
     """
 
     @cache
@@ -124,19 +127,20 @@ def _least_raised(
     def clear(raised: Raised, share: float) -> bool:
         return not collide(*_swept_boxes(task, path_of(raised), share * task.margin, sides)).any()
 
+    @cache
+    def passes(raised: Raised) -> bool:
+        return task.leg is None or not collide(*_shin_boxes(task, path_of(raised))).any()
+
     most = task.rise + task.scale.length * MODERATE_RAISE
     moderate = [raised for raised in candidates if max(raised[:2]) <= most]
     great = [raised for raised in candidates if max(raised[:2]) > most]
     every, last_resort = (moderate, great), () if _fast_foot(task) else (0.0,)
-    for fitting, groups, shares in (
-        (True, (moderate,), MARGIN_SHARES),
-        (False, every, MARGIN_SHARES),
-        (False, every, last_resort),
-    ):
+    stages = (True, (moderate,), MARGIN_SHARES), (False, every, MARGIN_SHARES), (False, every, last_resort)
+    for passing, (fitting, groups, shares) in product((True, False), stages):
         for group, share in product(groups, shares):
             for raised in group:
-                if (path_of(raised).fits or not fitting) and clear(raised, share):
-                    return path_of(raised), raised
+                if (path_of(raised).fits or not fitting) and clear(raised, share) and passes(raised) >= passing:
+                    return replace(path_of(raised), passes=passing), raised
     return replace(path_of(candidates[-1]), clear=False), candidates[-1]
 
 
@@ -268,6 +272,19 @@ def _free_sides(task: SwingTask, collide: Collide) -> tuple[float, float]:
         hit = collide(centers, np.repeat(pose.rotation[None], len(shares), 0), half)
         sides.append(float(max(shares[~hit], default=0.0)) * margin)
     return sides[0], sides[1]
+
+
+def _shin_boxes(task: SwingTask, path: SwingPath) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centres (k, 3), rotations (k, 3, 3), half sizes (k, 3) of thin boxes inside the shin, along a path."""
+    assert task.leg is not None
+    ankle, knee = task.leg.shin(path)
+    up = knee - ankle
+    length = np.linalg.norm(up, axis=1)
+    up /= length[:, None]
+    side = np.cross(path.start.rotation[:, 0], up)  # upright legs: far from along the foot
+    side /= np.linalg.norm(side, axis=1)[:, None]
+    half = np.column_stack([np.full((len(up), 2), task.scale.length * SHIN), length / 2])
+    return (ankle + knee) / 2, np.stack([np.cross(side, up), side, up], axis=-1), half
 
 
 def _swept_boxes(

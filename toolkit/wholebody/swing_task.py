@@ -75,6 +75,12 @@ class SwingingLeg:
         posture = self._posture(path, path.rotations(self.u))
         return bool((self.leg.min_length - posture.length).max() < self.spare)
 
+    def shin(self, path: SwingPath) -> tuple[np.ndarray, np.ndarray]:
+        """Ankle and knee, (k, 3) m each, as the foot follows a path."""
+        posture = self._posture(path, path.rotations(self.u))
+        ankle, knee = (np.broadcast_arrays(*point) for point in (posture.ankle_point, posture.knee_point))
+        return np.stack(ankle, axis=-1), np.stack(knee, axis=-1)
+
     def _posture(self, path: SwingPath, rotations: np.ndarray) -> LegPosture:
         """Postures (k,) of the leg on a path with world_from_contact rotations (k, 3, 3)."""
         middle = mean_heading(self.other_yaw, yaw_of(rotations))

@@ -32,6 +32,8 @@ class SurfaceConfig:
         foot_angle: Largest angle between up and the normal of a surface for feet, rad.
         palm_angle_min, palm_angle_max: Range of that angle for palms, rad.
         clearance: Room needed above a surface along its normal, m.
+        overhang: Room needed above ground below what hangs free, such as a bar to step over, m: a foot has room there,
+            and its shin does not.
         flush: Geometry up to this height above a surface does not cover it, m. Faces of equal friction whose
             planes differ by less and that are no further apart are one surface.
         flush_angle: Largest angle between the normals of merged faces, rad.
@@ -47,6 +49,7 @@ class SurfaceConfig:
     palm_angle_min: float = np.radians(60.0)
     palm_angle_max: float = np.radians(120.0)
     clearance: float = 0.15
+    overhang: float = 0.3
     flush: float = 1e-3
     flush_angle: float = np.radians(0.5)
     foot_area: float = 0.01
@@ -215,10 +218,7 @@ def _open_regions(faces: list[Face], solids: Solids, config: SurfaceConfig) -> l
     """Connected regions of faces that nothing covers; they may have holes."""
     regions = shapely.simplify([face.polygon for face in faces], 1e-6)
     shapely.prepare(regions)
-    frames = [face.frame for face in faces]
-    owner, shadows = solids.shadows(
-        frames, shapely.bounds(regions), config.flush, config.clearance, [face.own for face in faces]
-    )
+    owner, shadows = _shadows(faces, shapely.bounds(regions), solids, config)
     covers = shapely.intersects(regions[owner], shadows)
     owner, shadows = owner[covers], shadows[covers]
     rest, large = _without_largest(regions, owner, shadows, least := min(config.foot_area, config.palm_area) / 2)
@@ -240,6 +240,26 @@ def _open_regions(faces: list[Face], solids: Solids, config: SurfaceConfig) -> l
         for index, piece in zip(whole[part].tolist(), pieces, strict=True)
         if isinstance(piece, Polygon)
     ]
+
+
+def _shadows(
+    faces: list[Face], bounds: np.ndarray, solids: Solids, config: SurfaceConfig
+) -> tuple[np.ndarray, np.ndarray]:
+    """What covers faces with bounds (n, 4) m: ascending indices of faces (k,) int, and polygons (k,) in their xy."""
+    frames, own = [face.frame for face in faces], [face.own for face in faces]
+    owner, shadows = solids.shadows(frames, bounds, config.flush, config.clearance, own)
+    over, hanging = solids.shadows(frames, bounds, config.clearance, config.overhang, own)
+    feet = _serves(faces, config)[over, 0]
+    over, hanging = over[feet], hanging[feet]
+    for index in np.unique(over[np.isin(over, owner)]).tolist():  # what stands on the ground covers no more than there
+        lean = np.tan(np.arccos(min(faces[index].frame.normal[2], 1.0)))
+        beside = (config.overhang - config.clearance) * lean + 10 * config.simplify
+        standing = shapely.buffer(unions(shadows[owner == index], np.zeros((owner == index).sum(), int))[0], beside)
+        hanging[over == index] = shapely.difference(hanging[over == index], standing)
+    left = shapely.area(hanging) > 0.0
+    owner, shadows = np.concatenate([owner, over[left]]), np.concatenate([shadows, hanging[left]])
+    order = np.argsort(owner, kind="stable")
+    return owner[order], shadows[order]
 
 
 def _without_largest(
