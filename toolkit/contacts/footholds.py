@@ -7,7 +7,6 @@ centre of a sole may lie is computed exactly, for regions that are not convex or
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 import shapely
@@ -119,18 +118,21 @@ class Footholds:
 
     def _room(self, surface: Surface, along: np.ndarray) -> BaseGeometry:
         """Where the centre of a sole with this x axis (2,) may be: with less margin where none with more is near."""
+
+        def room(share: float) -> BaseGeometry:
+            return eroded(surface, along, self._half + share * self._margin)
+
         found, near = shapely.Polygon(), _NEAR * float(np.max(self._margin))
-        rooms = [partial(eroded, surface, along, self._half + share * self._margin) for share in _SHARES]
         convex = len(surface.pieces) == 1  # narrow everywhere or nowhere
-        narrow = shapely.Polygon() if convex else rooms[-1]()
-        for room in rooms:
+        least = shapely.Polygon() if convex else room(_SHARES[-1])
+        for share in _SHARES:
             if found.is_empty:
-                found = room()
+                found = room(share)
                 continue
             beside = shapely.buffer(found, near, join_style="mitre")
-            if shapely.difference(narrow, beside).is_empty:
+            if shapely.difference(least, beside).is_empty:
                 break
-            found = shapely.union(found, shapely.difference(room(), beside))
+            found = shapely.union(found, shapely.difference(room(share), beside))
         return found
 
 

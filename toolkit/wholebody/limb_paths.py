@@ -20,7 +20,7 @@ from toolkit.physics.leg import leg_posture
 from toolkit.robot.model import RobotModel
 from toolkit.wholebody.swing import LimbSample, SwingPath, Window
 from toolkit.wholebody.swing_planner import Collide, plan_swing
-from toolkit.wholebody.swing_task import LIFT, SAMPLES, SPARE, StandingLeg, SwingingLeg, SwingTask
+from toolkit.wholebody.swing_task import LIFT, SAMPLES, SPARE, StandingLeg, SwingingLeg, SwingTask, leg_points
 from toolkit.world.clearance import BoxCollider
 from toolkit.world.world import World
 
@@ -217,9 +217,7 @@ def _standing_leg(robot: RobotModel, standing: Contact, com: np.ndarray, yaw: np
     count, pose = len(com), standing.pose
     position, rotation = np.tile(pose.position, (count, 1)), np.tile(pose.rotation, (count, 1, 1))
     posture = leg_posture(robot.legs[standing.limb], com, mean_heading(pose.yaw, yaw), position, rotation)
-    joints = (posture.ankle_point, posture.knee_point, posture.hip_point)
-    points = [np.stack(np.broadcast_arrays(*point), axis=-1) for point in joints]
-    return StandingLeg(np.stack(points, axis=1), robot.leg_radii[::-1])
+    return StandingLeg(leg_points(posture), robot.leg_radii[::-1])
 
 
 def _feet(phase: Phase) -> Pose:

@@ -52,6 +52,12 @@ EARLY = replace(STEEP, fast_across=Window(0.02, 0.75))
 """For swings that end below an edge: the heel is over it before it comes down."""
 
 
+def leg_points(posture: LegPosture) -> np.ndarray:
+    """(k, 3, 3) m; ankle, knee and hip of k postures."""
+    joints = (posture.ankle_point, posture.knee_point, posture.hip_point)
+    return np.stack([np.stack(np.broadcast_arrays(*point), axis=-1) for point in joints], axis=1)
+
+
 @dataclass(frozen=True)
 class SwingingLeg:
     """The leg of a swinging foot, and where the body is during the swing.
@@ -77,9 +83,8 @@ class SwingingLeg:
 
     def shin(self, path: SwingPath) -> tuple[np.ndarray, np.ndarray]:
         """Ankle and knee, (k, 3) m each, as the foot follows a path."""
-        posture = self._posture(path, path.rotations(self.u))
-        ankle, knee = (np.broadcast_arrays(*point) for point in (posture.ankle_point, posture.knee_point))
-        return np.stack(ankle, axis=-1), np.stack(knee, axis=-1)
+        points = leg_points(self._posture(path, path.rotations(self.u)))
+        return points[:, 0], points[:, 1]
 
     def _posture(self, path: SwingPath, rotations: np.ndarray) -> LegPosture:
         """Postures (k,) of the leg on a path with world_from_contact rotations (k, 3, 3)."""

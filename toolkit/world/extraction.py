@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from toolkit.geometry.pose import Pose
+from toolkit.geometry.pose import Pose, steepness
 from toolkit.world.convex import convex_partition
 from toolkit.world.faces import Face, faces_of
 from toolkit.world.overlay import cut, overlap, unions, united
@@ -166,6 +166,9 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
                     used[other] = True
                     members.append(other)
                     waiting.append(other)
+        if len(members) == 1:
+            result[seed] = faces[seed]
+            continue
         parts, others = [shapes[seed]], [shapes[member] for member in members[1:]]
         for batch in [[other] for other in others] if len(others) < _MANY else [others]:
             parts = _sealed([*parts, *batch], config.flush)
@@ -173,8 +176,9 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
         for part in parts:
             own = [members[index] for index in np.flatnonzero(shapely.dwithin(inside, part, config.flush)).tolist()]
             names = "+".join(dict.fromkeys(faces[member].geom for member in own))
-            flush = Face(names, faces[seed].friction, frame, part)
-            result[min(own)] = flush if len(own) > 1 else faces[own[0]]
+            if own:  # closing seams may leave slivers
+                flush = Face(names, faces[seed].friction, frame, part)
+                result[min(own)] = flush if len(own) > 1 else faces[own[0]]
     return [result[first] for first in sorted(result)]
 
 
@@ -248,13 +252,16 @@ def _shadows(
     """What covers faces with bounds (n, 4) m: ascending indices of faces (k,) int, and polygons (k,) in their xy."""
     frames, own = [face.frame for face in faces], [face.own for face in faces]
     owner, shadows = solids.shadows(frames, bounds, config.flush, config.clearance, own)
-    over, hanging = solids.shadows(frames, bounds, config.clearance, config.overhang, own)
-    feet = _serves(faces, config)[over, 0]
-    over, hanging = over[feet], hanging[feet]
+    feet = np.flatnonzero(_serves(faces, config)[:, 0])
+    if len(feet) == 0:
+        return owner, shadows
+    grounds = [frames[index] for index in feet], bounds[feet]
+    over, hanging = solids.shadows(*grounds, config.clearance, config.overhang, [own[index] for index in feet])
+    over = feet[over]
     for index in np.unique(over[np.isin(over, owner)]).tolist():  # what stands on the ground covers no more than there
-        lean = np.tan(np.arccos(min(faces[index].frame.normal[2], 1.0)))
+        lean = steepness(faces[index].frame.normal[2])
         beside = (config.overhang - config.clearance) * lean + 10 * config.simplify
-        standing = shapely.buffer(unions(shadows[owner == index], np.zeros((owner == index).sum(), int))[0], beside)
+        standing = shapely.buffer(united(shadows[owner == index]), beside)
         hanging[over == index] = shapely.difference(hanging[over == index], standing)
     left = shapely.area(hanging) > 0.0
     owner, shadows = np.concatenate([owner, over[left]]), np.concatenate([shadows, hanging[left]])

@@ -99,13 +99,12 @@ def _box_cylinders(spec: mujoco.MjSpec, robot: RobotModel) -> None:
     it rests, and throws the robot into the air; its other collision of convex shapes (libccd) lets such feet sink in.
     """
     for limb in robot.limbs.values():
-        body, index = spec.body(limb.body), robot.mujoco_model.body(limb.body).id
+        body, own = spec.body(limb.body), robot.mujoco_model.body(limb.body)
         for geom in body.geoms:
             if geom.type == _CYLINDER and geom.contype | geom.conaffinity:
                 geom.type, geom.size = mujoco.mjtGeom.mjGEOM_BOX, geom.size[[0, 0, 1]]
-                body.explicitinertial, body.mass = True, robot.mujoco_model.body_mass[index]
-                body.ipos, body.iquat = robot.mujoco_model.body_ipos[index], robot.mujoco_model.body_iquat[index]
-                body.inertia = robot.mujoco_model.body_inertia[index]
+                body.explicitinertial, body.mass, body.inertia = True, own.mass[0], own.inertia
+                body.ipos, body.iquat = own.ipos, own.iquat
 
 
 def _share_assets(spec: mujoco.MjSpec, scenery: mujoco.MjSpec) -> None:
