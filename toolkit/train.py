@@ -96,15 +96,12 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
     from toolkit.robot.loader import load_robot
 
     try:
-        import torch
-
         from toolkit.learning.descent import FitConfig
-        from toolkit.learning.fit import check_device, fit_category, is_trained, saved_curves
+        from toolkit.learning.fit import check_device, fit_category, is_trained, saved_curves, threads
     except ImportError:
         raise InputError("fit needs torch: pip install -e '.[train]'") from None
     from toolkit.report.curves import draw_curves
 
-    torch.set_num_threads(args.workers)
     robot = load_robot(args.robot, args.robots)
     out = args.out or robot.folder / "networks"
     data = read_datasets(args.data, robot.fingerprint, limit=args.limit)
@@ -119,7 +116,7 @@ def run_fit(args: argparse.Namespace, console: Console) -> int:
         length=robot.scale.length,
         pace=robot.pace,
     )
-    with progress_bar(console) as progress:
+    with threads(args.workers), progress_bar(console) as progress:
         task = progress.add_task("epochs", total=2 * config.epochs * len(wanted))
         for number, category in enumerate(wanted):
             if category not in data:
