@@ -15,6 +15,8 @@ from toolkit.contacts.stance import Contact, Stance
 from toolkit.execution.run import execute
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import Pose
+from toolkit.pipeline.observer import Observer
+from toolkit.pipeline.warmup import warm_up
 from toolkit.robot.loader import load_robot
 from toolkit.wholebody.limb_paths import limb_paths
 from toolkit.wholebody.plan import whole_body
@@ -32,6 +34,13 @@ FLAT = """
   </worldbody>
 </mujoco>
 """
+
+
+def pytest_sessionstart(session):
+    """Where several processes test, compile the kernels of runs before each of them does."""
+    if session.config.getoption("numprocesses", None):
+        with warm_up(Observer()):
+            pass
 
 
 class Plan:
