@@ -170,6 +170,33 @@ def test_triangles_lie_on_their_geoms():
     assert np.linalg.norm(outward, axis=1).min() > 0
 
 
+@pytest.mark.parametrize(
+    ("kind", "size"),
+    [
+        ("sphere", [3.0]),
+        ("sphere", [0.1]),
+        ("ellipsoid", [0.6, 0.4, 0.1]),
+        ("capsule", [0.03, 0.2]),
+        ("capsule", [0.5, 0.8]),
+    ],
+)
+def test_polyhedra_hug_round_geoms(kind, size):
+    """A ball that lies deep in the ground takes no more of it than it does for MuJoCo."""
+    text = f'<geom type="{kind}" size="{" ".join(map(str, size))}" pos="9 0.2 0.3" euler="80 10 20"/>'
+    model = make_world(FLOOR, text).mujoco_model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    pose = Pose(data.geom_xmat[1].reshape(3, 3), data.geom_xpos[1])
+    corners = pose.inverse() @ world_triangles(model, np.full(3, -20.0), np.full(3, 20.0))[2:]
+    parts = np.random.default_rng(0).dirichlet(np.ones(3), (20, len(corners)))
+    points = np.einsum("nkc,kcx->nkx", parts, corners).reshape(-1, 3)
+    if kind == "capsule":
+        points[:, 2] -= np.clip(points[:, 2], -size[1], size[1])
+    radii = np.array(size if kind == "ellipsoid" else size[:1] * 3)
+    beyond = np.linalg.norm(points / radii, axis=1) - 1.0
+    assert beyond.min() > 0.0 and beyond.max() * radii.max() < 0.0105
+
+
 @pytest.mark.parametrize(("used", "slides"), [(0.93, False), (0.975, True), (1.05, True)])
 def test_ground_on_which_plans_have_no_friction_left_slides(robot, used, slides):
     """Feet could rest a little below the friction angle, but a plan that rests there has nothing left to steer with."""

@@ -11,10 +11,11 @@ import numpy as np
 import shapely
 
 from toolkit.geometry.pose import Pose
-from toolkit.geometry.triangles import height_field_triangles, mesh_vertices
+from toolkit.geometry.triangles import ball, height_field_triangles, mesh_vertices
 
 _WIDE = 100.0  # m; width and depth of the half space under a plane beyond the square
 _SIDES = 48  # sides of a prism that replaces a cylinder
+_DIVISIONS = 3  # of a `ball` that replaces a sphere
 
 
 @dataclass(frozen=True)
@@ -175,12 +176,12 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
         circle = size[0] / np.cos(np.pi / _SIDES) * np.column_stack([np.cos(angle), np.sin(angle)])
         return [_hull(_extruded(circle, -size[1], size[1]))]
     if kind == types.mjGEOM_SPHERE:
-        return [_hull(_ball() * size[0])]
+        return [_hull(ball(_DIVISIONS)[0] * size[0])]
     if kind == types.mjGEOM_ELLIPSOID:
-        return [_hull(_ball() * size)]
+        return [_hull(ball(_DIVISIONS)[0] * size)]
     if kind == types.mjGEOM_CAPSULE:
-        ball = _ball() * size[0]
-        return [_hull(np.concatenate([ball + [0, 0, size[1]], ball - [0, 0, size[1]]]))]
+        ends = ball(_DIVISIONS)[0] * size[0]
+        return [_hull(np.concatenate([ends + [0, 0, size[1]], ends - [0, 0, size[1]]]))]
     if kind == types.mjGEOM_MESH:
         return [_hull(mesh_vertices(model, int(model.geom_dataid[index])).astype(float))]
     if kind == types.mjGEOM_HFIELD:
@@ -189,15 +190,6 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
         foot = top * [1, 1, 0] + [0, 0, -model.hfield_size[model.geom_dataid[index], 3]]
         return [(np.concatenate([foot, top], axis=1), _PRISM_EDGES)]
     return []
-
-
-def _ball() -> np.ndarray:
-    """Corners (642, 3) of a polyhedron around the unit sphere."""
-    import trimesh  # here, since it takes long to import
-
-    ball = trimesh.creation.icosphere(subdivisions=3)
-    inside = (ball.triangles[:, 0] * ball.face_normals).sum(axis=1).min()
-    return np.asarray(ball.vertices) / inside
 
 
 def _extruded(ring: np.ndarray, low: float, high: float) -> np.ndarray:

@@ -6,9 +6,10 @@ import mujoco
 import numpy as np
 
 from toolkit.geometry.pose import Pose
-from toolkit.geometry.triangles import height_field_triangles, mesh_triangles, mesh_vertices
+from toolkit.geometry.triangles import ball, height_field_triangles, mesh_triangles, mesh_vertices
 
 _SIDES = 16  # sides of a prism around a cylinder
+_BALLS = (0.04, 0.14, 0.55, 2.2)  # m; largest radii of balls of 0 to 3 divisions, which reach out by a centimetre
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _FACES = np.array(
     [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
@@ -19,7 +20,7 @@ _FACES = np.array(
 def world_triangles(model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Triangles (t, 3, 3) m in the world frame of all colliding geoms that come near a box with corners (3,) m.
 
-    Boxes around rounded geoms and prisms around cylinders stand for these.
+    Polyhedra around rounded geoms and prisms around cylinders stand for these.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -62,13 +63,24 @@ def _local(model: mujoco.MjModel, index: int) -> np.ndarray:
                 triangle((zero, high), (a, high), (b, high)),
             ]
         )
-    half = {
-        types.mjGEOM_BOX: size,
-        types.mjGEOM_ELLIPSOID: size,
-        types.mjGEOM_SPHERE: size[[0, 0, 0]],
-        types.mjGEOM_CAPSULE: [size[0], size[0], size[0] + size[1]],
-    }.get(mujoco.mjtGeom(int(kind)))
-    return np.zeros((0, 3, 3)) if half is None else (_CORNERS * half)[_FACES]
+    if kind == types.mjGEOM_BOX:
+        return (_CORNERS * size)[_FACES]
+    if kind == types.mjGEOM_SPHERE or kind == types.mjGEOM_ELLIPSOID:
+        points, faces = _ball(size if kind == types.mjGEOM_ELLIPSOID else size[[0, 0, 0]])
+        return points[faces]
+    if kind == types.mjGEOM_CAPSULE:
+        from scipy.spatial import ConvexHull  # here, since it takes long to import
+
+        points, _ = _ball(size[[0, 0, 0]])
+        points = np.concatenate([points + [0, 0, size[1]], points - [0, 0, size[1]]])
+        return points[ConvexHull(points).simplices]
+    return np.zeros((0, 3, 3))
+
+
+def _ball(radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) m and triangles (k, 3) of a polyhedron around the ellipsoid with the radii (3,) m."""
+    points, faces = ball(int(np.searchsorted(_BALLS, radii.max())))
+    return points * radii, faces
 
 
 def _plane(pose: Pose, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
