@@ -64,7 +64,7 @@ def test_a_robot_goes_through_every_command(name, tmp_path, monkeypatch):
     assert trained("collect", "--out", data, "--samples", "8") == 0
     samples = read_dataset(tmp_path / "data", robot.fingerprint)
     assert list(samples) == categories and min(group.known.sum() for group in samples.values()) >= 8
-    assert trained("fit", "--data", data, "--epochs", "2") == 0
+    assert trained("fit", "--data", data, "--epochs", "2", "--workers", "1") == 0
     assert list(load_networks(robot)) == categories
     assert trained("evaluate", "--data", data, "--count", "20", "--split", "all") == 0
     assert planned("learned") in (0, 1)  # what so little training says of a plan is open

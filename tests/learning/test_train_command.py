@@ -22,7 +22,8 @@ def dataset(tmp_path_factory):
 
 
 def fit(dataset, out, *more):
-    return train.main(["fit", "--data", str(dataset), "--out", str(out), "--epochs", "2", "--categories", "0", *more])
+    options = ["--data", str(dataset), "--out", str(out), "--epochs", "2", "--categories", "0", "--workers", "1"]
+    return train.main(["fit", *options, *more])
 
 
 def test_fit_writes_networks_and_curves_and_goes_on_after_a_stop(dataset, tmp_path, capsys):
