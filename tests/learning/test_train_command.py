@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import torch
 
 from tests.learning.test_fit import HERE, samples
 from toolkit import train
@@ -36,6 +37,12 @@ def test_fit_writes_networks_and_curves_and_goes_on_after_a_stop(dataset, tmp_pa
     assert fit(dataset, tmp_path, "--resume", "--seed", "1") == 0
     assert "trained already" not in capsys.readouterr().out
     assert (tmp_path / "category_0.safetensors").read_bytes() != first
+
+
+def test_threads_are_as_before(dataset, tmp_path):
+    before = torch.get_num_threads()
+    assert fit(dataset, tmp_path, "--workers", str(before + 1)) == 0
+    assert torch.get_num_threads() == before
 
 
 def test_classifiers_are_kept(dataset, tmp_path):

@@ -58,3 +58,9 @@ def ball(divisions: int) -> tuple[np.ndarray, np.ndarray]:
     sphere = trimesh.creation.icosphere(subdivisions=divisions)
     inside = (sphere.triangles[:, 0] * sphere.face_normals).sum(axis=1).min()
     return np.asarray(sphere.vertices) / inside, np.asarray(sphere.faces)
+
+
+def capsule_points(radius: float, half_length: float, divisions: int) -> np.ndarray:
+    """Points (n, 3) m of two balls at the ends of a capsule along z, whose hull is around it; see `ball`."""
+    end, shift = radius * ball(divisions)[0], np.array([0.0, 0.0, half_length])
+    return np.concatenate([end + shift, end - shift])

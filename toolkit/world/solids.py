@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 
 from toolkit.geometry.pose import Pose
-from toolkit.geometry.triangles import ball, height_field_triangles, mesh_vertices
+from toolkit.geometry.triangles import ball, capsule_points, height_field_triangles, mesh_vertices
 
 _WIDE = 100.0  # m; width and depth of the half space under a plane beyond the square
 _SIDES = 48  # sides of a prism that replaces a cylinder
@@ -180,8 +180,7 @@ def _local_solids(model, index: int, pose: Pose, square: tuple[float, ...]):
     if kind == types.mjGEOM_ELLIPSOID:
         return [_hull(ball(_DIVISIONS)[0] * size)]
     if kind == types.mjGEOM_CAPSULE:
-        ends = ball(_DIVISIONS)[0] * size[0]
-        return [_hull(np.concatenate([ends + [0, 0, size[1]], ends - [0, 0, size[1]]]))]
+        return [_hull(capsule_points(size[0], size[1], _DIVISIONS))]
     if kind == types.mjGEOM_MESH:
         return [_hull(mesh_vertices(model, int(model.geom_dataid[index])).astype(float))]
     if kind == types.mjGEOM_HFIELD:

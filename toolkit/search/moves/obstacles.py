@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from toolkit.geometry.pose import Pose
-from toolkit.geometry.triangles import ball, height_field_triangles, mesh_triangles, mesh_vertices
+from toolkit.geometry.triangles import ball, capsule_points, height_field_triangles, mesh_triangles, mesh_vertices
 
 _SIDES = 16  # sides of a prism around a cylinder
 _BALLS = (0.04, 0.14, 0.55, 2.2)  # m; largest radii of balls of 0 to 3 divisions, which reach out by a centimetre
@@ -65,22 +65,27 @@ def _local(model: mujoco.MjModel, index: int) -> np.ndarray:
         )
     if kind == types.mjGEOM_BOX:
         return (_CORNERS * size)[_FACES]
-    if kind == types.mjGEOM_SPHERE or kind == types.mjGEOM_ELLIPSOID:
-        points, faces = _ball(size if kind == types.mjGEOM_ELLIPSOID else size[[0, 0, 0]])
-        return points[faces]
+    if kind == types.mjGEOM_SPHERE:
+        return _ellipsoid(size[[0, 0, 0]])
+    if kind == types.mjGEOM_ELLIPSOID:
+        return _ellipsoid(size)
     if kind == types.mjGEOM_CAPSULE:
         from scipy.spatial import ConvexHull  # here, since it takes long to import
 
-        points, _ = _ball(size[[0, 0, 0]])
-        points = np.concatenate([points + [0, 0, size[1]], points - [0, 0, size[1]]])
+        points = capsule_points(size[0], size[1], _divisions(size[0]))
         return points[ConvexHull(points).simplices]
     return np.zeros((0, 3, 3))
 
 
-def _ball(radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) m and triangles (k, 3) of a polyhedron around the ellipsoid with the radii (3,) m."""
-    points, faces = ball(int(np.searchsorted(_BALLS, radii.max())))
-    return points * radii, faces
+def _ellipsoid(radii: np.ndarray) -> np.ndarray:
+    """(t, 3, 3) m; triangles around an ellipsoid with radii (3,) m."""
+    points, faces = ball(_divisions(radii.max()))
+    return (points * radii)[faces]
+
+
+def _divisions(radius: float) -> int:
+    """Divisions of a ball of a radius in m."""
+    return int(np.searchsorted(_BALLS, radius))
 
 
 def _plane(pose: Pose, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
