@@ -8,7 +8,7 @@ from typing import Any
 from toolkit import cli
 from toolkit.drafts import write_whole
 from toolkit.report.console import make_console
-from toolkit.robot.loader import default_robot, load_robot
+from toolkit.robot.loader import load_robot
 from validation import goals, map_families, map_scale, map_worlds, options
 from validation.goals import Goal
 from validation.growing import add_growing_options, growth_note, stamped, state_of, take_over
@@ -105,7 +105,7 @@ def main(argv: list[str] | None = None) -> int:
     settings = options.trial_settings(args)
     robot = load_robot(settings.robot, settings.robots)
     scale = robot.scale.length
-    title = "map" if robot.name == default_robot(settings.robots) else f"map_{robot.name}"
+    title = options.results_name("map", robot, args)
     families = list(dict.fromkeys(args.families))
     cells = {cell.name: cell for cell in cells_of(families, quick=args.quick, seeds=args.seeds, first=args.seed_offset)}
     results = args.results or (options.RESULTS if args.add_results else args.out / "results")

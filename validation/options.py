@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from toolkit import cli
+from toolkit.errors import RobotError
 from toolkit.execution.config import ExecutionConfig
 from toolkit.pipeline import planner_kind
 from toolkit.prediction.networks import load_networks
-from toolkit.robot.loader import load_robot
+from toolkit.robot.loader import default_robot, load_robot
+from toolkit.robot.model import RobotModel
 from validation.cases import kind_of
 from validation.fresh_seeds import fresh_seed
 from validation.goals import NOT_MET, Goal
@@ -152,6 +154,15 @@ def trial_settings(args: argparse.Namespace) -> TrialSettings:
     replanning = getattr(args, "replanning", True)  # not every experiment executes
     planning = cli.PlanningOptions.of(args)
     return TrialSettings(folder.name, folder.parent, planner, planning, args.out.resolve(), replanning=replanning)
+
+
+def results_name(program: str, robot: RobotModel, args: argparse.Namespace) -> str:
+    """Name of a program's results: the program's for the robot that is used if none is named, else with the robot's."""
+    try:
+        default = args.robot is None or robot.name == default_robot(args.robots)
+    except RobotError:  # a folder of several robots, of which one was named
+        default = False
+    return program if default else f"{program}_{robot.name}"
 
 
 def first_seed(args: argparse.Namespace, purpose: str) -> int:

@@ -19,7 +19,7 @@ from toolkit.learning.samples import Samples
 from toolkit.prediction.network import TransitionNetwork, training_summary
 from toolkit.prediction.networks import load_networks
 from toolkit.report.console import make_console
-from toolkit.robot.loader import default_robot, load_robot
+from toolkit.robot.loader import load_robot
 from toolkit.robot.model import RobotModel
 from validation import goals, options
 from validation.encodings import EncodingScore, compare_encodings
@@ -187,7 +187,7 @@ def main(argv: list[str] | None = None) -> int:
     """Run the experiment; returns the exit code."""
     args, console = _arguments(argv), make_console()
     robot = load_robot(args.robot, args.robots)
-    name = "prediction" if robot.name == default_robot(args.robots) else f"prediction_{robot.name}"
+    name = options.results_name("prediction", robot, args)
     networks = load_networks(robot, args.networks)
     folder = args.networks or robot.folder / "networks"
     seed = fresh_seed(folder, "prediction") if args.seed is None else args.seed

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -159,3 +160,19 @@ def test_results_name_no_folder_of_a_machine(tmp_path, monkeypatch):
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert shown(tmp_path / "out" / "runs" / "one", tmp_path / "out") == "OUT/runs/one"
+
+
+def test_results_bear_the_name_of_a_robot_that_is_not_the_default(tmp_path):
+    from argparse import Namespace
+
+    shipped, folder = Path("robots").resolve(), tmp_path / "robots"
+    for name in ("one", "two"):  # a folder of several robots without a default
+        (folder / name).mkdir(parents=True)
+        (folder / name / "robot.toml").write_text("")
+    default = (shipped / "default").read_text().strip()
+    named = [(None, None, default), (default, None, default), ("one", None, "one"), ("one", folder, "one")]
+    found = [
+        options.results_name("map", SimpleNamespace(name=name), Namespace(robot=robot, robots=robots))
+        for robot, robots, name in named
+    ]
+    assert found == ["map", "map", "map_one", "map_one"]
