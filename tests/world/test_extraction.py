@@ -285,7 +285,7 @@ def test_flush_boxes_of_equal_friction_are_one_surface(make_world):
     [
         'size="0.5 0.5 0.1" pos="1 0 -0.1" friction="0.6"',
         'size="0.5 0.5 0.1" pos="1 0 -0.105"',
-        'size="0.5 0.5 0.1" pos="1.01 0 -0.1"',
+        'size="0.5 0.5 0.1" pos="1.017 0 -0.1"',
         'size="0.5 0.5 0.1" pos="1 0 -0.1" euler="0 0.6 0"',
     ],
     ids=["friction", "step", "gap", "angle"],
@@ -297,6 +297,39 @@ def test_boxes_that_are_not_flush_stay_apart(make_world, second):
     assert len(tops(world)) == 2
     for surface in tops(world):
         assert area_of(surface) == pytest.approx(1.0, abs=6e-3)
+
+
+@pytest.mark.parametrize("seam", [0.005, 0.012, 0.015])
+@pytest.mark.parametrize("board", [0.06, 0.09, 0.2])
+def test_boards_with_seams_are_one_surface(make_world, seam, board):
+    """Boards and pavers with joints bear soles as an unbroken floor does, however narrow they are."""
+    rng = np.random.default_rng(3)
+    boards = "".join(
+        f'<geom name="b{i}" type="box" size="{board / 2} 0.5 0.05" '
+        f'pos="{(board + seam) * i} 0 {-0.05 + rng.uniform(-4e-4, 4e-4):.5f}"/>'
+        for i in range(12)
+    )
+    (top,) = tops(make_world(boards))
+    assert area_of(top) == pytest.approx(12 * board + 11 * seam, rel=1e-3)
+    assert len(top.boundary) == 1
+
+
+def test_bars_wider_apart_than_a_seam_are_not_ground(make_world):
+    bars = "".join(f'<geom type="box" size="0.02 0.5 0.05" pos="{0.06 * i} 0 -0.05"/>' for i in range(12))
+    with pytest.raises(WorldError, match="surface"):
+        make_world(bars)
+
+
+def test_tiles_that_touch_in_a_blunt_corner_are_one_surface_there(make_world):
+    """A polygon touches an edge with one of its corners: the gap on both sides is a seam near by."""
+    prism = trimesh.creation.cylinder(radius=0.6, height=0.2, sections=16)
+    world = make_world(
+        '<geom name="round" type="mesh" mesh="round" pos="0 0 -0.1"/>'
+        '<geom name="b" type="box" size="0.5 0.5 0.1" pos="1.1 0 -0.1"/>',
+        assets=mesh_asset("round", prism),
+    )
+    (top,) = tops(world)
+    assert top.geom in ("b+round", "round+b")
 
 
 @pytest.mark.parametrize("seed", range(4))

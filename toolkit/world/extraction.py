@@ -22,6 +22,8 @@ from toolkit.world.surface import Surface
 _BATCH = 256  # faces that are processed together
 _LARGEST = 12  # shadows that are subtracted one after the other
 _MANY = 50  # groups of at least this many faces are joined at once, others face by face
+_ROUNDING = 1e-6  # m
+_SHARP, _NARROW = 20.0, 5.0  # mitres: corners of less than 6 degrees lose their tips, notches of less than 23 are closed
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,9 @@ class SurfaceConfig:
         overhang: Room needed above ground below what hangs free, such as a bar to step over, m: a foot has room there,
             and its shin does not.
         flush: Geometry up to this height above a surface does not cover it, m. Faces of equal friction whose
-            planes differ by less and that are no further apart are one surface.
+            planes differ by less and that are no further apart than a seam are one surface.
+        seam: Width of a gap between flush faces that soles and palms span, m: their planned centres of pressure stay
+            further inside than what such a gap may take off their edges.
         flush_angle: Largest angle between the normals of merged faces, rad.
         foot_area, palm_area: Smaller regions are dropped, m^2.
         foot_width, palm_width: Regions in which no circle of this diameter fits are dropped, m.
@@ -51,6 +55,7 @@ class SurfaceConfig:
     clearance: float = 0.15
     overhang: float = 0.3
     flush: float = 1e-3
+    seam: float = 0.015
     flush_angle: float = np.radians(0.5)
     foot_area: float = 0.01
     palm_area: float = 3e-3
@@ -155,7 +160,7 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
                 if np.abs((frame.inverse() @ outlines[other])[:, 2]).max() > config.flush:
                     return False
                 shapes[other] = _in_frame(faces[other], frame)
-            return shapely.dwithin(shapes[here], shapes[other], config.flush)
+            return shapely.dwithin(shapes[here], shapes[other], config.seam + _ROUNDING)
 
         members, waiting = [seed], [seed]
         while waiting:
@@ -171,7 +176,7 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
             continue
         parts, others = [shapes[seed]], [shapes[member] for member in members[1:]]
         for batch in [[other] for other in others] if len(others) < _MANY else [others]:
-            parts = _sealed([*parts, *batch], config.flush)
+            parts = _sealed([*parts, *batch], config.seam)
         inside = shapely.point_on_surface([shapes[member] for member in members])
         for part in parts:
             own = [members[index] for index in np.flatnonzero(shapely.dwithin(inside, part, config.flush)).tolist()]
@@ -186,8 +191,8 @@ def _near_pairs(
     faces: list[Face], normals: np.ndarray, outlines: list[np.ndarray], config: SurfaceConfig
 ) -> np.ndarray:
     """Ordered pairs (2, k) of faces with equal friction and touching boxes that may lie in one plane."""
-    low = np.array([points.min(axis=0) for points in outlines]) - config.flush
-    high = np.array([points.max(axis=0) for points in outlines]) + config.flush
+    low = np.array([points.min(axis=0) for points in outlines]) - config.seam
+    high = np.array([points.max(axis=0) for points in outlines]) + config.seam
     friction = np.array([face.friction for face in faces])
     boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
     pairs = shapely.STRtree(boxes).query(boxes)
@@ -211,10 +216,11 @@ def _in_frame(face: Face, frame: Pose) -> Polygon:
 
 def _sealed(shapes: list[Polygon], gap: float) -> list[Polygon]:
     """Union of shapes in which seams up to `gap` m wide are closed; parts that touch in corners alone stay apart."""
-    union = united(shapes)
-    if isinstance(union, Polygon) and not union.interiors:
+    union, wide = united(shapes), gap / 2 + _ROUNDING
+    closed = union.buffer(wide, join_style="mitre", mitre_limit=_SHARP)
+    closed = closed.buffer(-wide, join_style="mitre", mitre_limit=_NARROW)
+    if isinstance(union, Polygon) and not union.interiors and closed.area - union.area < _ROUNDING * gap:
         return [union]
-    closed = union.buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
     return shapely.get_parts(closed).tolist()
 
 
