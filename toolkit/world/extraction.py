@@ -23,7 +23,7 @@ _BATCH = 256  # faces that are processed together
 _LARGEST = 12  # shadows that are subtracted one after the other
 _MANY = 50  # groups of at least this many faces are joined at once, others face by face
 _ROUNDING = 1e-6  # m
-_SHARP, _NARROW = 20.0, 5.0  # mitres: corners of less than 6 degrees lose their tips, notches of less than 23 are closed
+_SHARP, _NARROW = 20.0, 5.0  # mitres: corners below 6 degrees lose their tips, notches below 23 are closed
 
 
 @dataclass(frozen=True)
