@@ -314,6 +314,17 @@ def test_boards_with_seams_are_one_surface(make_world, seam, board):
     assert len(top.boundary) == 1
 
 
+@pytest.mark.parametrize("seam", [0.0, 0.012])
+def test_boards_of_one_mesh_are_one_surface(make_world, seam):
+    """A scene that was exported as one mesh bears as its parts do."""
+    boards = [trimesh.creation.box((0.09, 1.0, 0.1)) for _ in range(12)]
+    for i, board in enumerate(boards):
+        board.apply_translation([(0.09 + seam) * i, 0, -0.05])
+    assets = mesh_asset("m", trimesh.util.concatenate(boards))
+    (top,) = tops(make_world('<geom type="mesh" mesh="m"/>', assets=assets))
+    assert area_of(top) == pytest.approx(12 * 0.09 + 11 * seam, rel=1e-3)
+
+
 def test_bars_wider_apart_than_a_seam_are_not_ground(make_world):
     bars = "".join(f'<geom type="box" size="0.02 0.5 0.05" pos="{0.06 * i} 0 -0.05"/>' for i in range(12))
     with pytest.raises(WorldError, match="surface"):

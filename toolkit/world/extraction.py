@@ -126,16 +126,17 @@ def _serves(faces: list[Face], config: SurfaceConfig) -> np.ndarray:
 
 
 def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
-    """The faces, with flush faces of different geoms and equal friction joined.
+    """The faces, with flush faces of equal friction joined: of different geoms, and of one mesh that consists of parts.
 
     Every face is compared with the largest face of its group, so that a chain of slightly raised tiles does not become
     one surface.
     """
-    if len({face.geom for face in faces}) < 2:
+    if not faces:
         return faces
     normals = np.array([face.frame.normal for face in faces])
     origins = np.array([face.frame.position for face in faces])
     geoms = np.unique([face.geom for face in faces], return_inverse=True)[1]
+    whole = np.array([face.own is not None for face in faces])  # of those, flush faces of one geom are one already
     outlines = [face.frame @ _with_zeros(shapely.get_coordinates(face.polygon)) for face in faces]
     first, second = _near_pairs(faces, normals, outlines, config)
     size = (len(faces), len(faces))
@@ -167,7 +168,7 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
             here = waiting.pop(0)
             around = graph.indices[graph.indptr[here] : graph.indptr[here + 1]]
             for other in [int(other) for other in np.sort(around) if not used[other]]:
-                if (geoms[other] != geoms[seed] or len(members) > 1) and joins(here, other):
+                if not (whole[other] and geoms[other] == geoms[seed] and len(members) == 1) and joins(here, other):
                     used[other] = True
                     members.append(other)
                     waiting.append(other)
