@@ -118,15 +118,19 @@ def _compiled(path: Path, mjcf: str | None) -> tuple[mujoco.MjSpec, mujoco.MjMod
         raise WorldError(f"{path}: MuJoCo cannot read this world: {one_line(error)}") from error
 
 
+def _body_label(model: mujoco.MjModel, body: int) -> str:
+    return model.body(body).name or f"body#{body}"
+
+
 def _check_static(path: Path, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     if model.njnt:
         joint = model.joint(0)
-        body = model.body(int(model.jnt_bodyid[0])).name or f"body#{int(model.jnt_bodyid[0])}"
         what = f"joint '{joint.name}'" if joint.name else "a joint"
+        body = _body_label(model, int(model.jnt_bodyid[0]))
         raise WorldError(f"{path}: body '{body}' moves ({what}); a world is static, remove the joint")
     if model.nmocap:
-        body = int(np.argmax(model.body_mocapid >= 0))
-        raise WorldError(f"{path}: body '{model.body(body).name}' is a mocap body; a world is static, remove mocap")
+        body = _body_label(model, int(np.argmax(model.body_mocapid >= 0)))
+        raise WorldError(f"{path}: body '{body}' is a mocap body; a world is static, remove mocap")
     for count, what in (
         (model.nu, "an actuator"),
         (model.neq, "an equality constraint"),
