@@ -149,7 +149,7 @@ CASES = {
     ),
     "free_joint": (mjcf_of(FLOOR + '<body name="ball"><freejoint/><geom size="0.1"/></body>'), "body 'ball' moves"),
     "mocap": (mjcf_of(FLOOR + '<body name="hand" mocap="true"><geom size="0.1"/></body>'), "'hand' is a mocap body"),
-    "mocap without a name": (mjcf_of(FLOOR + '<body mocap="true"><geom size="0.1"/></body>'), "'body#1' is a mocap body"),
+    "mocap_number": (mjcf_of(FLOOR + '<body mocap="true"><geom size="0.1"/></body>'), "'body#1' is a mocap body"),
     "equality": (
         mjcf_of(FLOOR + '<body name="a"/>', more='<equality><weld body1="a"/></equality>'),
         "the world has an equality constraint",
