@@ -147,6 +147,13 @@ def ankle_at(position, rotation, ankle_in_sole):
 
 
 @law
+def drop_to(hip, ankle, length):
+    """By how many m a hip has to be lower to be `length` m from its ankle; to its height where it is farther."""
+    x, y, z = between(hip, ankle)
+    return -z - np.sqrt(np.fmax(length * length - x * x - y * y, 0.0))
+
+
+@law
 def between(a, b):
     """The way from a to b."""
     return b[0] - a[0], b[1] - a[1], b[2] - a[2]

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from toolkit.centroidal.build import initial_com
 from toolkit.contacts.sequence import ContactTransition
 from toolkit.contacts.stance import Stance
 from toolkit.errors import PlanningError
@@ -127,7 +128,7 @@ class ContactPlanner:
         began = time.perf_counter()
         way = self.ground.way(start)
         heuristic_seconds = time.perf_counter() - began
-        com = start.mean_feet.position + np.array([0.0, 0.0, self.robot.com_height])
+        com = initial_com(self.robot, start)
         tally, timings = Tally(), self.timings(calmer, slides=way.slides)
         self._warm_up(start, com, timings)
         strategy, blame = self.strategy(way), Blame(exclusions, _STRIKES, scale=self.robot.scale.length)

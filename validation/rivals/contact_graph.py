@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from toolkit.centroidal.build import initial_com
 from toolkit.contacts.sequence import ContactSequence
 from toolkit.search.judging import Tally
 from toolkit.search.moves.candidates import mean_feet
@@ -55,7 +56,7 @@ def contact_graph(planner: ContactPlanner) -> ContactGraph:
     start = ground.start_stance()
     way = ground.way(start)
     parts = planner.parts(way, planner.strategy(way), planner.timings(slides=way.slides), Tally())
-    com = start.mean_feet.position + np.array([0.0, 0.0, robot.com_height])
+    com = initial_com(robot, start)
     problem = ContactProblem(parts, parts.reader.at_rest(start, com))
     return ContactGraph(problem, parts, _box(planner), planner.world.goal.position[:2])
 

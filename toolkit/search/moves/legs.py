@@ -14,6 +14,7 @@ from toolkit.physics.leg import (
     ReachMargins,
     ankle_at,
     distance,
+    drop_to,
     hip_at,
     hip_joints,
     posture_between,
@@ -91,17 +92,13 @@ def reach(legs, side, com, yaw, position, rotation, lean=np.inf):
 def least_drop(legs, com, yaw, left, left_rotation, right, right_rotation):
     """By how many m a CoM has to be lower for both legs to reach their soles, bent as little as they may be.
 
-    Below 0 where it may be higher, infinite where they do not reach at any height; arguments: see `reach`.
+    Below 0 where it may be higher, down to the ankles where they do not reach at any height; arguments: see `reach`.
     """
     heading, least = (np.cos(yaw), np.sin(yaw)), -np.inf
     for side in range(2):
         position, rotation = (left, left_rotation) if side == 0 else (right, right_rotation)
         hip, ankle = hip_at(com, heading, legs.hip[side]), ankle_at(position, rotation, legs.ankle[side])
-        longest = legs.ranges[side, _LENGTH, 1] - _BARELY
-        upright = longest**2 - (hip[0] - ankle[0]) ** 2 - (hip[1] - ankle[1]) ** 2
-        if upright <= 0.0:
-            return np.inf
-        least = max(least, hip[2] - ankle[2] - np.sqrt(upright))
+        least = max(least, drop_to(hip, ankle, legs.ranges[side, _LENGTH, 1] - _BARELY))
     return least
 
 
