@@ -1,19 +1,23 @@
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.search.worlds import FLOOR, box, corridor, make_world
+from toolkit.centroidal.build import initial_com
 from toolkit.contacts.category import Category, category_of
 from toolkit.contacts.failure import Failure
 from toolkit.errors import InputError, PlanningError
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
+from toolkit.physics.leg import PLANNED, ReachMargins, leg_clearances
 from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig, backwards
 from toolkit.search.planner import ContactPlanner, PlannerConfig
+from toolkit.world.loader import load_world
 from toolkit.world.timing import Timing
 
 QUICK = PlannerConfig(search=AnaStarConfig(max_expansions=150))
@@ -90,6 +94,37 @@ def test_start_stance_is_the_home_stance(robot):
     np.testing.assert_allclose(stance.mean_feet.position[1:], [-0.2, 0], atol=1e-6)
     width = stance[Limb.LEFT_FOOT].pose.position[1] - stance[Limb.RIGHT_FOOT].pose.position[1]
     assert 0.1 < width < 0.4
+
+
+@pytest.mark.parametrize("slope", [0.0, 10.0, 20.0, 26.0])
+@pytest.mark.parametrize("heading", range(0, 360, 45))
+def test_robots_that_find_a_stance_at_the_start_stand_within_their_limits(robot, slope, heading):
+    """Where the ground is steep, or ankles are narrow, the CoM at rest is lower, or over one of the feet."""
+    stiff = dict(ankle_roll=(-0.26, 0.26), ankle_pitch=(-0.86, 0.53))
+    legs = {
+        limb: replace(leg, max_length=leg.max_length - 0.03, ranges=leg.ranges | stiff)
+        for limb, leg in robot.legs.items()
+    }
+    robot, up = replace(robot, legs=legs), np.tan(np.radians(slope))
+    world = load_world(
+        "slope.xml",
+        mjcf=f"""<mujoco><worldbody><geom type="plane" size="0 0 1" euler="0 {-slope} 0" friction="0.9"/>
+        <site name="start" pos="0 0 0" euler="0 0 {heading}"/>
+        <site name="goal" type="cylinder" pos="2 0 {2 * up}" size="0.3 0.1"/></worldbody></mujoco>""",
+    )
+    try:
+        stance = ContactPlanner(robot, world, KinematicEvaluator(robot)).ground.start_stance()
+    except PlanningError as error:
+        assert slope > 15.0 and "ankle" in str(error)
+        return
+    com, feet = initial_com(robot, stance), stance.mean_feet
+    if slope == 0.0:
+        np.testing.assert_array_equal(com, feet.position + [0.0, 0.0, robot.com_height])
+    for limb in FEET:
+        sole = stance[limb].pose
+        posed = com[None], np.array([feet.yaw]), sole.position[None], sole.rotation[None]
+        spare = leg_clearances(legs[limb], *posed, ReachMargins(ankle=0.0))
+        assert all(spare[limit.name][0] > 0.0 for limit in PLANNED)
 
 
 def test_a_gap_needs_places_drawn_from_the_ground(robot):
