@@ -218,7 +218,7 @@ def _in_frame(face: Face, frame: Pose) -> Polygon:
 def _sealed(shapes: list[Polygon], gap: float) -> list[Polygon]:
     """Union of shapes in which seams up to `gap` m wide are closed; parts that touch in corners alone stay apart."""
     union, wide = united(shapes), gap / 2 + _ROUNDING
-    closed = union.buffer(wide, join_style="mitre", mitre_limit=_SHARP)
+    closed = shapely.remove_repeated_points(union, _ROUNDING).buffer(wide, join_style="mitre", mitre_limit=_SHARP)
     closed = closed.buffer(-wide, join_style="mitre", mitre_limit=_NARROW)
     if isinstance(union, Polygon) and not union.interiors and closed.area - union.area < _ROUNDING * gap:
         return [union]
