@@ -13,6 +13,7 @@ from toolkit.contacts.transition_rows import TransitionRows
 from toolkit.geometry.heading import mean_heading, wrapped
 from toolkit.geometry.limb import FEET
 from toolkit.geometry.pose import rotation_about_z, yaw_of
+from toolkit.physics.leg import drop_to
 from toolkit.prediction.evaluator import TransitionBatch, TransitionEvaluator
 from toolkit.robot.model import RobotModel
 
@@ -96,8 +97,6 @@ class KinematicEvaluator(TransitionEvaluator):
         for side, limb in enumerate(FEET):
             leg = self._robot.legs[limb]
             ankle = position[:, side] + rotation[:, side] @ leg.ankle_in_sole
-            away = mean + turn @ leg.hip_in_com - ankle
-            reach = leg.max_length - margin
-            rise = np.sqrt(np.maximum(reach**2 - away[:, 0] ** 2 - away[:, 1] ** 2, 0.0))
-            com[:, 2] = np.minimum(com[:, 2], ankle[:, 2] + rise - leg.hip_in_com[2])
+            drop = drop_to((com + turn @ leg.hip_in_com).T, ankle.T, leg.max_length - margin)
+            com[:, 2] -= np.maximum(drop, 0.0)
         return com
