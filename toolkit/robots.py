@@ -166,10 +166,14 @@ def _describe(console: Console, robot: RobotModel) -> None:
 
     from toolkit.report.console import print_warnings
     from toolkit.robot.description import FILE_NAME, read_description
+    from toolkit.search.moves.occupancy import BodyBox
 
     facts = read_description(robot.folder / FILE_NAME)
     console.print(f"{robot.name}: {facts.description}\nlicence {facts.licence}; source: {facts.source}", markup=False)
     console.print(f"{robot.mass:.2f} kg, CoM at {robot.com_height:.3f} m, {len(robot.joint_names)} joints")
+    body = BodyBox.of(robot)
+    size = f"{2 * body.half_depth:.2f} m deep and {2 * body.half_width:.2f} m wide"
+    console.print(f"at home its body is {size} from the knees up: doors and corridors have to be wider")
     limbs = Table("limb", "patch, m", "max N", "segments, m", "reach, m")
     for limb, model in robot.limbs.items():
         if limb in robot.legs:

@@ -13,6 +13,7 @@ from tests.shipped_robots import OWN
 from toolkit import robots
 from toolkit.errors import InputError, PackageError, RobotError, ToolkitError
 from toolkit.robot.loader import find_robots, load_robot
+from toolkit.search.moves.occupancy import BodyBox
 
 
 @pytest.mark.slow
@@ -49,6 +50,8 @@ def test_describes_one(capsys: pytest.CaptureFixture) -> None:
     assert robots.main([OWN[0]]) == 0
     text = capsys.readouterr().out
     assert "left_foot" in text and "right_foot" in text and "licence" in text
+    body = BodyBox.of(load_robot(OWN[0]))
+    assert f"{2 * body.half_width:.2f} m wide" in text
 
 
 def test_bad_arguments(tmp_path: Path) -> None:
