@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from toolkit.contacts.category import Category
 from toolkit.report.colors import EXECUTED, OPTIMISED, unit
@@ -32,7 +33,7 @@ def draw_curves(curves: Mapping[Category, Mapping[str, Losses]], path: Path) -> 
             if name in networks:
                 _draw(axes, networks[name])
     for axes in panels[-1]:
-        axes.set_xlabel("epoch")
+        axes.set_xlabel("epoch", fontsize=8)
     FigureCanvasAgg(figure).print_figure(str(path), dpi=100)
 
 
@@ -43,5 +44,8 @@ def _draw(axes, losses: Losses) -> None:
     axes.semilogy(validation, color=unit(EXECUTED), label="validation")
     axes.axvline(int(np.argmin(validation)), color="0.5", lw=0.8, ls="--", label="kept")
     axes.grid(alpha=0.3)
-    axes.tick_params(labelsize=7)
+    axes.yaxis.set_minor_locator(LogLocator(subs=(2, 5)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("{x:g}")
+    axes.tick_params(which="both", labelsize=7)
     axes.legend(fontsize=7)
