@@ -17,7 +17,6 @@ from toolkit.prediction.kinematic import KinematicConfig, KinematicEvaluator
 from toolkit.search.anytime.ana_star import AnaStarConfig
 from toolkit.search.costs.edge_cost import CostConfig, backwards
 from toolkit.search.planner import ContactPlanner, PlannerConfig
-from toolkit.world.loader import load_world
 from toolkit.world.timing import Timing
 
 QUICK = PlannerConfig(search=AnaStarConfig(max_expansions=150))
@@ -106,12 +105,8 @@ def test_robots_that_find_a_stance_at_the_start_stand_within_their_limits(robot,
         for limb, leg in robot.legs.items()
     }
     robot, up = replace(robot, legs=legs), np.tan(np.radians(slope))
-    world = load_world(
-        "slope.xml",
-        mjcf=f"""<mujoco><worldbody><geom type="plane" size="0 0 1" euler="0 {-slope} 0" friction="0.9"/>
-        <site name="start" pos="0 0 0" euler="0 0 {heading}"/>
-        <site name="goal" type="cylinder" pos="2 0 {2 * up}" size="0.3 0.1"/></worldbody></mujoco>""",
-    )
+    ground = f'<geom type="plane" size="0 0 1" euler="0 {-slope} 0" friction="0.9"/>'
+    world = make_world(ground, goal=(2.0, 0.0, 2.0 * up), heading=heading)
     try:
         stance = ContactPlanner(robot, world, KinematicEvaluator(robot)).ground.start_stance()
     except PlanningError as error:

@@ -18,8 +18,7 @@ from toolkit.contacts.stance import Contact, Stance
 from toolkit.errors import InputError
 from toolkit.geometry.heading import joint_heading, wrapped
 from toolkit.geometry.limb import FEET, Limb
-from toolkit.geometry.pose import rotation_about_z
-from toolkit.physics.leg import PLANNED, ReachMargins, drop_to, leg_clearances
+from toolkit.physics.leg import PLANNED, ReachMargins, ankle_at, drop_to, hip_at, leg_clearances
 from toolkit.robot.model import RobotModel
 
 MAX_SPEED = 20.0  # m/s; of the initial CoM, as a guard against wrong units
@@ -69,23 +68,23 @@ def initial_com(robot: RobotModel, stance: Stance) -> np.ndarray:
     On feet that are not level, as on a slope across, it is lower, and nearer to one of the feet, by as little as both
     legs need to keep their limits.
     """
-    feet = stance.mean_feet
-    left, right = (stance[limb].pose for limb in FEET)
-    aside = np.array([[*(part * (left.position - right.position)[:2]), 0.0] for part in _ASIDE])
-    down = robot.com_height * np.array([[0.0, 0.0, -part] for part in _DOWN])
-    moved = (aside[:, None] + down).reshape(-1, 3)
-    com, turn = feet.position + np.array([0.0, 0.0, robot.com_height]) + moved, rotation_about_z(feet.yaw)
-    legs, margins = [robot.legs[limb] for limb in FEET], _AT_REST.scaled(robot.scale.length)
-    for leg, sole in zip(legs, (left, right), strict=True):
-        drop = drop_to((com + turn @ leg.hip_in_com).T, sole @ leg.ankle_in_sole, leg.max_length - margins.length)
+    feet, legs = stance.mean_feet, [(robot.legs[limb], stance[limb].pose) for limb in FEET]
+    (_, left), (_, right) = legs
+    aside = np.outer(_ASIDE, [*(left.position - right.position)[:2], 0.0])
+    down = np.outer(_DOWN, [0.0, 0.0, -robot.com_height])
+    com = feet.position + np.array([0.0, 0.0, robot.com_height]) + (aside[:, None] + down).reshape(-1, 3)
+    heading, margins = (math.cos(feet.yaw), math.sin(feet.yaw)), _AT_REST.scaled(robot.scale.length)
+    for leg, sole in legs:
+        ankle = ankle_at(sole.position, sole.rotation, leg.ankle_in_sole)
+        drop = drop_to(hip_at(com.T, heading, leg.hip_in_com), ankle, leg.max_length - margins.length)
         com[:, 2] -= np.maximum(drop, 0.0)
-    count, spare = len(com), np.full(len(com), np.inf)
-    for leg, sole in zip(legs, (left, right), strict=True):
+    count, short = len(com), np.zeros(len(com))
+    for leg, sole in legs:
         posed = np.full(count, feet.yaw), np.tile(sole.position, (count, 1)), np.tile(sole.rotation, (count, 1, 1))
         clearances = leg_clearances(leg, com, *posed, margins)
-        spare = np.minimum(spare, np.min([clearances[limit.name] for limit in PLANNED], axis=0))
+        short = np.maximum(short, np.max([-clearances[limit.name] for limit in PLANNED], axis=0))
     away = np.linalg.norm(com - com[0], axis=1)
-    return com[np.lexsort((away, -np.minimum(spare, 0.0)))[0]]
+    return com[np.lexsort((away, short))[0]]
 
 
 def transition_problem(

@@ -131,7 +131,7 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
     Every face is compared with the largest face of its group, so that a chain of slightly raised tiles does not become
     one surface.
     """
-    if not faces:
+    if len(faces) < 2:
         return faces
     normals = np.array([face.frame.normal for face in faces])
     origins = np.array([face.frame.position for face in faces])
@@ -168,7 +168,7 @@ def _merged(faces: list[Face], config: SurfaceConfig) -> list[Face]:
             here = waiting.pop(0)
             around = graph.indices[graph.indptr[here] : graph.indptr[here + 1]]
             for other in [int(other) for other in np.sort(around) if not used[other]]:
-                if not (whole[other] and geoms[other] == geoms[seed] and len(members) == 1) and joins(here, other):
+                if (geoms[other] != geoms[seed] or len(members) > 1 or not whole[other]) and joins(here, other):
                     used[other] = True
                     members.append(other)
                     waiting.append(other)
