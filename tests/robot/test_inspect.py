@@ -64,7 +64,31 @@ def test_what_is_missing_is_said_at_once(tmp_path: Path, capsys: pytest.CaptureF
     assert robots.main(["--inspect", str(file)]) == 1
     text = capsys.readouterr().out
     assert "does not load yet: look up [limits.velocity] of 12 joints (left_hip_pitch, " in text
-    assert '# "*_knee" =' in text
+    assert '# "*_knee" =' in text and "limits.torque" not in text
+
+
+def test_torques_of_no_motor_are_to_be_looked_up(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    file = tmp_path / "biped.xml"
+    file.write_text(biped_mjcf().replace("-250 250", "-250000 250000"))
+    assert robots.main(["--inspect", str(file)]) == 1
+    text = capsys.readouterr().out
+    assert "look up [limits.torque] of 2 joints (left_knee, right_knee); [limits.velocity] of 12" in text
+    assert '# [limits.torque]\n# "*_knee" =\n' in text
+
+
+def test_a_hand_without_shapes_ends_where_its_inertia_does(tmp_path: Path) -> None:
+    """As hands are that come without the gripper that a program attaches."""
+    (path,) = load_robot(OWN[0]).folder.glob("*.xml")
+    spec = read_model(path).spec
+    before = find_anatomy(spec.compile())
+    hand = spec.body(before.palms[0].body)
+    for geom in list(hand.geoms):
+        spec.delete(geom)
+    hand.mass, hand.ipos, hand.inertia, hand.explicitinertial = 0.5, [0.0, 0.0, -0.08], [6e-4, 6e-4, 2e-4], True
+    found = find_anatomy(spec.compile()).palms[0]
+    half = np.sqrt(1.5 * (6e-4 + 6e-4 + 2e-4 - 2 * np.array([6e-4, 6e-4, 2e-4])) / 0.5)  # of a box with that inertia
+    assert found.seen and not found.shaped and before.palms[0].shaped
+    np.testing.assert_allclose(found.pose.position, [0.0, 0.0, -0.08 - half[2]], atol=2e-3)
 
 
 def test_feet_without_shapes_are_said_to_be_guessed(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -114,3 +114,17 @@ def test_a_mesh_without_a_solid_names_its_link_and_the_remedy(tmp_path: Path) ->
     wanted = r"'sole.dae' of link 'left_sole' holds no solid .* or replace the shape in \[mend.collision\]"
     with pytest.raises(RobotError, match=wanted):
         load_robot(str(folder))
+
+
+def test_all_parts_of_an_obj_count(tmp_path: Path) -> None:
+    """MuJoCo takes the faces of one, here a disc, and refuses a shape without a volume."""
+    box = trimesh.creation.box((0.2, 0.1, 0.02))
+    whole, parts = tmp_path / "whole.obj", tmp_path / "parts.obj"
+    lines = str(box.export(file_type="obj", include_normals=False)).splitlines()
+    faces = [line for line in lines if line.startswith("f ")]
+    corners = [line for line in lines if line.startswith("v ")]
+    whole.write_text("\n".join(["o box", *corners, *faces]))
+    parts.write_text("\n".join([*corners, "o top", *faces[:2], "o rest", *faces[2:]]))
+    assert converted(whole) is None
+    mesh = trimesh.load_mesh(io.BytesIO(converted(parts) or b""), file_type="stl")
+    assert mesh.volume == pytest.approx(box.volume, rel=1e-6)

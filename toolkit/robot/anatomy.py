@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -32,7 +32,8 @@ class FoundPatch:
         size: Full size (2,) m along x and y.
         pad: Whether the patch needs a box of its own: the shape is round there, or does not collide.
         joints: Joints from the base to the body, in order.
-        seen: Whether there are shapes; without any, the patch is a small one at the body's frame.
+        seen: Whether there is anything to go by; without, the patch is a small one at the body's frame.
+        shaped: Whether that are shapes, and not the inertia of a hand.
     """
 
     body: str
@@ -41,6 +42,7 @@ class FoundPatch:
     pad: bool
     joints: tuple[str, ...]
     seen: bool
+    shaped: bool
 
 
 @dataclass(frozen=True)
@@ -285,7 +287,10 @@ def _palm(model: mujoco.MjModel, data: mujoco.MjData, hand: int, legs: set[int],
     joints = [j for j in joints_to(model, hand) if j not in legs]
     elbow = data.xanchor[joints[-4] if len(joints) >= 7 else joints[-2]]
     points = _points(model, data, _drawn(model, hand))
-    if not len(points):
+    weighed = not len(points) and model.body_mass[hand] > 0.0
+    if weighed:
+        points = _inertia_box(model, data, hand)
+    elif not len(points):
         points = data.xpos[hand][None]
     middle = (points.min(0) + points.max(0)) / 2
     out = middle - elbow
@@ -299,18 +304,29 @@ def _palm(model: mujoco.MjModel, data: mujoco.MjData, hand: int, legs: set[int],
     axes = np.column_stack([ahead, np.cross(-out, ahead), -out])
     low, high = (palm @ axes).min(0), (palm @ axes).max(0)
     centre = middle + out * float((points @ out).max() - middle @ out)
-    return _patch(model, data, hand, Pose(axes, centre), (high - low)[:2], True)
+    patch = _patch(model, data, hand, Pose(axes, centre), (high - low)[:2], True)
+    return replace(patch, seen=patch.seen or weighed)
+
+
+def _inertia_box(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> np.ndarray:
+    """Corners (8, 3) m in the world of the box that has a body's mass and inertia."""
+    inertia, mass = model.body_inertia[body], float(model.body_mass[body])
+    half = np.sqrt(np.maximum(1.5 * (inertia.sum() - 2 * inertia) / mass, 0.0))
+    signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3)
+    return (signs * half) @ data.ximat[body].reshape(3, 3).T + data.xipos[body]
 
 
 def _patch(
     model: mujoco.MjModel, data: mujoco.MjData, body: int, pose: Pose, size: np.ndarray, pad: bool
 ) -> FoundPatch:
     world_from_body = Pose(data.xmat[body].reshape(3, 3), data.xpos[body])
+    shaped = bool(len(_drawn(model, body)))
     return FoundPatch(
         body=model.body(body).name,
         pose=world_from_body.inverse() @ pose,
         size=np.maximum(size, _LEAST_PATCH),
         pad=pad,
         joints=_names(model, joints_to(model, body)),
-        seen=bool(len(_drawn(model, body))),
+        seen=shaped,
+        shaped=shaped,
     )

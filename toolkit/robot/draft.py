@@ -12,7 +12,7 @@ import numpy as np
 
 from toolkit.geometry.limb import Limb
 from toolkit.robot.anatomy import Anatomy, FoundPatch, find_anatomy
-from toolkit.robot.motors import file_torques
+from toolkit.robot.motors import file_torques, most_torque
 from toolkit.robot.posture import standing, within
 from toolkit.robot.source import ModelSource
 
@@ -104,17 +104,27 @@ def _missing_structure(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
 
 
 def _missing_numbers(model: mujoco.MjModel, source: ModelSource, moved: list[str]) -> list[str]:
-    torques = file_torques(model)
+    return [
+        f"[{table}] of {len(names)} joint{'s' * (len(names) > 1)} ({', '.join(names[:3])}{', ...' * (len(names) > 3)})"
+        for table, names in _lacking(model, source, moved).items()
+    ]
+
+
+def _lacking(model: mujoco.MjModel, source: ModelSource, moved: list[str]) -> dict[str, list[str]]:
+    """The joints for which a file has no limit that can be used, by the table of the robot.toml that names one."""
+    torques = _torques(model)
     lacking = {
         "limits.position": [name for name in moved if not model.jnt_limited[model.joint(name).id]],
         "limits.torque": [name for name in moved if not torques.get(name)],
         "limits.velocity": [name for name in moved if name not in source.velocity],
     }
-    return [
-        f"[{table}] of {len(names)} joint{'s' * (len(names) > 1)} ({', '.join(names[:3])}{', ...' * (len(names) > 3)})"
-        for table, names in lacking.items()
-        if names
-    ]
+    return {table: names for table, names in lacking.items() if names}
+
+
+def _torques(model: mujoco.MjModel) -> dict[str, float]:
+    """The file's torque limits by joint, N m, that a motor can have."""
+    most = most_torque(model) or np.inf
+    return {name: torque for name, torque in file_torques(model).items() if torque <= most}
 
 
 def _joints(model: mujoco.MjModel) -> list[str]:
@@ -174,8 +184,10 @@ def _limb(limb: Limb, patch: FoundPatch) -> list[str]:
 def _palm(limb: Limb, patch: FoundPatch, model: mujoco.MjModel) -> list[str]:
     joints = list(patch.joints)
     elbow = joints[-4] if len(joints) >= 7 else joints[-2]
-    torque = file_torques(model).get(elbow)
+    torque = _torques(model).get(elbow)
     lines = _limb(limb, patch)
+    if not patch.shaped:
+        lines[0] += "   # the hand has no shape: this is the end of a box with its inertia"
     if not torque:
         return lines
     data = mujoco.MjData(model)
@@ -229,16 +241,16 @@ def _gains(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
 
 def _limits(model: mujoco.MjModel, source: ModelSource, anatomy: Anatomy, moved: list[str]) -> list[str]:
     """Tables of what a file does not say, to be filled in."""
-    ranges = [name for name in moved if not model.jnt_limited[model.joint(name).id]]
-    speeds = [name for name in moved if name not in source.velocity]
+    said = {
+        "limits.position": ("rad", "[-1.5, 1.5]"),
+        "limits.torque": ("N m, of the motors' data sheets", "100.0"),
+        "limits.velocity": ("rad/s, of the motors' data sheets", "10.0"),
+    }
     lines = []
-    for table, what, names, value in (
-        ("limits.position", "rad", ranges, "[-1.5, 1.5]"),
-        ("limits.velocity", "rad/s, of the motors' data sheets", speeds, "10.0"),
-    ):
-        if names:
-            lines += [f'# {what}; remove the # before the lines, or say "*" = {value} of all', f"# [{table}]"]
-            lines += [f"# {_key(name)} =" for name in _patterns(model, anatomy, names)]
+    for table, names in _lacking(model, source, moved).items():
+        what, value = said[table]
+        lines += [f'# {what}; remove the # before the lines, or say "*" = {value} of all', f"# [{table}]"]
+        lines += [f"# {_key(name)} =" for name in _patterns(model, anatomy, names)]
     return lines
 
 

@@ -1,4 +1,4 @@
-"""Mesh files that MuJoCo cannot read, turned into those that it can: COLLADA, and STL in plain text."""
+"""Mesh files that MuJoCo cannot read, turned into those that it can: COLLADA, STL in plain text, OBJ in parts."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ _SAID = 80  # most letters of what the loader says
 def converted(file: Path, *, upright: bool = False) -> bytes | None:
     """A mesh file as binary STL, in the file's own axes and before any scale of the model; None where MuJoCo reads it.
 
-    A COLLADA file becomes the convex hull of all its parts, which is what MuJoCo collides with. Its unit counts, its
-    `up_axis` does not, as everywhere in ROS, but where `upright`: then y, if it is said to point up, becomes z.
+    Of an OBJ file of several objects or groups MuJoCo takes the faces of one; here all count. A COLLADA file becomes
+    the convex hull of all its parts, which is what MuJoCo collides with. Its unit counts, its `up_axis` does not, as
+    everywhere in ROS, but where `upright`: then y, if it is said to point up, becomes z.
 
     Raises:
         ValueError: The file holds no solid that can be read.
     """
     ending = file.suffix.lower()
-    if not (ending == ".dae" or (ending == ".stl" and _is_text(file))):
+    if not (ending == ".dae" or (ending == ".stl" and _is_text(file)) or (ending == ".obj" and _in_parts(file))):
         return None
     import coal  # here, as few robots need it
     import trimesh
@@ -42,7 +43,8 @@ def converted(file: Path, *, upright: bool = False) -> bytes | None:
         except (QhullError, ElementTree.ParseError, ValueError, RuntimeError) as error:
             raise ValueError(f"holds no solid ({one_line(error)[:_SAID]})") from None
     else:
-        mesh = trimesh.load_mesh(file, file_type="stl_ascii")
+        kind = "stl_ascii" if ending == ".stl" else "obj"
+        mesh = trimesh.load_mesh(file, file_type=kind, skip_materials=True)
     return cast(bytes, mesh.export(file_type="stl"))
 
 
@@ -68,3 +70,8 @@ def _is_text(file: Path) -> bool:
     data = file.read_bytes()
     faces = int.from_bytes(data[_STL_HEADER - 4 : _STL_HEADER], "little")
     return data.lstrip().startswith(b"solid") and len(data) != _STL_HEADER + _STL_FACE * faces
+
+
+def _in_parts(file: Path) -> bool:
+    """Whether an OBJ file holds more than one object or group."""
+    return sum(line.startswith((b"o ", b"g ")) for line in file.read_bytes().splitlines()) > 1

@@ -56,7 +56,7 @@ def set_motors(description: RobotDescription, source: ModelSource, bare: mujoco.
     for table, values in (("torque", torque), ("velocity", velocity)):
         lacking = [name for name in names if not np.isfinite(values.get(name, np.nan)) or values[name] <= 0]
         _note_lacking(description, source, table, lacking, problems)
-    most = _MOST_LEVER * 9.81 * float(bare.body_mass.sum()) * _height(bare)
+    most = most_torque(bare)
     strong = [name for name in names if torque.get(name, 0.0) > most]
     if strong and most > 0:
         problems.add(
@@ -110,6 +110,11 @@ def _listed(names: Iterable[str]) -> str:
     quoted = [f"'{name}'" for name in names]
     shown = ", ".join(quoted[:_MOST_NAMES]) + (f" and {len(quoted) - _MOST_NAMES} more" if quoted[_MOST_NAMES:] else "")
     return f"joint{'s' if len(quoted) > 1 else ''} {shown}"
+
+
+def most_torque(bare: mujoco.MjModel) -> float:
+    """Torque in N m that no motor of a model reaches."""
+    return _MOST_LEVER * 9.81 * float(bare.body_mass.sum()) * _height(bare)
 
 
 def _height(bare: mujoco.MjModel) -> float:

@@ -123,10 +123,11 @@ def _shapes(model: mujoco.MjModel, limb: Limb) -> list[int]:
 
 
 def _gap(model: mujoco.MjModel, data: mujoco.MjData, limb: Limb) -> float:
-    """Distance in m from the middle of a patch to its body: to its shapes but the pad, or to its frame without any."""
+    """Distance in m from the middle of a patch to its body's shapes but the pad, or to its frame or CoM without any."""
     site, pad = model.site(limb.label).id, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, f"{limb.label}_pad")
     position = data.site_xpos[site]
-    gaps = [float(np.linalg.norm(position - data.xpos[model.site_bodyid[site]]))]
+    body = model.site_bodyid[site]
+    gaps = [min(float(np.linalg.norm(position - place[body])) for place in (data.xpos, data.xipos))]
     for geom in (geom for geom in _shapes(model, limb) if geom != pad):
         # Distance to the box around the shape, in the shape's own axes.
         local = data.geom_xmat[geom].reshape(3, 3).T @ (position - data.geom_xpos[geom]) - model.geom_aabb[geom, :3]
