@@ -287,11 +287,11 @@ def _palm(model: mujoco.MjModel, data: mujoco.MjData, hand: int, legs: set[int],
     joints = [j for j in joints_to(model, hand) if j not in legs]
     elbow = data.xanchor[joints[-4] if len(joints) >= 7 else joints[-2]]
     points = _points(model, data, _drawn(model, hand))
-    weighed = not len(points) and model.body_mass[hand] > 0.0
-    if weighed:
-        points = _inertia_box(model, data, hand)
-    elif not len(points):
-        points = data.xpos[hand][None]
+    weighed = False
+    if not len(points):
+        points, box = data.xpos[hand][None], _inertia_box(model, data, hand)
+        if weighed := 0.0 < float(np.ptp(box, axis=0).max()) < float(np.linalg.norm(data.xipos[hand] - elbow)):
+            points = box  # no hand is larger than its forearm; some files have inertias of anything
     middle = (points.min(0) + points.max(0)) / 2
     out = middle - elbow
     out = out / max(float(np.linalg.norm(out)), 1e-9)
@@ -310,7 +310,7 @@ def _palm(model: mujoco.MjModel, data: mujoco.MjData, hand: int, legs: set[int],
 
 def _inertia_box(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> np.ndarray:
     """Corners (8, 3) m in the world of the box that has a body's mass and inertia."""
-    inertia, mass = model.body_inertia[body], float(model.body_mass[body])
+    inertia, mass = model.body_inertia[body], max(float(model.body_mass[body]), 1e-9)
     half = np.sqrt(np.maximum(1.5 * (inertia.sum() - 2 * inertia) / mass, 0.0))
     signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3)
     return (signs * half) @ data.ximat[body].reshape(3, 3).T + data.xipos[body]
