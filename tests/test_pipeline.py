@@ -13,6 +13,7 @@ from toolkit.geometry.limb import Limb
 from toolkit.pipeline import Source, loop, trial
 from toolkit.refine import RefineConfig
 from toolkit.robot.scale import USUAL
+from toolkit.search.moves.limits import MOST_CARE
 from toolkit.wholebody.plan import LEVEL, WIDE, Manner
 from toolkit.world.timing import Timing
 
@@ -42,11 +43,12 @@ class Planner:
     calm: list | None = None  # what the searches after the first find; None for the same again
 
     def __init__(self, with_palms, without):
-        self.found, self.calls, self.exclusions = {True: with_palms, False: without}, [], []
+        self.found, self.calls, self.exclusions, self.care = {True: with_palms, False: without}, [], [], []
 
-    def search(self, rng, time_limit, observer=None, exclusions=(), palms=True, calmer=0):
+    def search(self, rng, time_limit, observer=None, exclusions=(), palms=True, calmer=0, care=0):
         self.calls.append(palms)
         self.pace = calmer
+        self.care.append(care)
         self.exclusions.append(len(exclusions))
         return SimpleNamespace(
             solutions=self.found[palms] if len(self.calls) == 1 or self.calm is None else self.calm,
@@ -66,8 +68,8 @@ class Run:
     """A run with made-up costs; infinite ones have no motion, and only sequences in `passing` pass.
 
     The local search turns a sequence into what `better` has for its name; those in `hurrying` ask too much of joints.
-    What has no motion lacks it from `since` s on, and what does not pass fails in the transition `failed_at`; for those
-    in `touching` no pace is to blame.
+    What has no motion lacks it from `since` s on, those in `stretching` for the legs. What does not pass fails in the
+    transition `failed_at`; for those in `touching` no pace is to blame.
     """
 
     def __init__(
@@ -82,6 +84,7 @@ class Run:
         failed_at=None,
         still=True,
         touching=None,
+        stretching=(),
         **settings,
     ):
         self.optimised, self.tested, self.improved = [], [], []
@@ -95,7 +98,8 @@ class Run:
 
             def optimise(self, sequence, known=None):
                 optimised.append(sequence.name)
-                failure = Failure("no motion", since, 0) if cost.get(sequence.name, 0.0) == np.inf else None
+                failure = Failure("no motion", since, 0, stretched=sequence.name in stretching)
+                failure = failure if cost.get(sequence.name, 0.0) == np.inf else None
                 return SimpleNamespace(name=sequence.name, sequence=sequence), failure
 
             def motion_of(self, sequence):
@@ -240,6 +244,34 @@ def test_where_a_transition_fails_it_alone_is_slowed_down_at_first(monkeypatch, 
         planner.paces, planner.calm = paces, [solution("slow", FOOT)]
         run = Run(planner, {"fast at 1 in 0", "slow"}, monkeypatch, cost, failed_at=failed_at)
         assert run.tested == tested and run.result.passed
+
+
+@pytest.mark.parametrize("stretching", ["ab", ""])
+def test_where_legs_are_asked_too_much_the_margins_of_the_next_search_grow(monkeypatch, stretching):
+    """Before the pace yields, which it does at once where other limits are broken."""
+    planner = Planner([solution("a", FOOT), solution("b", FOOT)], [])
+    planner.paces, planner.calm = 2, [solution("other", FOOT)]
+    run = Run(planner, {"other"}, monkeypatch, {"a": np.inf, "b": np.inf, "other": 1.0}, stretching=stretching)
+    assert run.result.passed
+    assert (planner.care, planner.pace) == (([0, 1], 0) if stretching else ([0, 0], 1))
+
+
+def test_margins_that_leave_nothing_shrink_for_good(monkeypatch):
+    planner = Planner([solution("a", FOOT)], [])
+    planner.paces, planner.calm = 2, []
+    run = Run(planner, set(), monkeypatch, {"a": np.inf}, stretching="a")
+    assert planner.care == [0, 1, 0, 0, 0] and not run.result.passed
+
+
+def test_the_margins_grow_as_often_as_they_may(monkeypatch):
+    class Restless(Planner):
+        def search(self, *args, **settings):
+            self.found[True] = [solution(f"s{len(self.calls)}", FOOT)]
+            return super().search(*args, **settings)
+
+    planner, names = Restless([], []), [f"s{number}" for number in range(9)]
+    Run(planner, set(), monkeypatch, dict.fromkeys(names, np.inf), stretching=names, optimisations=6)
+    assert planner.care == [0, 1, 2, *[MOST_CARE] * 3]
 
 
 def test_where_links_touch_the_world_the_pace_does_not_yield(monkeypatch):

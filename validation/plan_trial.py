@@ -104,13 +104,14 @@ class TimedPlanner:
         exclusions: Sequence[Exclusion] = (),
         palms: bool = True,
         calmer: int = 0,
+        care: int = 0,
     ) -> SearchResult:
         """See `ContactPlanner.search`."""
         if self.search_result is not None:
-            return self._planner.search(rng, time_limit, observer, exclusions, palms, calmer)
+            return self._planner.search(rng, time_limit, observer, exclusions, palms, calmer, care)
         before = memory()
         clock = SearchClock.start()
-        search = self._planner.search(rng, time_limit, clock, exclusions, palms, calmer)
+        search = self._planner.search(rng, time_limit, clock, exclusions, palms, calmer, care)
         share, after = clock.share(), memory()
         first = search.solutions[0].seconds if search.solutions else None
         first_share = self.first_share = clock.processor_share or share

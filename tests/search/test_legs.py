@@ -7,6 +7,7 @@ from toolkit.geometry.pose import rotation_about_z, rotation_on_surface
 from toolkit.physics.leg import LIMITS, ReachMargins, leg_clearances
 from toolkit.robot.loader import load_robot
 from toolkit.search.moves.legs import any_lean, legs_of, reach, stances_violated
+from toolkit.search.moves.limits import MOST_CARE, margins
 from toolkit.search.moves.reasons import OF_LIMIT, Reason
 from toolkit.search.moves.shanks import shanks_of
 
@@ -35,6 +36,13 @@ def test_same_verdict_as_the_closed_form(name):
         np.testing.assert_array_equal(got, expected)
         seen |= set(got.tolist())
     assert {Reason.NONE, Reason.LEG_LENGTH, Reason.ANKLE_PITCH, Reason.ANKLE_ROLL} <= seen
+
+
+def test_margins_that_grow_leave_less_of_every_range():
+    robot = load_robot(OWN[0])
+    ranges = [legs_of(robot, margins(robot, care)).ranges for care in range(MOST_CARE + 1)]
+    for less, more in zip(ranges[1:], ranges, strict=False):
+        assert (less[..., 0] > more[..., 0]).all() and (less[..., 1] < more[..., 1]).all()
 
 
 def test_a_lower_com_brings_long_strides_into_reach():

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from toolkit.centroidal.body import BodyResiduals, body_residuals
+from toolkit.centroidal.body import POSTURES, SWING_LEG, BodyResiduals, body_residuals
 from toolkit.centroidal.problem import GRAVITY, CentroidalMotion, Margins
 from toolkit.centroidal.residual import TOLERANCE, check, confirmed
 from toolkit.contacts.failure import Failure
@@ -74,7 +74,8 @@ def _failure(motion: CentroidalMotion, body: BodyResiduals, slack: np.ndarray, s
     if body.largest > BODY_TOLERANCE and (slack[:, 1].max() - 1.0 >= excess or excess < CHEATED):
         name, knot, limb = body.worst
         reason = f"infeasible: {name} of {limb.label} beyond its limit by {body.largest:.3g}"
-        return Failure(reason, float(times[knot]), limb=limb, knot=int(knot))
+        stretched = name in (*POSTURES, SWING_LEG)
+        return Failure(reason, float(times[knot]), limb=limb, knot=int(knot), stretched=stretched)
     residuals = check(motion)
     if excess < CHEATED and residuals.largest < 1e-3:
         return Failure(f"unsolved: {residuals.worst.replace('_', ' ')} is violated by {residuals.largest:.2g}")

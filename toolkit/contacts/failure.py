@@ -18,6 +18,7 @@ class Failure:
         limb: The limb that it happens to.
         knot: The knot of the centroidal motion at which a constraint is violated most.
         too_fast: Whether joints had to turn faster or harder than they can; a calmer pace may help.
+        stretched: Whether a leg had to go beyond a limit of its posture or length; wider margins in a search may help.
         at_any_pace: Whether a link touches the world, or a palm has no way clear of it, for which no pace is to blame.
     """
 
@@ -27,4 +28,5 @@ class Failure:
     limb: Limb | None = None
     knot: int | None = None
     too_fast: bool = False
+    stretched: bool = False
     at_any_pace: bool = False

@@ -24,6 +24,7 @@ from toolkit.robot.model import RobotModel
 from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.plan_cost import PlanCost, plan_cost
 from toolkit.search.moves.exclusion import Blame, to_blame
+from toolkit.search.moves.limits import MOST_CARE
 from toolkit.search.result import SearchResult, Solution
 from toolkit.world.timing import Timing
 from toolkit.world.world import World
@@ -133,6 +134,7 @@ class _Run:
         self._pace = 0  # how often the pace has yielded
         self._fruitful: int | None = None  # the pace of the last search that found something
         self._calmest: int | None = None  # the last pace to search at, where nothing was found at a calmer one
+        self._care, self._most_care = 0, MOST_CARE  # how often the margins of the legs have grown, and may
         self._improved_at: dict[int, int] = {}  # number of exclusions when a candidate was improved last
         self._local: LocalSearch | None = None
 
@@ -142,6 +144,8 @@ class _Run:
         while True:
             search = self._search(palms)
             found = self._optimised(search)
+            if not aside and self._takes_care(found):
+                continue
             if min(_costs(aside), default=np.inf) < min(_costs(found), default=np.inf):
                 found += aside  # what was found at a faster pace
             paces = self._paces_that_pay(found)
@@ -165,6 +169,21 @@ class _Run:
             elif not found or not (self._blame.exclusions or failed_with_palms):
                 break
         return self._concluded()
+
+    def _takes_care(self, found: list[Candidate]) -> bool:
+        """Whether to search again with other margins of the legs than those of the last search.
+
+        They grow where no sequence has a motion, most of them for the limits of the legs: a judge without dynamics does
+        not know how far the CoM is from where it expects it. Where nothing is found with them, they shrink for good.
+        """
+        stretched = sum(c.failure is not None and c.failure.stretched for c in found)
+        if self._care and not found:
+            self._care = self._most_care = 0
+        elif self._care < self._most_care and 2 * stretched > len(found) and not (_ranked(found) or self._spent()):
+            self._care += 1
+        else:
+            return False
+        return True
 
     def _left_over(self) -> list[Candidate]:
         """Feasible candidates that have not been tested and have no transition that failed."""
@@ -233,6 +252,7 @@ class _Run:
             exclusions=tuple(exclusions),
             palms=palms,
             calmer=self._pace,
+            care=self._care,
         )
         self._searches.append(search)
         found = len(search.solutions)
@@ -240,6 +260,8 @@ class _Run:
         detail = search.reason or f"{found} sequence{'s' if found > 1 else ''}"
         if exclusions:
             detail += f" without {len(exclusions)} transition{'s' if len(exclusions) > 1 else ''} that failed"
+        if self._care:
+            detail += " and with wider margins of the legs"
         if not palms:
             detail += " for the feet alone"
         if search.warning:

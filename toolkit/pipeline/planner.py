@@ -37,6 +37,7 @@ class Planner(Protocol):
         exclusions: Sequence[Exclusion] = (),
         palms: bool = True,
         calmer: int = 0,
+        care: int = 0,
     ) -> SearchResult:
         """Search for as long as `time_limit` s."""
         ...

@@ -188,14 +188,13 @@ def _palm(limb: Limb, patch: FoundPatch, model: mujoco.MjModel) -> list[str]:
     lines = _limb(limb, patch)
     if patch.seen and not patch.shaped:
         lines[0] += "   # the hand has no shape: this is the end of a box with its inertia"
-    if not torque:
-        return lines
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     body = model.body(patch.body).id
     palm = data.xmat[body].reshape(3, 3) @ patch.pose.position + data.xpos[body]
     lever = max(float(np.linalg.norm(palm - data.xanchor[model.joint(elbow).id])), 0.05)
-    return [*lines, f"max_force = {torque / lever:.0f}.0   # what '{elbow}' holds on a lever of {lever:.2f} m"]
+    holds = f"what '{elbow}' holds on a lever of {lever:.2f} m"
+    return [*lines, f"max_force = {torque / lever:.0f}.0   # {holds}" if torque else f"# max_force =    # N; {holds}"]
 
 
 def _home(model: mujoco.MjModel, anatomy: Anatomy, moved: list[str]) -> list[str]:

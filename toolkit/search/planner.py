@@ -107,6 +107,7 @@ class ContactPlanner:
         exclusions: Sequence[Exclusion] = (),
         palms: bool = True,
         calmer: int = 0,
+        care: int = 0,
     ) -> SearchResult:
         """Search for contact sequences until the time is up or nothing can improve.
 
@@ -117,6 +118,7 @@ class ContactPlanner:
             exclusions: Transitions that later stages rejected; the search avoids them.
             palms: Whether this search may use palms, where `config.palms` allows them at all.
             calmer: How often the pace has yielded, where it is the planner's to choose; see `timings`.
+            care: How often the margins of the legs have grown, up to `MOST_CARE`.
 
         Returns:
             Every solution, or the reason why there is none.
@@ -133,7 +135,7 @@ class ContactPlanner:
         self._warm_up(start, com, timings)
         strategy, blame = self.strategy(way), Blame(exclusions, _STRIKES, scale=self.robot.scale.length)
         deadline = time.perf_counter() + time_limit
-        parts = self.parts(way, strategy, timings, tally, blame.exclusions, palms=palms, deadline=deadline)
+        parts = self.parts(way, strategy, timings, tally, blame.exclusions, palms=palms, care=care, deadline=deadline)
         state = parts.reader.at_rest(start, com)
         settings, paces = replace(strategy.search, unit=parts.cost.unit), self._paces_after(calmer, slides=way.slides)
         if paces or way.slides:  # a calmer search follows, or the strategy has extended the limit
@@ -175,6 +177,7 @@ class ContactPlanner:
         exclusions: Sequence[Exclusion] = (),
         *,
         palms: bool = True,
+        care: int = 0,
         deadline: float = math.inf,
     ) -> Parts:
         """The parts of the graphs of one search, from which other searches than ANA* can be made.
@@ -186,6 +189,7 @@ class ContactPlanner:
             tally: Counts the rejections.
             exclusions: Transitions to avoid.
             palms: Whether palms may be used, where `config.palms` allows them at all.
+            care: How often the margins of the legs have grown.
             deadline: `time.perf_counter()` after which the judge is not asked any more.
         """
         moves = self.ground.moves(way)
@@ -193,7 +197,7 @@ class ContactPlanner:
         limbs = [limb for limb in PALMS if palms and limb in self.robot.arms]
         candidates = CandidateGenerator(moves, limbs, timings, exclusions, tally.rejected)
         scale = self.robot.scale
-        reader, reach = StateReader(table, timings, scale), ReachCheck(moves, limbs, timings)
+        reader, reach = StateReader(table, timings, scale), ReachCheck(moves, limbs, timings, care)
         mass = 0.0 if self._finish is None else self.robot.mass
         cost = EdgeCost(strategy.cost, table, timings, self.world.goal, way.distance, way.longest, mass, scale)
         haste = None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 
 from toolkit.geometry.limb import Limb
@@ -13,6 +15,9 @@ _DROP = 0.25  # part of its height at home by which the CoM may be lower
 # Margins of the legs of a body of the usual size (`toolkit.robot.scale`). The hips' is negative, as the base, which the
 # closed form keeps upright, may help them.
 _MARGINS = ReachMargins(length=0.005, ankle=0.05, hip=-0.1)
+# What is added to them, up to `MOST_CARE` times, after searches of which no sequence had a motion for the legs.
+_MORE = ReachMargins(length=0.005, ankle=0.05, hip=0.05)
+MOST_CARE = 3
 _CLIMB = 0.55  # part of thigh and shin together by which the heights of two soles may differ
 
 _APART = 0.02  # m; least distance between two soles
@@ -28,9 +33,10 @@ def sole_room(robot: RobotModel) -> np.ndarray:
     return np.maximum(half, robot.foot_outline - _TOUCH)
 
 
-def margins(robot: RobotModel) -> ReachMargins:
-    """Margins of the legs."""
-    return _MARGINS.scaled(robot.scale.length)
+def margins(robot: RobotModel, care: int = 0) -> ReachMargins:
+    """Margins of the legs, which have grown so many times (`care`)."""
+    wanted = {name: value + care * getattr(_MORE, name) for name, value in asdict(_MARGINS).items()}
+    return ReachMargins(**wanted).scaled(robot.scale.length)
 
 
 def climb(robot: RobotModel) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.geometry.pose import rotation_about_z
 from toolkit.search.moves.candidates import Candidates, mean_feet
-from toolkit.search.moves.legs import any_lean, stances_violated
+from toolkit.search.moves.legs import any_lean, legs_of, stances_violated
+from toolkit.search.moves.limits import margins
 from toolkit.search.moves.moves import MoveGenerator
 from toolkit.search.moves.reasons import Reason
 from toolkit.world.timing import Timing
@@ -22,10 +23,14 @@ _ARM_SWAY = 0.05  # m that the CoM may stay short of the standing foot during a 
 
 
 class ReachCheck:
-    """Checks the candidates of one search, with its moves, the palms in use and the timings to choose from."""
+    """Checks the candidates of one search, with its moves, the palms in use and the timings to choose from.
 
-    def __init__(self, moves: MoveGenerator, palms: Sequence[Limb], timings: tuple[Timing, ...]):
+    The margins of the legs have grown `care` times.
+    """
+
+    def __init__(self, moves: MoveGenerator, palms: Sequence[Limb], timings: tuple[Timing, ...], care: int = 0):
         self._moves, self._table, self._palms = moves, moves.table, palms
+        self._legs = legs_of(moves.robot, margins(moves.robot, care))
         scale = moves.robot.scale.length
         self._drops, self._margin, self._sway = scale * _COM_DROPS, scale * _ARM_MARGIN, scale * _ARM_SWAY
         self._shift = np.array([item.shift for item in timings])
@@ -86,7 +91,7 @@ class ReachCheck:
         def codes(rows: np.ndarray, leans: np.ndarray) -> np.ndarray:
             a, b = left[rows], right[rows]
             soles = table.position[a], table.rotation[a], table.position[b], table.rotation[b]
-            return stances_violated(moves.legs, moves.shanks, com[rows], self._drops, yaw[rows], *soles, leans)
+            return stances_violated(self._legs, moves.shanks, com[rows], self._drops, yaw[rows], *soles, leans)
 
         found = codes(np.arange(len(com)), any_lean(len(com)))
         passed = np.flatnonzero(found == 0)  # few do, and few of those stand before something
