@@ -39,7 +39,7 @@ def solution(name, *limbs, start=(), seconds=0.0):
 class Planner:
     """Finds what it is given: with palms, and for the feet alone."""
 
-    paces = 1
+    paces, brisk = 1, False
     calm: list | None = None  # what the searches after the first find; None for the same again
 
     def __init__(self, with_palms, without):
@@ -60,6 +60,7 @@ class Planner:
             slides=False,
             paced=False,
             calmer=tuple(Timing(swing=float(pace)) for pace in range(calmer + 1, self.paces)),
+            briskest=not (self.brisk and calmer == 0),
             screen=SimpleNamespace(),
         )
 
@@ -263,15 +264,20 @@ def test_margins_that_leave_nothing_shrink_for_good(monkeypatch):
     assert planner.care == [0, 1, 0, 0, 0] and not run.result.passed
 
 
-def test_the_margins_grow_as_often_as_they_may(monkeypatch):
+@pytest.mark.parametrize("brisk", [False, True])
+def test_the_margins_grow_as_often_as_they_may_and_then_the_pace_is_brisker_once(monkeypatch, brisk):
     class Restless(Planner):
-        def search(self, *args, **settings):
+        def search(self, *args, calmer=0, **settings):
             self.found[True] = [solution(f"s{len(self.calls)}", FOOT)]
-            return super().search(*args, **settings)
+            paces.append(calmer)
+            return super().search(*args, calmer=calmer, **settings)
 
+    paces = []
     planner, names = Restless([], []), [f"s{number}" for number in range(9)]
-    Run(planner, set(), monkeypatch, dict.fromkeys(names, np.inf), stretching=names, optimisations=6)
-    assert planner.care == [0, 1, 2, *[MOST_CARE] * 3]
+    planner.brisk, planner.paces = brisk, 2
+    Run(planner, set(), monkeypatch, dict.fromkeys(names, np.inf), stretching=names, optimisations=7)
+    assert planner.care[:4] == [0, 1, 2, MOST_CARE]
+    assert paces == ([0, 0, 0, 0, -1, 0, 1] if brisk else [0, 0, 0, 0, 1, 1, 1])
 
 
 def test_where_links_touch_the_world_the_pace_does_not_yield(monkeypatch):

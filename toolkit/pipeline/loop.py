@@ -131,10 +131,11 @@ class _Run:
         self._blame = Blame(scale=robot.scale.length)
         self._at_start: Counter[str] = Counter()  # reasons of failures where nothing has moved yet
         self._known: set[bytes] = set()
-        self._pace = 0  # how often the pace has yielded
+        self._pace = 0  # how often the pace has yielded; -1 at a brisker one
         self._fruitful: int | None = None  # the pace of the last search that found something
         self._calmest: int | None = None  # the last pace to search at, where nothing was found at a calmer one
         self._care, self._most_care = 0, MOST_CARE  # how often the margins of the legs have grown, and may
+        self._hurried = False  # whether a brisker pace than the first has been tried
         self._improved_at: dict[int, int] = {}  # number of exclusions when a candidate was improved last
         self._local: LocalSearch | None = None
 
@@ -144,7 +145,7 @@ class _Run:
         while True:
             search = self._search(palms)
             found = self._optimised(search)
-            if not aside and self._takes_care(found):
+            if not aside and self._spares_legs(found):
                 continue
             if min(_costs(aside), default=np.inf) < min(_costs(found), default=np.inf):
                 found += aside  # what was found at a faster pace
@@ -170,19 +171,26 @@ class _Run:
                 break
         return self._concluded()
 
-    def _takes_care(self, found: list[Candidate]) -> bool:
-        """Whether to search again with other margins of the legs than those of the last search.
+    def _spares_legs(self, found: list[Candidate]) -> bool:
+        """Whether to search again because no sequence has a motion, most of them for the limits of the legs.
 
-        They grow where no sequence has a motion, most of them for the limits of the legs: a judge without dynamics does
-        not know how far the CoM is from where it expects it. Where nothing is found with them, they shrink for good.
+        A judge without dynamics does not know how far the CoM is from where it expects it. So the margins of the legs
+        grow, as long as anything is found with them. Then a brisker pace is tried once, at which the CoM need not go as
+        far over each foot.
         """
-        stretched = sum(c.failure is not None and c.failure.stretched for c in found)
-        if self._care and not found:
+        again = self._care > 0 and not found
+        if again:
             self._care = self._most_care = 0
-        elif self._care < self._most_care and 2 * stretched > len(found) and not (_ranked(found) or self._spent()):
-            self._care += 1
         else:
-            return False
+            stretched = sum(c.failure is not None and c.failure.stretched for c in found)
+            if _ranked(found) or self._spent() or 2 * stretched <= len(found):
+                return False
+            if self._care < self._most_care:
+                self._care += 1
+                return True
+        if self._searches[-1].briskest or self._hurried:
+            return again
+        self._care, self._most_care, self._pace, self._hurried = 0, 0, self._pace - 1, True
         return True
 
     def _left_over(self) -> list[Candidate]:

@@ -76,15 +76,20 @@ class ContactPlanner:
         """The timings of a transition to choose from when the pace has yielded so often.
 
         Where the ground `slides`, standing for longer does not help, so the pace never yields, and is a run's where it
-        is the planner's to choose. Judges that know no dynamics begin with the second pace, but not for soles that
-        roll, which stride along first: a robot stands the worse the longer it stands on one. Heavy rotors make a
-        world's own timing longer, as they do the planner's.
+        is the planner's to choose. Judges that know no dynamics begin with the second pace (the first is that of -1),
+        but not for soles that roll, which stride along first: a robot stands the worse the longer it stands on one.
+        Heavy rotors make a world's own timing longer, as they do the planner's.
         """
-        config, stands = self.config, self.robot.stands_on_one_foot
-        pace = 0 if slides else calmer + (config.one_timing and stands)
+        config, rolls = self.config, not self.robot.stands_on_one_foot
+        pace = 0 if slides else calmer + self._held_back
         own = self.world.timing and self.world.timing.times(self.robot.rotor_factor)
-        timings = timings_of(config.timings, own, self.robot.pace, pace, slides=slides, rolls=not stands)
+        timings = timings_of(config.timings, own, self.robot.pace, pace, slides=slides, rolls=rolls)
         return timings[:1] if config.one_timing else timings
+
+    @property
+    def _held_back(self) -> bool:
+        """Whether searches begin with the second pace."""
+        return self.config.one_timing and self.robot.stands_on_one_foot
 
     @property
     def paced(self) -> bool:
@@ -118,6 +123,7 @@ class ContactPlanner:
             exclusions: Transitions that later stages rejected; the search avoids them.
             palms: Whether this search may use palms, where `config.palms` allows them at all.
             calmer: How often the pace has yielded, where it is the planner's to choose; see `timings`.
+                -1 where the search before was not the `briskest`.
             care: How often the margins of the legs have grown, up to `MOST_CARE`.
 
         Returns:
@@ -155,6 +161,7 @@ class ContactPlanner:
             slides=way.slides,
             paced=self.paced,
             calmer=paces,
+            briskest=way.slides or not (self.paced and self._held_back and calmer == 0),
             screen=parts.screen,
         )
 
