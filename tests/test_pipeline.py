@@ -280,6 +280,21 @@ def test_the_margins_grow_as_often_as_they_may_and_then_the_pace_is_brisker_once
     assert paces == ([0, 0, 0, 0, -1, 0, 1] if brisk else [0, 0, 0, 0, 1, 1, 1])
 
 
+def test_a_pace_that_spares_the_legs_does_not_yield_after_a_few_failures(monkeypatch):
+    class Restless(Planner):
+        def search(self, *args, calmer=0, **settings):
+            paces.append(calmer)
+            self.found[True] = [solution(name, FOOT) for name in found[min(len(paces), len(found)) - 1]]
+            return super().search(*args, calmer=calmer, **settings)
+
+    paces, found = [], ["a", "", "bcd", "e"]
+    planner = Restless([], [])
+    planner.brisk, planner.paces = True, 2
+    cost = {"a": np.inf, "b": 1.0, "c": 2.0, "d": 3.0, "e": 4.0}
+    run = Run(planner, {"e"}, monkeypatch, cost, stretching="a", candidates=8)
+    assert run.tested == ["b", "c", "d", "e"] and paces == [0, 0, -1, -1] and run.result.passed
+
+
 def test_where_links_touch_the_world_the_pace_does_not_yield(monkeypatch):
     """Nor is the transition to blame slowed down; the next search does without it."""
     planner = Planner([solution("fast", FOOT)], [])

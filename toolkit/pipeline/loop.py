@@ -205,9 +205,14 @@ class _Run:
         ]
 
     def _keeps_pace(self, tested: int) -> bool:
-        """Whether no pace is to blame in the last trial from number `tested` on; half are left for calmer ones."""
+        """Whether a calmer pace would not help after the last trial from number `tested` on; half are left for those.
+
+        No pace is to blame, or calmer ones have asked too much of the legs.
+        """
         last = self._trials[-1].failure if len(self._trials) > tested else None
-        return last is not None and last.at_any_pace and len(self._trials) < self._config.candidates // 2
+        if last is None or len(self._trials) >= self._config.candidates // 2:
+            return False
+        return last.at_any_pace or (self._pace < 0 and not last.too_fast)
 
     @property
     def _calmer(self) -> tuple[Timing, ...]:
@@ -369,7 +374,8 @@ class _Run:
 
         Before a candidate is tested, it is improved, and again where a transition has been blamed since. Where the pace
         may yield, one that fails is tested once more with the transition to blame at a calmer timing unless it does no
-        more than touch the world, and no other is after one that asks too much of the joints, or after a few failures.
+        more than touch the world, and no other is after one that asks too much of the joints, or after a few failures
+        at a pace that legs can follow when it is calmer.
         On soles that roll, calmer is harder.
         """
         blame = self._blame
@@ -396,7 +402,7 @@ class _Run:
             if slowed is not None and again.at_any_pace:
                 self._note(candidate.solution.sequence, again)
             failures += 1 if slowed is None else 2
-            if failures >= _FAILURES and self._calmer and self._robot.stands_on_one_foot:
+            if failures >= _FAILURES and self._pace >= 0 and self._calmer and self._robot.stands_on_one_foot:
                 break
         return False
 
