@@ -64,8 +64,7 @@ def measure(
     torque_ratio = (np.abs(recorder.torque[:count]) / robot.torque_limit).max(1)
     joints, speed = recorder.qpos[:count, 7:], np.abs(recorder.qvel[:count, 6:])
     excess = np.maximum(joints - robot.upper, robot.lower - joints).max()
-    feet = _feet(recorder, controls.final_qpos).mean(0)[:2]
-    distance = float(np.hypot(*(feet - goal.position[:2])))
+    distance = float(goal.distance(_feet(recorder, controls.final_qpos).mean(0)))
     fell = bool(recorder.fall)
     completed = count == standard.ticks and not fell
     values = {

@@ -266,6 +266,6 @@ def arrives(sequence: ContactSequence, base: MotionPlan) -> bool:
     goal = base.world.goal
 
     def distance(each: ContactSequence) -> float:
-        return float(np.hypot(*(each.stances[-1].mean_feet.position - goal.position)[:2]))
+        return float(goal.distance(each.stances[-1].mean_feet.position))
 
     return distance(sequence) <= max(arrival_radius(goal, base.robot.scale), distance(base.sequence))

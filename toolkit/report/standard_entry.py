@@ -30,7 +30,7 @@ def standard_entry(standard: Standard) -> dict[str, Any]:
     return plain(
         {
             "robot": {name: getattr(robot, name) for name in names} | {"limbs": limbs},
-            "goal": {"position": standard.goal.position, "radius": standard.goal.radius},
+            "goal": {name: getattr(standard.goal, name) for name in ("position", "radius", "floor")},
             **{name: getattr(standard, name) for name in _NAMES},
             "moves": [
                 {"limb": move.limb.label, "start": move.start, "end": move.end, "target": move.target}
@@ -65,7 +65,7 @@ def read_standard(entry: dict[str, Any]) -> Standard:
         raise ValueError(f"{ticks} ticks of {decimation} steps of {timestep} s are no run")
     return Standard(
         subject,
-        Goal(_finite(goal["position"], 3), _number(goal["radius"])),
+        Goal(_finite(goal["position"], 3), _number(goal["radius"]), _floor(goal.get("floor"))),
         timestep,
         decimation,
         ticks,
@@ -80,6 +80,12 @@ def _read_move(entry: dict[str, Any]) -> Move:
     """One planned move."""
     target = None if entry["target"] is None else _finite(entry["target"], 3)
     return Move(Limb.from_label(entry["limb"]), _number(entry["start"]), _number(entry["end"]), target)
+
+
+def _floor(entry: list[float | None] | None) -> tuple[float, float]:
+    """The heights of a goal's floor, where null is infinite; older runs have none."""
+    low, high = entry or (None, None)
+    return -np.inf if low is None else _number(low), np.inf if high is None else _number(high)
 
 
 def _number(value: Any) -> float:

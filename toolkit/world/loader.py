@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -15,6 +16,7 @@ from toolkit.geometry.pose import Pose
 from toolkit.mjcf import warnings_refused
 from toolkit.shipped import shipped
 from toolkit.world.extraction import SurfaceConfig, extract_surfaces
+from toolkit.world.floors import goal_floor
 from toolkit.world.solids import solids_of
 from toolkit.world.source import read_source
 from toolkit.world.surface import Surface
@@ -65,6 +67,7 @@ def load_world(
                 f"{config.foot_area:g} m^2, tilted less than {np.degrees(config.foot_angle):g} degrees"
                 f"{_also_feet(palms)}"
             )
+        goal = replace(goal, floor=goal_floor(goal, surfaces))
         _check_ground(path, start, surfaces, palms)
         _check_walls(path, palms, surfaces, config)
         return World(path.stem, path, model, surfaces, start, goal, timing, square, source.spec, palms)

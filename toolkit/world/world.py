@@ -22,10 +22,27 @@ PALM_SITE_REACH = 0.3
 
 @dataclass(frozen=True)
 class Goal:
-    """The goal is reached when the mean of the feet is within `radius` of `position` (3,) in xy, m."""
+    """The goal is reached when the mean of the feet is within `radius` of `position` in xy, and on its floor.
+
+    Attributes:
+        position: (3,) m.
+        radius: m.
+        floor: m; the feet's mean is no lower and no higher. Infinite where there is only one floor.
+    """
 
     position: np.ndarray
     radius: float
+    floor: tuple[float, float] = (-np.inf, np.inf)
+
+    def distance(self, place: np.ndarray) -> np.ndarray:
+        """(...,) m; how far places (..., 3) m are from the middle in xy; off the floor more than the radius, too."""
+        away = np.hypot(place[..., 0] - self.position[0], place[..., 1] - self.position[1])
+        off = np.maximum(self.floor[0] - place[..., 2], place[..., 2] - self.floor[1])
+        return np.where(off > 0.0, np.maximum(away, self.radius) + off, away)
+
+    def on_floor(self, height: np.ndarray) -> np.ndarray:
+        """(...,) bool; whether heights (...,) m are those of its floor."""
+        return (height >= self.floor[0]) & (height <= self.floor[1])
 
 
 @dataclass(frozen=True)

@@ -159,7 +159,7 @@ class TransitionCost:
 
     def at_goal(self, centre: np.ndarray) -> np.ndarray:
         """(n,) bool; whether a plan may end with the mean of the feet at (n, 3) m."""
-        return np.hypot(*(centre[:, :2] - self._goal.position[:2]).T) <= self._radius
+        return self._goal.distance(centre) <= self._radius
 
     def _steep(self, candidates: Candidates) -> np.ndarray:
         """(n,) cost of feet on contacts that leave little friction."""

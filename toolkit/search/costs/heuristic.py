@@ -143,6 +143,7 @@ class GridDistance:
         self._ahead = np.full(nodes.shape, np.nan, np.float32)
         middle = self._corner + cell * np.stack(np.meshgrid(*(np.arange(k) for k in shape), indexing="ij"), axis=-1)
         inside = np.hypot(*(middle - goal.position[:2]).transpose(2, 0, 1)) <= max(goal.radius, 0.75 * cell)
+        inside = inside[..., None] & goal.on_floor(levels)
         targets = nodes[inside]
         targets = targets[targets >= 0]
         self.supported = bool((levels[inside] > -np.inf).any())
