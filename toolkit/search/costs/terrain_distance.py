@@ -139,8 +139,9 @@ class TerrainDistance:
             plain = self._proof(start, usual, surfaces)
             found = found if plain is None else plain
         what, (x, y) = found
-        goal = self._world.goal.position
-        head = f"{self._world.path}: nothing leads to the goal at ({goal[0]:.3g}, {goal[1]:.3g})"
+        goal = self._world.goal
+        shown = goal.position[: 3 if np.isfinite(goal.floor).any() else 2]
+        head = f"{self._world.path}: nothing leads to the goal at ({', '.join(f'{each:.3g}' for each in shown)})"
         if what == "goal":
             return f"{head}: no surface within its radius holds a sole; move the goal onto walkable ground"
         place = f"near ({x:.3g}, {y:.3g})"
