@@ -60,9 +60,22 @@ class Planner:
             slides=False,
             paced=False,
             calmer=tuple(Timing(swing=float(pace)) for pace in range(calmer + 1, self.paces)),
-            briskest=not (self.brisk and calmer == 0),
+            brisker=self.brisk and calmer == 0,
             screen=SimpleNamespace(),
         )
+
+
+class Restless(Planner):
+    """Finds sequences of other names, a letter each, with every search, and keeps the paces that were asked for."""
+
+    def __init__(self, *names):
+        super().__init__([], [])
+        self.names, self.asked = names, []
+
+    def search(self, *args, calmer=0, **settings):
+        self.found[True] = [solution(name, FOOT) for name in self.names[len(self.calls)]]
+        self.asked.append(calmer)
+        return super().search(*args, calmer=calmer, **settings)
 
 
 class Run:
@@ -266,33 +279,20 @@ def test_margins_that_leave_nothing_shrink_for_good(monkeypatch):
 
 @pytest.mark.parametrize("brisk", [False, True])
 def test_the_margins_grow_as_often_as_they_may_and_then_the_pace_is_brisker_once(monkeypatch, brisk):
-    class Restless(Planner):
-        def search(self, *args, calmer=0, **settings):
-            self.found[True] = [solution(f"s{len(self.calls)}", FOOT)]
-            paces.append(calmer)
-            return super().search(*args, calmer=calmer, **settings)
-
-    paces = []
-    planner, names = Restless([], []), [f"s{number}" for number in range(9)]
+    names = "abcdefghi"
+    planner = Restless(*names)
     planner.brisk, planner.paces = brisk, 2
     Run(planner, set(), monkeypatch, dict.fromkeys(names, np.inf), stretching=names, optimisations=7)
     assert planner.care[:4] == [0, 1, 2, MOST_CARE]
-    assert paces == ([0, 0, 0, 0, -1, 0, 1] if brisk else [0, 0, 0, 0, 1, 1, 1])
+    assert planner.asked == ([0, 0, 0, 0, -1, 0, 1] if brisk else [0, 0, 0, 0, 1, 1, 1])
 
 
 def test_a_pace_that_spares_the_legs_does_not_yield_after_a_few_failures(monkeypatch):
-    class Restless(Planner):
-        def search(self, *args, calmer=0, **settings):
-            paces.append(calmer)
-            self.found[True] = [solution(name, FOOT) for name in found[min(len(paces), len(found)) - 1]]
-            return super().search(*args, calmer=calmer, **settings)
-
-    paces, found = [], ["a", "", "bcd", "e"]
-    planner = Restless([], [])
+    planner = Restless("a", "", "bcd", "e")
     planner.brisk, planner.paces = True, 2
     cost = {"a": np.inf, "b": 1.0, "c": 2.0, "d": 3.0, "e": 4.0}
     run = Run(planner, {"e"}, monkeypatch, cost, stretching="a", candidates=8)
-    assert run.tested == ["b", "c", "d", "e"] and paces == [0, 0, -1, -1] and run.result.passed
+    assert run.tested == ["b", "c", "d", "e"] and planner.asked == [0, 0, -1, -1] and run.result.passed
 
 
 def test_where_links_touch_the_world_the_pace_does_not_yield(monkeypatch):

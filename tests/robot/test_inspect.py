@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -58,20 +59,26 @@ def test_a_draft_loads(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
         robots.main(["--inspect", str(file), "--out", str(out)])
 
 
-def test_what_is_missing_is_said_at_once(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    file = tmp_path / "biped.xml"
-    file.write_text(biped_mjcf())
-    assert robots.main(["--inspect", str(file)]) == 1
-    text = capsys.readouterr().out
+@pytest.fixture
+def inspected(tmp_path: Path, capsys: pytest.CaptureFixture) -> Callable[[str, str], str]:
+    """What is printed of a model, by the name of its file and its text, whose draft is not complete."""
+
+    def inspect(name: str, text: str) -> str:
+        (tmp_path / name).write_text(text)
+        assert robots.main(["--inspect", str(tmp_path / name)]) == 1
+        return capsys.readouterr().out
+
+    return inspect
+
+
+def test_what_is_missing_is_said_at_once(inspected: Callable[[str, str], str]) -> None:
+    text = inspected("biped.xml", biped_mjcf())
     assert "does not load yet: look up [limits.velocity] of 12 joints (left_hip_pitch, " in text
     assert '# "*_knee" =' in text and "limits.torque" not in text
 
 
-def test_torques_of_no_motor_are_to_be_looked_up(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    file = tmp_path / "biped.xml"
-    file.write_text(biped_mjcf().replace("-250 250", "-250000 250000"))
-    assert robots.main(["--inspect", str(file)]) == 1
-    text = capsys.readouterr().out
+def test_torques_of_no_motor_are_to_be_looked_up(inspected: Callable[[str, str], str]) -> None:
+    text = inspected("biped.xml", biped_mjcf().replace("-250 250", "-250000 250000"))
     assert "look up [limits.torque] of 2 joints (left_knee, right_knee); [limits.velocity] of 12" in text
     assert '# [limits.torque]\n# "*_knee" =\n' in text
 
@@ -91,11 +98,9 @@ def test_a_hand_without_shapes_ends_where_its_inertia_does(tmp_path: Path) -> No
     np.testing.assert_allclose(found.pose.position, [0.0, 0.0, -0.08 - half[2]], atol=2e-3)
 
 
-def test_feet_without_shapes_are_said_to_be_guessed(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    file = tmp_path / "biped.urdf"
-    file.write_text(biped_urdf().replace('<box size="0.2 0.1 0.02"/>', '<mesh filename="sole.dae"/>'))
-    assert robots.main(["--inspect", str(file)]) == 1
-    text = capsys.readouterr().out
+def test_feet_without_shapes_are_said_to_be_guessed(inspected: Callable[[str, str], str]) -> None:
+    sole = '<mesh filename="sole.dae"/>'
+    text = inspected("biped.urdf", biped_urdf().replace('<box size="0.2 0.1 0.02"/>', sole))
     assert "the draft loads: 12 joints, CoM at 0." in text
     assert ", but look up [limbs.left_foot]: 'left_foot_link' has no shape that can be read" in text
     assert '[mend]\ncollision = { left_sole = "none", right_sole = "none" }' in text

@@ -110,10 +110,8 @@ def _arrived(goal: Goal, centre: np.ndarray, contact: Contact, margin: float, bo
 
     Both feet are displaced alike here. That covers any other displacements of the two, since the goal is convex.
     """
-    moved = centre + _ways(contact, box)
-    planned = np.hypot(*(centre - goal.position)[:2])
-    farthest = np.hypot(*(moved - goal.position)[:, :2].T).max()
-    return bool(farthest <= max(goal.radius - margin, planned + 1e-9))
+    farthest = goal.distance(centre + _ways(contact, box)).max()
+    return bool(farthest <= max(goal.radius - margin, goal.distance(centre) + 1e-9))
 
 
 def _free(hits: Callable[[np.ndarray, np.ndarray], np.ndarray], contact: Contact, box: np.ndarray) -> bool:

@@ -188,7 +188,7 @@ class _Run:
             if self._care < self._most_care:
                 self._care += 1
                 return True
-        if self._searches[-1].briskest or self._hurried:
+        if self._hurried or not self._searches[-1].brisker:
             return again
         self._care, self._most_care, self._pace, self._hurried = 0, 0, self._pace - 1, True
         return True

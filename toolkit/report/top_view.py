@@ -105,7 +105,7 @@ def _extent(world: World, points: list[np.ndarray]) -> tuple[np.ndarray, np.ndar
     goal = world.goal
     around = [world.start.position[:2], goal.position[:2] - goal.radius, goal.position[:2] + goal.radius, *points]
     low, high = np.min(around, axis=0) - BORDER, np.max(around, axis=0) + BORDER
-    corners = [(surface.pose @ _flat(surface.boundary[0]))[:, :2] for surface in world.surfaces]
+    corners = [surface.rings[0][:, :2] for surface in world.surfaces]
     if corners:
         everything = np.concatenate(corners)
         low = np.maximum(low - 0.3, np.minimum(low, everything.min(0) - 0.1))
@@ -122,8 +122,8 @@ def _draw_surface(axes, surface: Surface) -> None:
     """Draw a surface with its holes; a steep one appears as a line."""
     color = FOOT_SURFACE if surface.serves_foot else PALM_SURFACE if surface.serves_palm else OTHER_SURFACE
     vertices, codes = [], []
-    for ring in surface.boundary:
-        points = (surface.pose @ _flat(ring))[:, :2]
+    for ring in surface.rings:
+        points = ring[:, :2]
         vertices += [*points, points[0]]
         codes += [Outline.MOVETO, *[Outline.LINETO] * (len(points) - 1), Outline.CLOSEPOLY]
     outline = Outline(np.array(vertices), codes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from toolkit.geometry.pose import Pose
 from toolkit.robot.chain import bodies_above, joints_to
-from toolkit.robot.mend import geom_points
+from toolkit.robot.mend import box_corners, geom_points
 
 FLAT = 0.001  # m; points so near to the lowest one belong to the sole
 _AROUND = 48  # points around round shapes
@@ -32,8 +32,8 @@ class FoundPatch:
         size: Full size (2,) m along x and y.
         pad: Whether the patch needs a box of its own: the shape is round there, or does not collide.
         joints: Joints from the base to the body, in order.
-        seen: Whether there is anything to go by; without, the patch is a small one at the body's frame.
-        shaped: Whether that are shapes, and not the inertia of a hand.
+        shaped: Whether there are shapes.
+        weighed: Whether a hand has none, and its inertia says where it ends.
     """
 
     body: str
@@ -41,8 +41,13 @@ class FoundPatch:
     size: np.ndarray
     pad: bool
     joints: tuple[str, ...]
-    seen: bool
     shaped: bool
+    weighed: bool = False
+
+    @property
+    def seen(self) -> bool:
+        """Whether there is anything to go by; without, the patch is a small one at the body's frame."""
+        return self.shaped or self.weighed
 
 
 @dataclass(frozen=True)
@@ -304,29 +309,32 @@ def _palm(model: mujoco.MjModel, data: mujoco.MjData, hand: int, legs: set[int],
     axes = np.column_stack([ahead, np.cross(-out, ahead), -out])
     low, high = (palm @ axes).min(0), (palm @ axes).max(0)
     centre = middle + out * float((points @ out).max() - middle @ out)
-    patch = _patch(model, data, hand, Pose(axes, centre), (high - low)[:2], True)
-    return replace(patch, seen=patch.seen or weighed)
+    return _patch(model, data, hand, Pose(axes, centre), (high - low)[:2], True, weighed)
 
 
 def _inertia_box(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> np.ndarray:
     """Corners (8, 3) m in the world of the box that has a body's mass and inertia."""
     inertia, mass = model.body_inertia[body], max(float(model.body_mass[body]), 1e-9)
     half = np.sqrt(np.maximum(1.5 * (inertia.sum() - 2 * inertia) / mass, 0.0))
-    signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3)
-    return (signs * half) @ data.ximat[body].reshape(3, 3).T + data.xipos[body]
+    return box_corners(half) @ data.ximat[body].reshape(3, 3).T + data.xipos[body]
 
 
 def _patch(
-    model: mujoco.MjModel, data: mujoco.MjData, body: int, pose: Pose, size: np.ndarray, pad: bool
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    body: int,
+    pose: Pose,
+    size: np.ndarray,
+    pad: bool,
+    weighed: bool = False,
 ) -> FoundPatch:
     world_from_body = Pose(data.xmat[body].reshape(3, 3), data.xpos[body])
-    shaped = bool(len(_drawn(model, body)))
     return FoundPatch(
         body=model.body(body).name,
         pose=world_from_body.inverse() @ pose,
         size=np.maximum(size, _LEAST_PATCH),
         pad=pad,
         joints=_names(model, joints_to(model, body)),
-        seen=shaped,
-        shaped=shaped,
+        shaped=bool(len(_drawn(model, body))),
+        weighed=weighed,
     )

@@ -186,7 +186,7 @@ def _palm(limb: Limb, patch: FoundPatch, model: mujoco.MjModel) -> list[str]:
     elbow = joints[-4] if len(joints) >= 7 else joints[-2]
     torque = _torques(model).get(elbow)
     lines = _limb(limb, patch)
-    if patch.seen and not patch.shaped:
+    if patch.weighed:
         lines[0] += "   # the hand has no shape: this is the end of a box with its inertia"
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

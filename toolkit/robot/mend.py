@@ -156,9 +156,13 @@ def geom_points(model: mujoco.MjModel, geom: int) -> np.ndarray:
     if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
         points = mesh_vertices(model, model.geom_dataid[geom])
     else:
-        corners = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), -1).reshape(-1, 3)
-        points = model.geom_aabb[geom, :3] + corners * model.geom_aabb[geom, 3:]
+        points = model.geom_aabb[geom, :3] + box_corners(model.geom_aabb[geom, 3:])
     return pose @ points
+
+
+def box_corners(half: np.ndarray) -> np.ndarray:
+    """(8, 3) m; corners of a box with half extents (3,) m around the origin."""
+    return np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), -1).reshape(-1, 3) * half
 
 
 def geom_spheres(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, float]:

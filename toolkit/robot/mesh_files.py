@@ -29,11 +29,12 @@ def converted(file: Path, *, upright: bool = False) -> bytes | None:
     ending = file.suffix.lower()
     if not (ending == ".dae" or (ending == ".stl" and _is_text(file)) or (ending == ".obj" and _in_parts(file))):
         return None
-    import coal  # here, as few robots need it
-    import trimesh
-    from scipy.spatial import ConvexHull, QhullError
+    import trimesh  # here, as few robots need it
 
     if ending == ".dae":
+        import coal
+        from scipy.spatial import ConvexHull, QhullError
+
         try:
             points = np.asarray(coal.MeshLoader().load(str(file), np.ones(3)).vertices(), float)
             points = _unit(file) * points[ConvexHull(points).vertices]  # which raises where they lie in a plane

@@ -92,9 +92,7 @@ def _on_ground(ground: list[Surface], point: Sequence[float], option: str) -> np
     heights = np.array([surface.height(np.array([point]))[0] for surface in ground])
     if np.isfinite(heights).any():
         return np.array([*point, np.nanmin(heights)])
-    corners = np.concatenate(
-        [(s.pose @ np.column_stack([s.boundary[0], np.zeros(len(s.boundary[0]))])) for s in ground]
-    )
+    corners = np.concatenate([surface.rings[0] for surface in ground])
     near = corners[int(np.linalg.norm(corners[:, :2] - point, axis=1).argmin())]
     low, high = corners.min(axis=0), corners.max(axis=0)
     raise InputError(

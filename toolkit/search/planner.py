@@ -123,7 +123,7 @@ class ContactPlanner:
             exclusions: Transitions that later stages rejected; the search avoids them.
             palms: Whether this search may use palms, where `config.palms` allows them at all.
             calmer: How often the pace has yielded, where it is the planner's to choose; see `timings`.
-                -1 where the search before was not the `briskest`.
+                -1 where a `brisker` one was left after the search before.
             care: How often the margins of the legs have grown, up to `MOST_CARE`.
 
         Returns:
@@ -161,7 +161,7 @@ class ContactPlanner:
             slides=way.slides,
             paced=self.paced,
             calmer=paces,
-            briskest=way.slides or not (self.paced and self._held_back and calmer == 0),
+            brisker=self.paced and self._held_back and calmer == 0 and not way.slides,
             screen=parts.screen,
         )
 

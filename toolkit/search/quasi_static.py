@@ -28,7 +28,6 @@ from toolkit.search.moves.legs import legs_of, reach
 from toolkit.search.moves.limits import margins
 from toolkit.search.planner import ContactPlanner
 from toolkit.search.planner_config import PlannerConfig
-from toolkit.world.surface import Surface
 from toolkit.world.world import World
 
 _FRICTION = 0.9  # part of the friction coefficients that may be used
@@ -141,16 +140,12 @@ def quasi_static_planner(robot: RobotModel, world: World, config: PlannerConfig 
 
 def _walls_in_reach(robot: RobotModel, world: World) -> bool:
     """Whether a corner of a palm surface is at waist height above ground no farther away than an arm reaches."""
-
-    def corners(surface: Surface) -> np.ndarray:
-        return surface.pose @ np.column_stack([surface.boundary[0], np.zeros(len(surface.boundary[0]))])
-
-    ground = [corners(surface) for surface in world.surfaces if surface.serves_foot]
+    ground = [surface.rings[0] for surface in world.surfaces if surface.serves_foot]
     lower, upper = np.array([points.min(0) for points in ground]), np.array([points.max(0) for points in ground])
     reach = 1.5 * max(arm.max_reach for arm in robot.arms.values())
     for surface in world.surfaces:
         if surface.serves_palm:
-            points = corners(surface)[:, None]
+            points = surface.rings[0][:, None]
             near = ((points >= lower - reach) & (points <= upper + reach))[..., :2].all(-1)
             if (near & (points[..., 2] - upper[:, 2] > 0.6 * robot.com_height)).any():
                 return True

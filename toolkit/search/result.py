@@ -82,7 +82,7 @@ class SearchResult:
         paced: Whether the planner chose the timing; see there.
         calmer: The calmest timing of every pace to come, the fastest pace first; empty where the pace is not the
             planner's to choose, or none is left.
-        briskest: Whether no brisker pace was left; else it is that of `calmer` = -1 in `ContactPlanner.search`.
+        brisker: Whether a brisker pace is left, that of `calmer` = -1 in `ContactPlanner.search`.
         screen: The screens of the search, for sequences that are made from what it found; None where there are none.
     """
 
@@ -97,7 +97,7 @@ class SearchResult:
     slides: bool = False
     paced: bool = False
     calmer: tuple[Timing, ...] = ()
-    briskest: bool = True
+    brisker: bool = False
     screen: SequenceScreen | None = field(default=None, repr=False, compare=False)
 
 

@@ -40,7 +40,7 @@ def _span(goal: Goal, surface: Surface) -> tuple[float, float] | None:
     """Least and greatest height in m of a surface within a goal's radius; None where no foot stands on it there."""
     if not surface.serves_foot:
         return None
-    rings = [(surface.pose @ np.column_stack([ring, np.zeros(len(ring))]))[:, :2] for ring in surface.boundary]
+    rings = [ring[:, :2] for ring in surface.rings]
     low, high = rings[0].min(0), rings[0].max(0)
     if (low > goal.position[:2] + goal.radius).any() or (high < goal.position[:2] - goal.radius).any():
         return None

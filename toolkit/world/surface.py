@@ -52,6 +52,11 @@ class Surface:
         """The region, holes included, in the surface's frame."""
         return Polygon(self.boundary[0], self.boundary[1:])
 
+    @property
+    def rings(self) -> list[np.ndarray]:
+        """Rings (k, 3) of the boundary in the world, m; see there."""
+        return [self.pose @ np.column_stack([ring, np.zeros(len(ring))]) for ring in self.boundary]
+
     def height(self, points: np.ndarray) -> np.ndarray:
         """World z (n,) in m of a surface that is not vertical at points (n, 2) of the world's xy, NaN outside it."""
         normal, origin = self.normal, self.pose.position

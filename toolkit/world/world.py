@@ -40,9 +40,9 @@ class Goal:
         off = np.maximum(self.floor[0] - place[..., 2], place[..., 2] - self.floor[1])
         return np.where(off > 0.0, np.maximum(away, self.radius) + off, away)
 
-    def on_floor(self, height: np.ndarray) -> np.ndarray:
-        """(...,) bool; whether heights (...,) m are those of its floor."""
-        return (height >= self.floor[0]) & (height <= self.floor[1])
+    def on_floor(self, height: np.ndarray, slack: float = 0.0) -> np.ndarray:
+        """(...,) bool; whether heights (...,) m are those of its floor, or beyond it by no more than a slack in m."""
+        return (height >= self.floor[0] - slack) & (height <= self.floor[1] + slack)
 
 
 @dataclass(frozen=True)

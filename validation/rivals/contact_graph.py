@@ -66,7 +66,6 @@ def _box(planner: ContactPlanner) -> np.ndarray:
     points = [planner.world.start.position[None, :2], planner.world.goal.position[None, :2]]
     for surface in planner.world.surfaces:
         if surface.serves_foot:
-            ring = surface.boundary[0]
-            points.append((surface.pose @ np.column_stack([ring, np.zeros(len(ring))]))[:, :2])
+            points.append(surface.rings[0][:, :2])
     everything = np.concatenate(points)
     return np.array([everything.min(0), everything.max(0)])

@@ -126,8 +126,7 @@ class Proof:
         self._rise = climb(robot) + 2 * self._merge
         self._goal = self._levels > -np.inf
         self._goal &= self._within(world.goal.position[:2], world.goal.radius + self._cell)[..., None]
-        low, high = np.array(world.goal.floor) + [-self._merge, self._merge]
-        self._goal &= (self._levels >= low) & (self._levels <= high)
+        self._goal &= world.goal.on_floor(self._levels, self._merge)
         mark_stances(self._levels, ground, around, self._rise, self._merge, self._goal)
         self._free = np.zeros(self._levels.shape, np.bool_)
         if self._goal.any():

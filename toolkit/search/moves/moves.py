@@ -79,7 +79,7 @@ class MoveGenerator:
 
     Attributes:
         table: The table in which contacts are entered, empty at first.
-        legs: Both legs with the margins of the search.
+        legs: Both legs with the least margins of a search.
         shanks: See `Body`.
         has_palm_surfaces: Whether the world has surfaces for palms.
     """
