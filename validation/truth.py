@@ -109,7 +109,9 @@ class Truth:
             motions: Most motions that it may optimise.
         """
         config = RefineConfig(optimisations=motions)
-        local = LocalSearch(config, self.cost, lambda sequence: self._tester.optimise(sequence)[0], self._tester.slide)
+        tester = self._tester
+        motion_of = lambda sequence: tester.optimise(sequence)[0]  # noqa: E731
+        local = LocalSearch(config, self.cost, motion_of, tester.slide, tester.part)
         return self._timed(lambda: local.improved(plan, origin, screen, lambda sequence: True))
 
     def _timed(self, make: Callable[[], MotionPlan]) -> Outcome:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from toolkit.centroidal.part import part_motion
 from toolkit.centroidal.plan import MotionConfig, keeps_margins, plan_motion, slid
 from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.sequence import SequenceConfig
@@ -21,7 +22,7 @@ class Workshop:
     """What a local search asks for, counted."""
 
     def __init__(self, walk):
-        self._walk, self.sequences, self.slides = walk, [], []
+        self._walk, self.sequences, self.slides, self.parts = walk, [], [], []
 
     def optimise(self, sequence):
         self.sequences.append(sequence)
@@ -32,8 +33,12 @@ class Workshop:
         self.slides.append(share.copy())
         return slid(plan, landing, SequenceConfig(), share)
 
+    def part(self, plan, part, first, following):
+        self.parts.append(len(part.transitions))
+        return part_motion(plan, part, first, following, SequenceConfig())
+
     def search(self, **settings):
-        return LocalSearch(RefineConfig(**settings), COST, self.optimise, self.slide)
+        return LocalSearch(RefineConfig(**settings), COST, self.optimise, self.slide, self.part)
 
 
 @pytest.fixture(scope="module")

@@ -140,8 +140,9 @@ def sequence_problem(
     com_velocity: np.ndarray,
     *,
     config: ProblemConfig | None = None,
+    final_at_rest: bool = True,
 ) -> CentroidalProblem:
-    """Problem of a whole schedule, which ends at rest; the steps of a phase are equally long.
+    """Problem of a whole schedule; the steps of a phase are equally long.
 
     Args:
         robot: The robot.
@@ -149,6 +150,7 @@ def sequence_problem(
         com: (3,) m; initial CoM in the world.
         com_velocity: (3,) m/s.
         config: Settings; the defaults where None.
+        final_at_rest: Whether the CoM must be at rest at the end.
 
     Raises:
         InputError: The schedule ends with a foot in the air, or as in `transition_problem`.
@@ -176,7 +178,7 @@ def sequence_problem(
         for contact in phase.contacts:
             _put(arrays, contact, begin, end)
         begin = end
-    return _problem(robot, config, arrays, dt, yaw, com, com_velocity, last, True, landing=None)
+    return _problem(robot, config, arrays, dt, yaw, com, com_velocity, last, final_at_rest, landing=None)
 
 
 def _contact_arrays(steps: int) -> tuple[np.ndarray, ...]:

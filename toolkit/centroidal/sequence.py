@@ -66,21 +66,25 @@ def optimise(
     com: np.ndarray,
     com_velocity: np.ndarray,
     *,
+    spin: np.ndarray | None = None,
     config: SequenceConfig = SequenceConfig(),
     room: np.ndarray | None = None,
     surroundings: Surroundings | None = None,
+    at_rest: bool = True,
 ) -> CentroidalMotion:
-    """Optimise the motion of a whole schedule, which ends at rest.
+    """Optimise the motion of a whole schedule, which ends at rest unless it is a part of a longer one.
 
     Args:
         robot: The robot, with its mass, patches, legs and arms.
         schedule: The phases; the last one has both feet in contact.
         com: (3,) m; initial CoM in the world.
         com_velocity: (3,) m/s.
+        spin: (3,) kg m^2/s; initial angular momentum about the CoM; None: none.
         config: Settings.
         room: (transitions, 2, 2) m; lowest and highest displacement of each transition's contact along its own axes,
             where feet may land elsewhere; `CentroidalMotion.landed` says where they do. None: contacts stay as planned.
         surroundings: What limits where the CoM may be; None: nothing does.
+        at_rest: Whether the CoM must be at rest at the end.
 
     Returns:
         The motion. Feasible where NumPy confirms it within the margins that it keeps and the body's limits; else its
@@ -89,7 +93,9 @@ def optimise(
     Raises:
         InputError: As `sequence_problem`, or a contact is not finite.
     """
-    problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem)
+    problem = sequence_problem(robot, schedule, com, com_velocity, config=config.problem, final_at_rest=at_rest)
+    if spin is not None:
+        problem = replace(problem, angular_momentum=np.array(spin, float))
     if surroundings is not None:
         problem = _confined(problem, surroundings)
     landings = None if room is None else _landings(problem, schedule, room)

@@ -58,7 +58,7 @@ class ContactSequence:
     start: Stance
     transitions: tuple[ContactTransition, ...]
 
-    @property
+    @cached_property
     def stances(self) -> tuple[Stance, ...]:
         """(len(transitions) + 1,) stances: the start, then the one after each transition."""
         stances = [self.start]
@@ -76,6 +76,10 @@ class ContactSequence:
             ),
         )
 
+    def part(self, first: int, end: int) -> ContactSequence:
+        """Its transitions [first, end), from the stance before them."""
+        return ContactSequence(self.stances[first], self.transitions[first:end])
+
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """Every contact: those of the start, then what each transition makes."""
@@ -86,7 +90,43 @@ class ContactSequence:
         """Bytes that are equal for equal sequences: limbs, places, surfaces and timings, to the last bit."""
         return b"|".join(each.identity for each in (*self.start.contacts, *self.transitions))
 
+    @cached_property
+    def identities(self) -> tuple[bytes, ...]:
+        """(transitions,) the transitions' `identity`."""
+        return tuple(each.identity for each in self.transitions)
+
     @property
     def duration(self) -> float:
         """Length of all transitions in s."""
         return sum(transition.timing.shift + transition.timing.swing for transition in self.transitions)
+
+
+@dataclass(frozen=True)
+class Change:
+    """Where two sequences from one stance differ, with some transitions more on both sides.
+
+    Attributes:
+        old: That part of the first sequence.
+        new: The same of the second one, which ends in the same stance.
+        first: Number of their first transition, in both sequences.
+    """
+
+    old: ContactSequence
+    new: ContactSequence
+    first: int
+
+    @classmethod
+    def between(cls, old: ContactSequence, new: ContactSequence, around: int) -> Change:
+        """Where two sequences differ, and `around` transitions on either side of that."""
+        a, b = old.identities, new.identities
+        least = min(len(a), len(b))
+        before = next((index for index in range(least) if a[index] != b[index]), least)
+        after = next((index for index in range(least - before) if a[-1 - index] != b[-1 - index]), least - before)
+        stance = old.stances[before]
+        for transition in new.transitions[before : len(b) - after]:
+            stance = transition.apply(stance)
+        while after and stance.identity != old.stances[len(a) - after].identity:
+            stance, after = new.transitions[len(b) - after].apply(stance), after - 1
+        first, kept = max(0, before - around), max(0, after - around)
+        part = old.part(first, len(a) - kept)
+        return cls(part, replace(part, transitions=new.transitions[first : len(b) - kept]), first)

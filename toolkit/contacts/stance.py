@@ -49,6 +49,11 @@ class Stance:
         if limbs != sorted(set(limbs)) or limbs[: len(FEET)] != list(FEET):
             raise ValueError(f"a stance needs both feet, each limb once and in order; got {[x.label for x in limbs]}")
 
+    @cached_property
+    def identity(self) -> bytes:
+        """Bytes that are equal for equal stances: those of all contacts."""
+        return b"|".join(contact.identity for contact in self.contacts)
+
     def __getitem__(self, limb: Limb) -> Contact:
         for contact in self.contacts:
             if contact.limb == limb:

@@ -439,7 +439,7 @@ class _Run:
         if config is None or screen is None:
             return []
         if self._local is None:
-            self._local = LocalSearch(config, self._weights, self._optimise, self._tester.slide)
+            self._local = LocalSearch(config, self._weights, self._optimise, self._tester.slide, self._tester.part)
         began, before = time.perf_counter(), self._local.spent
         self._observer.started("refinement")
         origin = candidate.solution.sequence

@@ -9,10 +9,12 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
+from toolkit.centroidal.part import part_motion
 from toolkit.centroidal.plan import MotionConfig, MotionPlan, keeps_margins, plan_motion, slid
+from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.failure import Failure
 from toolkit.contacts.room import RoomConfig
-from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.sequence import ContactSequence, ContactTransition
 from toolkit.execution.check import Result
 from toolkit.execution.result import Execution
 from toolkit.execution.run import execute
@@ -113,6 +115,12 @@ class Tester:
     def slide(self, plan: MotionPlan, landing: RoomConfig, share: np.ndarray) -> MotionPlan | None:
         """Move the landing points of a plan; see `toolkit.centroidal.plan.slid`."""
         return slid(plan, landing, self._config.sequence, share, self._surroundings)
+
+    def part(
+        self, plan: MotionPlan, part: ContactSequence, first: int, following: ContactTransition | None
+    ) -> CentroidalMotion:
+        """Optimise a part of a sequence from a plan's state; see `toolkit.centroidal.part.part_motion`."""
+        return part_motion(plan, part, first, following, self._motions.optimiser, self._surroundings)
 
     def test(self, candidate: Candidate) -> Trial:
         """Put a candidate through the stages after the optimiser; stop at the first that fails.

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.sequence import Change, ContactSequence
 from toolkit.contacts.stance import Contact, Stance
 from toolkit.geometry.limb import FEET, Limb
 from toolkit.robot.scale import USUAL, Scale
@@ -20,6 +20,7 @@ from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.plan_cost import PlanCost, known_costs
 from toolkit.world.world import Goal
 
+_AROUND = 1  # transitions beside those that differ; the CoM is where they have it in both variants
 _OVER = 0.7  # part of the way from the middle of the feet to the standing one, in the middle of a swing
 _HELD = 0.4  # the same while a palm helps
 # s in which the CoM of a body of the usual size (`toolkit.robot.scale`) reaches the middle of the feet after the last
@@ -39,17 +40,26 @@ class Foresight:
     """
 
     def __init__(self, sequence: ContactSequence, cost: PlanCost, config: CostConfig, goal: Goal, scale: Scale = USUAL):
+        self._sequence, self._cost = sequence, cost.total
         self._config, self._goal, self._scale = config, goal, scale
         # Known cost, place of the CoM, shift and swing of each transition that was met. Variants share most of them.
         self._met: dict[tuple[bytes, bytes, bool, bytes], np.ndarray] = {}
-        known, way = self._known_and_travel(sequence)
+        self._parts: dict[tuple[int, int], float] = {}  # what parts of the sequence are worth
+        _, way = self._known_and_travel(sequence)
         self._per_travel = cost.dynamics / max(way, 1e-9)
-        self._rests = cost.total - cost.dynamics - known
 
-    def __call__(self, sequence: ContactSequence) -> float:
+    def __call__(self, variant: ContactSequence) -> float:
         """The guess for a variant."""
-        known, way = self._known_and_travel(sequence)
-        return known + self._rests + self._per_travel * way
+        change = Change.between(self._sequence, variant, _AROUND)
+        part = change.first, len(change.old.transitions)
+        if part not in self._parts:
+            self._parts[part] = self._worth(change.old)
+        return self._cost + self._worth(change.new) - self._parts[part]
+
+    def _worth(self, part: ContactSequence) -> float:
+        """What a part of a sequence costs, but for what is equal in all variants."""
+        known, way = self._known_and_travel(part)
+        return known + self._per_travel * way
 
     def _known_and_travel(self, sequence: ContactSequence) -> tuple[float, float]:
         """The cost that is known without the motion, and `travel`."""

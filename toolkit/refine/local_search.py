@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain
 from operator import itemgetter
@@ -10,23 +10,27 @@ from operator import itemgetter
 import numpy as np
 
 from toolkit.centroidal.plan import MotionPlan, keeps_margins
+from toolkit.centroidal.problem import CentroidalMotion
 from toolkit.contacts.room import RoomConfig
-from toolkit.contacts.sequence import ContactSequence
+from toolkit.contacts.sequence import Change, ContactSequence, ContactTransition
 from toolkit.refine.chains import FootChains
 from toolkit.refine.foresight import Foresight
 from toolkit.refine.variants import left_out, relinked, swapped, without_palms
 from toolkit.search.costs.edge_cost import CostConfig, arrival_radius
-from toolkit.search.costs.plan_cost import PlanCost, plan_cost
+from toolkit.search.costs.plan_cost import PlanCost, known_costs, plan_cost
 from toolkit.search.sequence_screen import SequenceScreen
 
 Optimise = Callable[[ContactSequence], MotionPlan]
 """The motion of a sequence with its contacts where they are."""
 Slide = Callable[[MotionPlan, RoomConfig, np.ndarray], "MotionPlan | None"]
 """A plan with landing points moved, each within a share of its room; see `toolkit.centroidal.plan.slid`."""
+PartMotion = Callable[[MotionPlan, ContactSequence, int, "ContactTransition | None"], CentroidalMotion]
+"""The motion of a part of a sequence from a plan's state; see `toolkit.centroidal.part.part_motion`."""
 Allowed = Callable[[ContactSequence], bool]
 """Whether a sequence may be tried at all."""
 
 _SHARES = (0.4, 0.0)  # parts of their room that landing points get after the screens rejected them once, and twice
+_PART = 0.5  # of a sequence; variants whose part around what differs is longer are judged whole
 _SLIDE = 1.03  # variants that lack margins but cost at most this much more than is wanted get their contacts moved
 
 
@@ -48,6 +52,7 @@ class RefineConfig:
             that only leave contacts out.
         slides: Most times in a row that landing points are moved.
         landing: How far they move each time.
+        around: Transitions on either side of those that differ which show what a variant of a long sequence costs.
     """
 
     starts: int = 2
@@ -59,6 +64,7 @@ class RefineConfig:
     patience: int = 12
     slides: int = 3
     landing: RoomConfig = field(default_factory=lambda: RoomConfig(reach=(0.15, 0.1)))
+    around: int = 6
 
 
 class LocalSearch:
@@ -69,14 +75,16 @@ class LocalSearch:
         cost: Weights of the true cost.
         optimise: Optimises the motion of a sequence.
         slide: Moves the landing points of a plan.
+        part: Optimises a part of a sequence.
 
     Attributes:
-        spent: Number of motions that were optimised so far.
+        spent: Number of motions of whole sequences that were optimised so far.
     """
 
-    def __init__(self, config: RefineConfig, cost: CostConfig, optimise: Optimise, slide: Slide):
-        self._config, self._cost, self._optimise, self._slide = config, cost, optimise, slide
+    def __init__(self, config: RefineConfig, cost: CostConfig, optimise: Optimise, slide: Slide, part: PartMotion):
+        self._config, self._cost, self._optimise, self._slide, self._part = config, cost, optimise, slide, part
         self._known: dict[bytes, tuple[MotionPlan, PlanCost]] = {}
+        self._parts: dict[tuple[bytes, int, int], CentroidalMotion] = {}  # of plans' own sequences
         self._limit = self.spent = 0
         self._longer = 1.0  # how many times as long as usual the sequence is
 
@@ -151,8 +159,10 @@ class LocalSearch:
                 continue
             if best is not None and tried >= self._config.batch:
                 break
-            found = self._judged(variant, plan, screen, least, astray)
             tried += 1
+            if not self._promises(variant, plan, cost, least):
+                continue
+            found = self._judged(variant, plan, screen, least, astray)
             if found is not None and found[1].total < least:
                 best, least = found, found[1].total
         return best
@@ -176,9 +186,44 @@ class LocalSearch:
             if best.identity not in fewer and (cost_of_best := guess(best)) <= most:
                 others[best.identity] = cost_of_best, best
         others.pop(sequence.identity, None)
-        ranked = sorted(others.values(), key=itemgetter(0))[: int(self._longer * self._config.patience)]
-        ranked = [*((guess(each), each) for each in fewer.values()), *ranked]
+        ranked = [*((guess(each), each) for each in fewer.values()), *self._promising(sequence, others.values())]
         yield from (each for _, each in sorted(ranked, key=itemgetter(0)))
+
+    def _promising(
+        self, sequence: ContactSequence, others: Iterable[tuple[float, ContactSequence]]
+    ) -> list[tuple[float, ContactSequence]]:
+        """Those variants with the least guesses, as many in each stretch of a long sequence."""
+        stretches = int(self._longer)
+        counts, most = [0] * stretches, int(self._longer * self._config.patience / stretches)
+        ranked = []
+        for each in sorted(others, key=itemgetter(0)):
+            first = Change.between(sequence, each[1], 0).first
+            stretch = first * stretches // len(sequence.transitions)
+            counts[stretch] += 1
+            if counts[stretch] <= most:
+                ranked.append(each)
+        return ranked
+
+    def _promises(self, variant: ContactSequence, plan: MotionPlan, cost: PlanCost, wanted: float) -> bool:
+        """Whether a variant may cost less than is wanted, as far as the motion around what differs tells.
+
+        That is asked only where it is a small part of the sequence, and no motion of the whole is known.
+        """
+        change = Change.between(plan.sequence, variant, self._config.around)
+        if len(change.new.transitions) > _PART * len(variant.transitions) or variant.identity in self._known:
+            return True
+        first, end = change.first, change.first + len(change.old.transitions)
+        following = next(iter(plan.sequence.transitions[end : end + 1]), None)
+        key = plan.sequence.identity, first, end
+        if key not in self._parts:
+            self._parts[key] = self._part(plan, change.old, first, following)
+        old, new = self._parts[key], self._part(plan, change.new, first, following)
+        if not (old.feasible and new.feasible):
+            return not old.feasible
+        goal, scale = plan.world.goal, plan.robot.scale
+        known = [known_costs(part, goal, self._cost, scale).sum() for part in (change.old, change.new)]
+        more = known[1] - known[0] + self._cost.dynamics * (new.objective - old.objective)
+        return cost.total + more < wanted
 
     def _judged(
         self,
