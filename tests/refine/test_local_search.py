@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.refine.conftest import steps
 from toolkit.centroidal.part import part_motion
 from toolkit.centroidal.plan import MotionConfig, keeps_margins, plan_motion, slid
 from toolkit.centroidal.problem import Margins
 from toolkit.centroidal.sequence import SequenceConfig
+from toolkit.contacts.sequence import Change
+from toolkit.refine.chains import FootChains
 from toolkit.refine.foresight import Foresight, travel
 from toolkit.refine.local_search import LocalSearch, RefineConfig, arrives
-from toolkit.refine.variants import left_out, swapped
+from toolkit.refine.variants import left_out, relinked, swapped
 from toolkit.search.costs.edge_cost import CostConfig
 from toolkit.search.costs.plan_cost import plan_cost
 
@@ -117,6 +120,45 @@ def test_a_plan_off_its_screens_starts_from_the_sequence_of_the_search(walk, pla
     found, workshop = improved(walk, off, optimisations=12)
     assert workshop.sequences[0] is walk.sequence
     assert walk.screen.passes(found.sequence) and total(found) < total(off)
+
+
+@pytest.fixture(scope="module")
+def long_walk(walk):
+    """Thirty steps over 8.7 m, of which few can be left out."""
+    sequence = steps(walk.sequence.start, 30, 0.6)
+    goal = replace(walk.world.goal, position=np.array([8.7, 0.0, 0.0]))
+    return walk._replace(sequence=sequence, world=replace(walk.world, goal=goal))
+
+
+def test_the_motion_around_a_change_tells_what_it_costs(long_walk):
+    workshop = Workshop(long_walk)
+    base = workshop.optimise(long_walk.sequence)
+    chains, screen = FootChains(long_walk.screen), long_walk.screen
+    groups = [*([each] for each in left_out(base.sequence, screen)), *relinked(base.sequence, chains)]
+    variants = [next(iter(group), base.sequence) for group in groups][:: len(groups) // 12]
+    found = 0
+    for variant in variants:
+        change = Change.between(base.sequence, variant, RefineConfig().around)
+        end = change.first + len(change.old.transitions)
+        following = next(iter(base.sequence.transitions[end:]), None)
+        old, new = (workshop.part(base, part, change.first, following) for part in (change.old, change.new))
+        assert old.feasible
+        other = workshop.optimise(variant).motion
+        assert new.feasible == other.feasible
+        if other.feasible and variant is not base.sequence:
+            more = other.objective - base.motion.objective
+            assert new.objective - old.objective == pytest.approx(more, rel=0.05, abs=2e-3 * base.motion.objective)
+            found += 1
+    assert found > 5
+
+
+def test_variants_of_long_sequences_need_few_motions_of_the_whole(long_walk):
+    start = Workshop(long_walk).optimise(long_walk.sequence)
+    found, workshop = improved(long_walk, start, optimisations=30)
+    whole, judge = improved(long_walk, start, optimisations=30, around=100)
+    assert total(found) == pytest.approx(total(whole), rel=0.005) and total(found) < total(start)
+    assert not judge.parts
+    assert len(workshop.sequences) < len(judge.sequences) / 3
 
 
 class Astray:
