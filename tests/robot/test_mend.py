@@ -137,6 +137,19 @@ def test_inertia_that_no_body_can_have(tmp_path: Path) -> None:
     assert robot.mujoco_model.body_mass[1:].min() >= 6.0 and robot.mujoco_model.body_inertia[1:].min() >= 0.01
 
 
+def test_tendons_are_left_out_with_what_pulls_and_measures_them(tmp_path: Path) -> None:
+    fixed = '<fixed name="hamstring" range="-1 2" limited="true"><joint joint="left_knee" coef="1"/></fixed>'
+    tendon = f"<tendon>{fixed}</tendon>"
+    motor = '<actuator><motor name="pull" tendon="hamstring"/></actuator>'
+    sensor = '<sensor><tendonpos name="length" tendon="hamstring"/></sensor>'
+    model = biped_mjcf().replace("</mujoco>", f"{tendon}{motor}{sensor}</mujoco>")
+    with pytest.raises(RobotError, match="tendons are not supported; remove them, or say without_tendons = true"):
+        load_robot(str(write_robot(tmp_path / "biped", model)))
+    robot = load_robot(str(write_robot(tmp_path / "biped", model, mended("without_tendons = true"))))
+    plain = load_robot(str(write_robot(tmp_path / "biped", biped_mjcf())))
+    assert robot.mjcf == plain.mjcf
+
+
 KEY = "<keyframe><key name='stand' qpos='0 0 0 1 0 0 0 {}'/></keyframe></mujoco>"
 
 

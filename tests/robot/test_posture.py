@@ -13,7 +13,7 @@ from tests.robot.samples import biped_mjcf
 from toolkit import robots
 from toolkit.robot.anatomy import Anatomy, find_anatomy
 from toolkit.robot.loader import load_robot
-from toolkit.robot.posture import standing
+from toolkit.robot.posture import standing, stands
 
 KNEELESS = '<key name="stand" qpos="0 0 0.8 1 0 0 0 {angles}"/>'
 
@@ -102,6 +102,22 @@ def test_a_keyframe_with_straight_knees_keeps_its_arms_and_bends_its_legs() -> N
     assert set(angles) == {f"{side}_{joint}" for side in ("left", "right") for joint in ("hip_pitch", "knee")}
     bent = keyframe | {f"{side}_{joint}": angle for side in ("left", "right") for joint, angle in (("knee", 0.6),)}
     assert standing(model, find_anatomy(model), bent) == {}
+
+
+def key(base: str, left: float, right: float) -> str:
+    """A keyframe with the base turned, and knees bent, as hips and ankles make up for."""
+    legs = " ".join(f"{-knee / 2} 0 0 {knee} {-knee / 2} 0" for knee in (left, right))
+    return f'<key qpos="0 0 0.8 {base} {legs}"/>'
+
+
+def test_keyframes_that_squat_lie_or_stand_on_one_leg_are_not_at_ease() -> None:
+    upright, prone = "1 0 0 0", "0.7 0 0.7 0"
+    keys = [key(upright, 0.6, 0.6), key(upright, 0.0, 0.0), key(upright, 2.0, 2.0), key(upright, 0.3, 1.0)]
+    keys.append(key(prone, 0.6, 0.6))
+    text = biped_mjcf().replace("</mujoco>", f"<keyframe>{''.join(keys)}</keyframe></mujoco>")
+    model = mujoco.MjModel.from_xml_string(text)
+    anatomy = find_anatomy(model)
+    assert [stands(model, anatomy, each) for each in range(5)] == [True, True, False, False, False]
 
 
 def test_a_draft_names_both_sides_at_once(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

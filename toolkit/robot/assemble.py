@@ -208,7 +208,10 @@ def _strip(source: ModelSource, problems: Problems) -> None:
         else:
             spec.delete(equality)
     if spec.tendons:
-        problems.add("tendons are not supported; remove them", source.path)
+        problems.add(
+            "tendons are not supported; remove them, or say without_tendons = true in robot.toml [mend]",
+            source.path,
+        )
     world = spec.worldbody
     for group in (spec.keys, spec.sensors, spec.cameras, spec.lights, world.geoms, world.sites):
         for item in list(group):

@@ -13,7 +13,7 @@ import numpy as np
 from toolkit.geometry.limb import Limb
 from toolkit.robot.anatomy import Anatomy, FoundPatch, find_anatomy
 from toolkit.robot.motors import file_torques, most_torque
-from toolkit.robot.posture import standing, within
+from toolkit.robot.posture import standing, stands, within
 from toolkit.robot.source import ModelSource
 
 _LEAST_MASS, _LEAST_INERTIA = 1e-3, 1e-6  # kg and kg m^2, of bodies without any
@@ -98,8 +98,6 @@ def _missing_structure(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
     for j in range(model.njnt):
         if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
             missing.append(f"hinges in place of the ball joint '{model.joint(j).name}'")
-    if model.ntendon:
-        missing.append("a file without tendons")
     return missing
 
 
@@ -160,6 +158,8 @@ def _mend(model: mujoco.MjModel, source: ModelSource, anatomy: Anatomy, inertia:
     if anatomy.forward[0] < 0.98:
         x, y = np.round(anatomy.forward, 6) + 0.0
         lines.append(f"forward = [{float(x)}, {float(y)}]   # the knees say where the toes point")
+    if model.ntendon:
+        lines.append("without_tendons = true   # what they limit or pull together, [limits.position] can narrow")
     if source.turned:
         lines.append("up_axis = true   # so the shapes lie around the links' centres of mass")
     if source.unread:
@@ -201,8 +201,9 @@ def _home(model: mujoco.MjModel, anatomy: Anatomy, moved: list[str]) -> list[str
     """The posture of a keyframe, with bent knees where its own are straight; else one that hangs its arms."""
     if not anatomy.feet:
         return []
-    keys = [model.key(k).name for k in range(model.nkey)]
-    standing_key = next((name for name in _STANDING if name in keys), keys[0] if keys and keys[0] else None)
+    keys = [key for key in (model.key(k).name for k in range(model.nkey)) if key]
+    likely = [*(name for name in _STANDING if name in keys), *keys]
+    standing_key = next((name for name in likely if stands(model, anatomy, model.key(name).id)), None)
     lines, start = ["[home]", "flat_soles = true"], dict[str, float]()
     if standing_key:
         lines.append(f"keyframe = {_text(standing_key)}")

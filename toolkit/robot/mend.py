@@ -37,6 +37,8 @@ def mended(source: ModelSource, mend: Mend, base: str, problems: Problems) -> Mo
                 problems.add(f"[mend] drop '{pattern}' would remove the base '{base}'")
             else:
                 spec.delete(body)
+    if mend.without_tendons:
+        _leave_out_tendons(spec)
     if mend.forward is not None and spec.body(base) is not None:
         _turn(spec.body(base), np.arctan2(mend.forward[1], mend.forward[0]))
     if mend.collision:
@@ -69,6 +71,14 @@ def _rename(spec: mujoco.MjSpec, mend: Mend, problems: Problems) -> None:
         if equality.type == mujoco.mjtEq.mjEQ_JOINT:
             equality.name1 = mend.joints.get(equality.name1, equality.name1)
             equality.name2 = mend.joints.get(equality.name2, equality.name2)
+
+
+def _leave_out_tendons(spec: mujoco.MjSpec) -> None:
+    actuators = [item for item in spec.actuators if item.trntype == mujoco.mjtTrn.mjTRN_TENDON]
+    sensors = [item for item in spec.sensors if item.objtype == mujoco.mjtObj.mjOBJ_TENDON]
+    equalities = [item for item in spec.equalities if item.type == mujoco.mjtEq.mjEQ_TENDON]
+    for item in [*actuators, *sensors, *equalities, *spec.tendons]:
+        spec.delete(item)
 
 
 def _matching(spec: mujoco.MjSpec, pattern: str, table: str, problems: Problems) -> list[mujoco.MjsBody]:

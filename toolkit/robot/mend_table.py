@@ -11,7 +11,7 @@ from toolkit.robot.reader import Reader
 
 _KEYS = (
     "rename_bodies", "rename_joints", "drop", "collision", "exclude", "forward", "balance_inertia", "least_mass",
-    "least_inertia", "up_axis",
+    "least_inertia", "up_axis", "without_tendons",
 )  # fmt: skip
 _GROUP = re.compile(r"group ([0-5])")
 
@@ -43,6 +43,7 @@ class Mend:
         forward: Direction (x, y) of the toes in the axes of the file's base body, or None for its x axis.
         balance_inertia: Whether inertias that no body can have are evened out.
         up_axis: Whether COLLADA shapes are turned to have z up where their files say that y points up.
+        without_tendons: Whether tendons are left out, with what they limit and pull.
         least_mass, least_inertia: Least mass in kg, and least principal inertia in kg m^2, of every body.
     """
 
@@ -54,6 +55,7 @@ class Mend:
     forward: tuple[float, float] | None
     balance_inertia: bool
     up_axis: bool
+    without_tendons: bool
     least_mass: float
     least_inertia: float
 
@@ -79,6 +81,7 @@ def read_mend(reader: Reader, data: dict) -> Mend:
         forward=forward,
         balance_inertia=reader.flag(table, "balance_inertia", "mend."),
         up_axis=reader.flag(table, "up_axis", "mend."),
+        without_tendons=reader.flag(table, "without_tendons", "mend."),
         least_mass=reader.numbers(table, "least_mass", "mend.", 1, default=(0.0,), lowest=0.0)[0],
         least_inertia=reader.numbers(table, "least_inertia", "mend.", 1, default=(0.0,), lowest=0.0)[0],
     )

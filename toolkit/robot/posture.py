@@ -13,6 +13,9 @@ from toolkit.robot.anatomy import Anatomy, FoundPatch
 
 _KNEE = 0.7  # rad; flexion of the knees
 _STRAIGHT = 0.3  # rad; a keyframe whose knees bend less has no room to step
+# rad; more flexion of the knees, and a larger difference of the two, than a keyframe has that stands at ease
+_DEEP, _UNEQUAL = 1.2, 0.15
+_UPRIGHT = 0.95  # least cosine between the vertical and that of the base in such a keyframe
 _SPREADS = (0.3, 0.5, 0.7, 0.9)  # rad; upper arms out to the sides, as far as the forearms need to be free
 _FREE = 0.02  # share of the CoM's height that forearms stay away from the rest of the robot
 _ELBOW = 0.5  # rad; forearms forward of the upper arms
@@ -47,6 +50,28 @@ def standing(model: mujoco.MjModel, anatomy: Anatomy, start: Mapping[str, float]
     if bends:
         found |= _bent(model, data, legs)  # the arms have moved the CoM
     return {model.joint(joint).name: float(np.round(found[joint], 2)) + 0.0 for joint in sorted(found)}
+
+
+def stands(model: mujoco.MjModel, anatomy: Anatomy, key: int) -> bool:
+    """Whether a robot stands upright at ease in a keyframe, on both legs alike.
+
+    Args:
+        model: The compiled file.
+        anatomy: What its tree suggests, with both feet.
+        key: Number of the keyframe.
+    """
+    data, base = mujoco.MjData(model), model.body(anatomy.base).id
+    mujoco.mj_kinematics(model, data)
+    before = data.xmat[base].copy().reshape(3, 3)
+    mujoco.mj_resetDataKeyframe(model, data, key)
+    mujoco.mj_kinematics(model, data)
+    if (data.xmat[base].reshape(3, 3) @ before.T)[2, 2] < _UPRIGHT:
+        return False
+    legs = [_Leg(model, foot, anatomy) for foot in anatomy.feet]
+    if any(len(leg.joints) != 3 for leg in legs):
+        return True
+    left, right = (leg.flexion(data) for leg in legs)
+    return max(left, right) < _DEEP and abs(left - right) < _UNEQUAL
 
 
 def within(model: mujoco.MjModel, joint: int, value: float) -> float:
