@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -118,6 +119,59 @@ def test_a_base_that_looks_back_a_waist_below_the_trunk_and_an_empty_root(tmp_pa
     assert anatomy.shared == ("waist",) and anatomy.others == ("map",)
     np.testing.assert_allclose(anatomy.forward, [-1, 0], atol=1e-9)
     assert [patch.body for patch in anatomy.feet] == ["left_foot_link", "right_foot_link"]
+
+
+TURNS = {
+    "y up": [0.0, 0.70710678, 0.70710678, 0.0],
+    "looks to the left": [0.70710678, 0.0, 0.0, 0.70710678],
+    "lies on its back, askew": [0.6, 0.1, -0.75, 0.2],
+    "upside down": [0.0, 0.0, 1.0, 0.0],
+}
+
+
+@pytest.mark.parametrize("turn", TURNS.values(), ids=TURNS)
+def test_a_base_with_any_axes_gives_the_same_robot(turn: list[float], tmp_path: Path) -> None:
+    """The base's axes are turned in its file, and everything on it stays where it is; the draft turns them back."""
+    text, quaternion = biped_mjcf(), " ".join(map(str, turn))
+    w, x, y, z = turn
+    start, end = text.index("<freejoint/>") + len("<freejoint/>"), text.rindex("</body>")
+    inner = f'<frame quat="{w} {-x} {-y} {-z}">{text[start:end]}</frame>'
+    turned = text[:start].replace('pos="0 0 0.8"', f'pos="0 0 0.8" quat="{quaternion}"') + inner + text[end:]
+    robots_made = []
+    for name, model in (("plain", text), ("turned", turned)):
+        (tmp_path / f"{name}.xml").write_text(model)
+        folder = tmp_path / name
+        assert robots.main(["--inspect", str(tmp_path / f"{name}.xml"), "--out", str(folder)]) == 1
+        with (folder / "robot.toml").open("a") as draft:
+            draft.write('[limits.velocity]\n"*" = 10.0\n')
+        robots_made.append(load_robot(str(folder)))
+    plain, robot = robots_made
+    assert "[mend]" not in (tmp_path / "plain" / "robot.toml").read_text()
+    assert robot.com_height == pytest.approx(plain.com_height, abs=1e-6)
+    for foot in FEET:
+        np.testing.assert_allclose(robot.legs[foot].hip_in_com, plain.legs[foot].hip_in_com, atol=1e-6)
+        np.testing.assert_allclose(robot.legs[foot].ankle_in_sole, plain.legs[foot].ankle_in_sole, atol=1e-6)
+    np.testing.assert_allclose(robot.home[7:], plain.home[7:], atol=0.02)
+
+
+def test_toes_are_held_still_and_belong_to_the_sole(tmp_path: Path) -> None:
+    """A sole of two parts with a joint between them; ankles, which are no toes, move."""
+    text = biped_mjcf()
+    for side in ("left", "right"):
+        at = text.index("<geom", text.index(f'<body name="{side}_foot_link"'))
+        toe = f"""<body name="{side}_toe_link" pos="0.12 0 -0.065">
+          <joint name="{side}_toe" axis="0 1 0" range="-1 0.2"/>
+          <geom type="box" size="0.03 0.05 0.0075" pos="0.03 0 -0.0075" mass="0.1"/></body>"""
+        text = text[:at] + toe + text[at:]
+    (tmp_path / "biped.xml").write_text(text)
+    anatomy = find_anatomy(read_model(tmp_path / "biped.xml").spec.compile())
+    before = find_anatomy(mujoco.MjModel.from_xml_string(biped_mjcf()))
+    assert anatomy.beyond == ("left_toe", "right_toe") and before.beyond == () and not anatomy.arms
+    for found, foot in zip(anatomy.feet, before.feet, strict=True):
+        assert found.body == foot.body and found.joints == foot.joints
+        np.testing.assert_allclose(found.size, foot.size + [0.06, 0.0], atol=1e-6)
+    assert robots.main(["--inspect", str(tmp_path / "biped.xml"), "--out", str(tmp_path / "biped")]) == 1
+    assert "locked_joints = { left_toe = 0, right_toe = 0 }" in (tmp_path / "biped" / "robot.toml").read_text()
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

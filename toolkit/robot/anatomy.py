@@ -10,15 +10,19 @@ from scipy.spatial import ConvexHull, QhullError
 
 from toolkit.geometry.pose import Pose
 from toolkit.robot.chain import bodies_above, joints_to
-from toolkit.robot.mend import box_corners, geom_points
+from toolkit.robot.mend import box_corners, geom_points, upright
 
 FLAT = 0.001  # m; points so near to the lowest one belong to the sole
 _AROUND = 48  # points around round shapes
 _LEAST_PATCH = 0.02  # m; least side of a patch that is proposed
 _HAND_DEPTH = 0.01  # m; points so near to the end of a hand belong to its palm
+_LEG_JOINTS = 5  # least joints of a leg
 _PALM_JOINTS = 4  # least joints of an arm whose palm is proposed
 _LEAST_ARM = 3  # least joints of an arm; what has fewer is an eye or an ear
 _ARM_JOINTS = 7  # most joints of an arm; what comes after them is a finger
+# A toe turns about the left, at less than so much of the height of the joint before it, farther ahead than a share of
+# the leg's height, on a foot that reaches down as far but for another share.
+_TOE_TURNS, _TOE_HEIGHT, _TOE_AHEAD, _TOE_LOW = 0.7, 0.75, 0.05, 0.03
 _STEEPEST = 0.7  # least cosine between the normal of a sole and straight down in the zero posture
 
 
@@ -57,24 +61,28 @@ class Anatomy:
     Attributes:
         base: Name of the root body of the robot.
         others: Names of further root bodies.
-        forward: Direction (2,) of the toes in the axes of the base.
+        up: Direction (3,) that points up in the axes of the base.
+        forward: Level direction (2,) of the toes in the world of the zero posture.
+        toes: The same in the axes of the base, after they are turned upright.
         feet: Soles, left one first; empty where no two legs were found.
         palms: Palms, left one first; empty where no two arms of four joints or more were found.
         arms: Joints of the arms in order, left arm first; empty where no two arms of three joints or more were found.
         backward: The knee whose range lets it bend the other way than that of the other leg, against the toes, if any.
         shared: Joints that both legs hang on, such as a waist below a floating trunk.
-        fingers: Joints beyond the hands.
+        beyond: Joints beyond hands and feet: fingers and toes.
     """
 
     base: str
     others: tuple[str, ...]
+    up: np.ndarray
     forward: np.ndarray
+    toes: np.ndarray
     feet: tuple[FoundPatch, ...]
     palms: tuple[FoundPatch, ...]
     arms: tuple[tuple[str, ...], ...]
     backward: tuple[str, ...]
     shared: tuple[str, ...]
-    fingers: tuple[str, ...]
+    beyond: tuple[str, ...]
 
 
 def find_anatomy(model: mujoco.MjModel) -> Anatomy:
@@ -83,20 +91,27 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
     mujoco.mj_kinematics(model, data)
     roots = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
     base = max(roots, key=lambda b: float(model.body_subtreemass[b]))
+    axes = data.xmat[base].reshape(3, 3)
     tips = _tips(model, base)
     feet = _feet(model, data, tips)
     if len(feet) != 2:
         others = tuple(model.body(b).name for b in roots if b != base)
-        return Anatomy(model.body(base).name, others, np.array([1.0, 0.0]), (), (), (), (), (), ())
+        ahead = np.array([1.0, 0.0])
+        return Anatomy(model.body(base).name, others, axes[2], ahead, ahead, (), (), (), (), (), ())
+    toes = {foot: _foot_of_toe(model, data, foot) for foot in feet}
+    tips = [tip for tip in tips if tip not in feet or toes[tip] == tip]
+    toe_joints = [j for foot, above in toes.items() if above != foot for j in joints_to(model, foot)[-1:]]
+    ends = {toes[foot]: foot for foot in feet}
+    feet = list(ends)
     first, second = (joints_to(model, foot) for foot in feet)
     shared = [j for j in first if j in second]
     own = [[j for j in leg if j not in shared] for leg in (first, second)]
     bends = [_forward(model, data, base, leg) for leg in own]
-    toes = _toes(model, data, feet)
+    ahead = _ahead(model, data, feet)
     agree = bends[0] @ bends[1] > 0.0
-    forward = bends[0] if agree or bends[0] @ toes > 0.0 else bends[1]
+    forward = bends[0] if agree or bends[0] @ ahead > 0.0 else bends[1]
     wrong = [] if agree else [leg[3] for leg, bend in zip(own, bends, strict=True) if bend @ forward < 0.0]
-    across = np.array([-forward[1], forward[0], 0.0])
+    across = _left(forward)
     feet = sorted(feet, key=lambda b: -float(across @ data.xpos[b]))
     legs = {j for foot in feet for j in joints_to(model, foot)}
     arms = _arms(model, data, tips, legs, across, base)
@@ -107,13 +122,15 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
     return Anatomy(
         base=model.body(base).name,
         others=tuple(model.body(b).name for b in roots if b != base),
+        up=axes[2],
         forward=forward,
-        feet=tuple(_sole(model, data, foot, forward) for foot in feet),
+        toes=(upright(axes[2]) @ axes.T @ np.append(forward, 0.0))[:2],
+        feet=tuple(_sole(model, data, foot, ends[foot], forward) for foot in feet),
         palms=tuple(_palm(model, data, hand, legs, forward) for hand in hands),
         arms=tuple(_names(model, joints) for joints, _ in arms),
         backward=_names(model, wrong),
         shared=_names(model, shared),
-        fingers=_names(model, fingers),
+        beyond=_names(model, [*toe_joints, *fingers]),
     )
 
 
@@ -188,7 +205,7 @@ def _lowest(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> float:
 
 def _feet(model: mujoco.MjModel, data: mujoco.MjData, tips: list[int]) -> list[int]:
     """The two lowest ends of chains with at least five joints, if they stand equally high."""
-    long = [tip for tip in tips if len(joints_to(model, tip)) >= 5]
+    long = [tip for tip in tips if len(joints_to(model, tip)) >= _LEG_JOINTS]
     lowest = sorted(long, key=lambda tip: _lowest(model, data, tip))[:2]
     height = float(np.ptp(data.xpos[1:, 2])) if model.nbody > 1 else 0.0
     if len(lowest) < 2 or abs(_lowest(model, data, lowest[0]) - _lowest(model, data, lowest[1])) > 0.1 * height:
@@ -206,15 +223,41 @@ def _forward(model: mujoco.MjModel, data: mujoco.MjData, base: int, leg: list[in
     return ahead / np.linalg.norm(ahead)
 
 
-def _toes(model: mujoco.MjModel, data: mujoco.MjData, feet: list[int]) -> np.ndarray:
+def _ahead(model: mujoco.MjModel, data: mujoco.MjData, feet: list[int]) -> np.ndarray:
     """Level direction (2,) from the ankles to the middles of the feet, which reach farther ahead than back."""
     points = [_points(model, data, _rigid(model, foot)[0]) for foot in feet]
     ahead = [(p.min(0) + p.max(0)) / 2 - data.xpos[foot] for p, foot in zip(points, feet, strict=True) if len(p)]
     return np.sum(ahead, axis=0)[:2] if ahead else np.zeros(2)
 
 
-def _sole(model: mujoco.MjModel, data: mujoco.MjData, foot: int, forward: np.ndarray) -> FoundPatch:
-    shapes, colliding = _rigid(model, foot)
+def _foot_of_toe(model: mujoco.MjModel, data: mujoco.MjData, end: int) -> int:
+    """The foot that carries the end of a leg where that is a toe, which has to be held still; else the end itself."""
+    joints = joints_to(model, end)
+    foot = int(model.jnt_bodyid[joints[-2]])
+    if model.body_jntnum[end] != 1 or len(joints) < _LEG_JOINTS + 1 or foot != model.body_parentid[end]:
+        return end
+    ground = min(_lowest(model, data, end), _lowest(model, data, foot))
+    hip, (ankle, toe) = data.xanchor[joints[0]], data.xanchor[joints[-2:]]
+    tall = float(hip[2]) - ground
+    left = _left(_forward(model, data, end, joints))
+    is_toe = (
+        abs(float(left @ data.xaxis[joints[-1]])) > _TOE_TURNS
+        and toe[2] - ground < _TOE_HEIGHT * (ankle[2] - ground)
+        and float(np.hypot(*(toe - ankle)[:2])) > _TOE_AHEAD * tall
+        and abs(_lowest(model, data, foot) - _lowest(model, data, end)) < _TOE_LOW * tall
+    )
+    return foot if is_toe else end
+
+
+def _left(forward: np.ndarray) -> np.ndarray:
+    """(3,) the level direction to the left of another (2,)."""
+    return np.array([-forward[1], forward[0], 0.0])
+
+
+def _sole(model: mujoco.MjModel, data: mujoco.MjData, foot: int, end: int, forward: np.ndarray) -> FoundPatch:
+    """The sole of a foot, with the toe at its end where it has one."""
+    parts = [_rigid(model, body) for body in dict.fromkeys((foot, end))]
+    shapes, colliding = np.concatenate([part for part, _ in parts]), all(collides for _, collides in parts)
     points = _points(model, data, shapes)
     if len(points) < 4:
         points = data.xpos[foot] + 0.5 * _LEAST_PATCH * np.array([[x, y, 0.0] for x in (-1, 1) for y in (-1, 1)])

@@ -132,11 +132,11 @@ def _joints(model: mujoco.MjModel) -> list[str]:
 
 
 def _locked(model: mujoco.MjModel, anatomy: Anatomy) -> list[str]:
-    """Joints that the toolkit cannot move: those that carry both legs, fingers, and those tied to others."""
+    """Joints that the toolkit cannot move: those that carry both legs, fingers and toes, and those tied to others."""
     tied = set()
     for equality in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
         tied.update(model.joint(j).name for j in (model.eq_obj1id[equality], model.eq_obj2id[equality]) if j >= 0)
-    return [*anatomy.shared, *anatomy.fingers, *sorted(tied - {*anatomy.shared, *anatomy.fingers})]
+    return [*anatomy.shared, *anatomy.beyond, *sorted(tied - {*anatomy.shared, *anatomy.beyond})]
 
 
 def _lock_lines(model: mujoco.MjModel, names: list[str]) -> list[str]:
@@ -155,8 +155,10 @@ def _mend(model: mujoco.MjModel, source: ModelSource, anatomy: Anatomy, inertia:
     empty = [name for name in anatomy.others if not float(model.body_subtreemass[model.body(name).id])]
     if empty:
         lines.append(f"drop = [{', '.join(_text(name) for name in empty)}]")
-    if anatomy.forward[0] < 0.98:
-        x, y = np.round(anatomy.forward, 6) + 0.0
+    if anatomy.up[2] < 0.98:
+        lines.append(f"up = {_numbers(np.round(anatomy.up, 6) + 0.0)}   # in the axes of the base")
+    if anatomy.toes[0] < 0.98:
+        x, y = np.round(anatomy.toes, 6) + 0.0
         lines.append(f"forward = [{float(x)}, {float(y)}]   # the knees say where the toes point")
     if model.ntendon:
         lines.append("without_tendons = true   # what they limit or pull together, [limits.position] can narrow")

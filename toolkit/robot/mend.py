@@ -39,8 +39,11 @@ def mended(source: ModelSource, mend: Mend, base: str, problems: Problems) -> Mo
                 spec.delete(body)
     if mend.without_tendons:
         _leave_out_tendons(spec)
-    if mend.forward is not None and spec.body(base) is not None:
-        _turn(spec.body(base), np.arctan2(mend.forward[1], mend.forward[0]))
+    if spec.body(base) is not None:
+        if mend.up is not None and np.linalg.norm(mend.up) > 0.0:
+            _turn(spec.body(base), upright(np.array(mend.up)))
+        if mend.forward is not None:
+            _turn(spec.body(base), rotation_about_z(-np.arctan2(mend.forward[1], mend.forward[0])))
     if mend.collision:
         _set_shapes(spec, mend.collision, problems)
     _exclude(spec, mend.exclude, problems)
@@ -95,9 +98,17 @@ def _below(body: mujoco.MjsBody) -> Iterable[mujoco.MjsBody]:
         yield from _below(child)
 
 
-def _turn(base: mujoco.MjsBody, angle: float) -> None:
-    """Turn the axes of a body about its z by an angle in rad; everything on it stays where it is."""
-    back = rotation_about_z(np.array([-angle]))[0]
+def upright(up: np.ndarray) -> np.ndarray:
+    """The smallest rotation (3, 3) that turns a direction (3,) to z."""
+    x, y, z = up / np.linalg.norm(up)
+    if z < -1.0 + 1e-9:
+        return np.diag([1.0, -1.0, -1.0])
+    cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
+    return np.eye(3) + cross + cross @ cross / (1.0 + z)
+
+
+def _turn(base: mujoco.MjsBody, back: np.ndarray) -> None:
+    """Turn the axes of a body by the inverse of a rotation (3, 3); everything on it stays where it is."""
     frame = base.add_frame(quat=Pose(back, np.zeros(3)).quaternion_wxyz)
     for child in [*base.bodies, *base.geoms, *base.sites, *base.cameras, *base.lights]:
         if child.frame is None:

@@ -10,7 +10,7 @@ import numpy as np
 from toolkit.robot.reader import Reader
 
 _KEYS = (
-    "rename_bodies", "rename_joints", "drop", "collision", "exclude", "forward", "balance_inertia", "least_mass",
+    "rename_bodies", "rename_joints", "drop", "collision", "exclude", "up", "forward", "balance_inertia", "least_mass",
     "least_inertia", "up_axis", "without_tendons",
 )  # fmt: skip
 _GROUP = re.compile(r"group ([0-5])")
@@ -40,7 +40,9 @@ class Mend:
             removes them, "box" is a box around them (or around what is drawn, where nothing collides), an int is the
             group whose shapes collide, and a `Box` stands for itself.
         exclude: Pairs of patterns of bodies that do not collide with each other.
-        forward: Direction (x, y) of the toes in the axes of the file's base body, or None for its x axis.
+        up: Direction (x, y, z) that points up in the axes of the file's base body, or None for its z axis. The axes are
+            turned with it the shortest way.
+        forward: Direction (x, y) of the toes in these axes, or None for their x axis.
         balance_inertia: Whether inertias that no body can have are evened out.
         up_axis: Whether COLLADA shapes are turned to have z up where their files say that y points up.
         without_tendons: Whether tendons are left out, with what they limit and pull.
@@ -52,6 +54,7 @@ class Mend:
     drop: tuple[str, ...]
     collision: dict[str, str | int | Box]
     exclude: tuple[tuple[str, str], ...]
+    up: tuple[float, ...] | None
     forward: tuple[float, float] | None
     balance_inertia: bool
     up_axis: bool
@@ -63,7 +66,11 @@ class Mend:
 def read_mend(reader: Reader, data: dict) -> Mend:
     """The table [mend]; nothing is changed where it is missing."""
     table = reader.table(data, "mend", _KEYS)
-    forward = None
+    up = forward = None
+    if "up" in table:
+        up = reader.numbers(table, "up", "mend.", 3)
+        if np.linalg.norm(up) < 1e-3:
+            reader.problems.add("'mend.up' is no direction; it is (x, y, z) of what points up in the axes of the base")
     if "forward" in table:
         x, y = reader.numbers(table, "forward", "mend.", 2)
         if np.hypot(x, y) < 1e-3:
@@ -78,6 +85,7 @@ def read_mend(reader: Reader, data: dict) -> Mend:
             for pattern, value in reader.table(table, "collision", None, "mend.").items()
         },
         exclude=_pairs(reader, table),
+        up=up,
         forward=forward,
         balance_inertia=reader.flag(table, "balance_inertia", "mend."),
         up_axis=reader.flag(table, "up_axis", "mend."),
