@@ -101,8 +101,8 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
     toes = {foot: _foot_of_toe(model, data, foot) for foot in feet}
     tips = [tip for tip in tips if tip not in feet or toes[tip] == tip]
     toe_joints = [j for foot, above in toes.items() if above != foot for j in joints_to(model, foot)[-1:]]
-    ends = {toes[foot]: foot for foot in feet}
-    feet = list(ends)
+    tip_of = {toes[foot]: foot for foot in feet}
+    feet = list(tip_of)
     first, second = (joints_to(model, foot) for foot in feet)
     shared = [j for j in first if j in second]
     own = [[j for j in leg if j not in shared] for leg in (first, second)]
@@ -125,7 +125,7 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
         up=axes[2],
         forward=forward,
         toes=(upright(axes[2]) @ axes.T @ np.append(forward, 0.0))[:2],
-        feet=tuple(_sole(model, data, foot, ends[foot], forward) for foot in feet),
+        feet=tuple(_sole(model, data, foot, tip_of[foot], forward) for foot in feet),
         palms=tuple(_palm(model, data, hand, legs, forward) for hand in hands),
         arms=tuple(_names(model, joints) for joints, _ in arms),
         backward=_names(model, wrong),
@@ -254,9 +254,9 @@ def _left(forward: np.ndarray) -> np.ndarray:
     return np.array([-forward[1], forward[0], 0.0])
 
 
-def _sole(model: mujoco.MjModel, data: mujoco.MjData, foot: int, end: int, forward: np.ndarray) -> FoundPatch:
-    """The sole of a foot, with the toe at its end where it has one."""
-    parts = [_rigid(model, body) for body in dict.fromkeys((foot, end))]
+def _sole(model: mujoco.MjModel, data: mujoco.MjData, foot: int, tip: int, forward: np.ndarray) -> FoundPatch:
+    """The sole of a foot, with the toe at its tip where it has one."""
+    parts = [_rigid(model, body) for body in dict.fromkeys((foot, tip))]
     shapes, colliding = np.concatenate([part for part, _ in parts]), all(collides for _, collides in parts)
     points = _points(model, data, shapes)
     if len(points) < 4:
