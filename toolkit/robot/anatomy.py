@@ -86,7 +86,7 @@ class Anatomy:
 
 
 def find_anatomy(model: mujoco.MjModel) -> Anatomy:
-    """Legs and arms of a model, whose base is above its feet and whose z axis points up in the zero posture."""
+    """Legs and arms of a model, whose base is above its feet in the zero posture."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     roots = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
@@ -98,10 +98,10 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
         others = tuple(model.body(b).name for b in roots if b != base)
         ahead = np.array([1.0, 0.0])
         return Anatomy(model.body(base).name, others, axes[2], ahead, ahead, (), (), (), (), (), ())
-    toes = {foot: _foot_of_toe(model, data, foot) for foot in feet}
-    tips = [tip for tip in tips if tip not in feet or toes[tip] == tip]
-    toe_joints = [j for foot, above in toes.items() if above != foot for j in joints_to(model, foot)[-1:]]
-    tip_of = {toes[foot]: foot for foot in feet}
+    carrier = {foot: _foot_of_toe(model, data, foot) for foot in feet}
+    tips = [tip for tip in tips if tip not in feet or carrier[tip] == tip]
+    toe_joints = [j for foot, above in carrier.items() if above != foot for j in joints_to(model, foot)[-1:]]
+    tip_of = {carrier[foot]: foot for foot in feet}
     feet = list(tip_of)
     first, second = (joints_to(model, foot) for foot in feet)
     shared = [j for j in first if j in second]
