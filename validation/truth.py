@@ -109,10 +109,12 @@ class Truth:
             motions: Most motions that it may optimise.
         """
         config = RefineConfig(optimisations=motions)
-        tester = self._tester
-        motion_of = lambda sequence: tester.optimise(sequence)[0]  # noqa: E731
-        local = LocalSearch(config, self.cost, motion_of, tester.slide, tester.part)
+        local = LocalSearch(config, self.cost, self._motion_of, self._tester.slide, self._tester.part)
         return self._timed(lambda: local.improved(plan, origin, screen, lambda sequence: True))
+
+    def _motion_of(self, sequence: ContactSequence) -> MotionPlan:
+        """The motion of a sequence, feasible or not."""
+        return self._tester.optimise(sequence)[0]
 
     def _timed(self, make: Callable[[], MotionPlan]) -> Outcome:
         """The plan that is made, its price, and how long making it took."""

@@ -198,7 +198,7 @@ class LocalSearch:
         ranked = []
         for each in sorted(others, key=itemgetter(0)):
             first = Change.between(sequence, each[1], 0).first
-            stretch = first * stretches // len(sequence.transitions)
+            stretch = min(first * stretches // len(sequence.transitions), stretches - 1)
             counts[stretch] += 1
             if counts[stretch] <= most:
                 ranked.append(each)
