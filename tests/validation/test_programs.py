@@ -66,7 +66,7 @@ def test_execution_runs_keeps_its_failures_and_resumes(folders, capsys):
     failed = result(folders, "execution")["trials"][1]
     assert failed["stage"] == "planning"
     assert "expansion" in failed["reason"]
-    names = {path.name for path in Path(failed["folder"]).iterdir()}
+    names = {path.name for path in Path(failed["folder"].replace("OUT", folders[3], 1)).iterdir()}
     assert {"report.json", "recording.rrd", "world.xml"} <= names
 
 
