@@ -131,6 +131,11 @@ class Walk(NamedTuple):
                 held.add(transition.limb)
         return cls(feet, standing, over, times)
 
+    def part(self, first: int, end: int) -> Walk:
+        """The walk of transitions [first, end)."""
+        own = slice(first, end)
+        return Walk(self.feet[..., first : end + 1, :, :], self.standing[..., own], self.over[own], self.times[own])
+
     def linked(self, first: int, last: int, feet: np.ndarray, standing: np.ndarray) -> Walk:
         """Walks, m of them, in which k steps stand for those from one stance to a later one.
 

@@ -139,6 +139,8 @@ class _Links:
             return chains
         between = np.array([rows[1:-1, : len(FEET)] for _, rows in chains])
         standing = np.array([[limb.mirrored for limb in limbs] for limbs, _ in chains])
-        walks = self._walk.linked(first, last, self._screen.table.position[between], standing)
+        begin = max(0, first - 1)  # one transition more on either side is what they share
+        walk = self._walk.part(begin, last + 1)
+        walks = walk.linked(first - begin, last - begin, self._screen.table.position[between], standing)
         order = np.argsort(walks.travel(self._screen.scale.time), kind="stable")
         return [chains[index] for index in order]
