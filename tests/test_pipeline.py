@@ -105,7 +105,7 @@ class Run:
         optimised, tested, asked, cost, better = self.optimised, self.tested, self.improved, cost or {}, better or {}
 
         class Tester:
-            slide = None
+            slide = part = None
 
             def __init__(self, *parts):
                 pass
