@@ -54,6 +54,7 @@ def rubble(rows):
 
 WORLDS = {  # how a world is made, and a size and one with four times as many parts
     "boxes": (lambda count: boxes(count, 0.21 * np.sqrt(count), 0.05), 1250, 5000),
+    "boxes in one heap": (lambda count: boxes(count, 3.0, 0.3), 250, 1000),
     "tiles": (rubble, 40, 160),
     "height field": (height_field, 100, 200),
     "mesh": (lambda side: scan(side, 0.0), 40, 80),
