@@ -96,7 +96,7 @@ class Truth:
         """The outcome of a sequence, of which a search may have made the plan already."""
         key = sequence.identity
         if key not in self._known:
-            self._known[key] = self._timed(lambda: self._tester.optimise(sequence, plan)[0])
+            self._known[key] = self._timed(lambda: self._motion_of(sequence, plan))
         return self._known[key]
 
     def improved(self, plan: MotionPlan, origin: ContactSequence, screen: SequenceScreen, motions: int) -> Outcome:
@@ -112,9 +112,9 @@ class Truth:
         local = LocalSearch(config, self.cost, self._motion_of, self._tester.slide, self._tester.part)
         return self._timed(lambda: local.improved(plan, origin, screen, lambda sequence: True))
 
-    def _motion_of(self, sequence: ContactSequence) -> MotionPlan:
-        """The motion of a sequence, feasible or not."""
-        return self._tester.optimise(sequence)[0]
+    def _motion_of(self, sequence: ContactSequence, known: MotionPlan | None = None) -> MotionPlan:
+        """The motion of a sequence, feasible or not; that of a search where it is known."""
+        return self._tester.optimise(sequence, known)[0]
 
     def _timed(self, make: Callable[[], MotionPlan]) -> Outcome:
         """The plan that is made, its price, and how long making it took."""

@@ -68,6 +68,7 @@ def test_a_change_is_what_two_sequences_do_not_share(around, dropped):
     assert (*before, *change.new.transitions, *after) == other.transitions
     assert change.old.stances[-1].identity == change.new.stances[-1].identity or not after
     assert change.first == max(0, min((*dropped, 8)) - around)
+    assert change.following == next(iter(after), None)
 
 
 def test_a_change_lasts_until_the_feet_stand_where_they_did():

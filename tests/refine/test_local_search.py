@@ -139,9 +139,8 @@ def test_the_motion_around_a_change_tells_what_it_costs(long_walk):
     found = 0
     for variant in variants:
         change = Change.between(base.sequence, variant, RefineConfig().around)
-        end = change.first + len(change.old.transitions)
-        following = next(iter(base.sequence.transitions[end:]), None)
-        old, new = (workshop.part(base, part, change.first, following) for part in (change.old, change.new))
+        parts = change.old, change.new
+        old, new = (workshop.part(base, part, change.first, change.following) for part in parts)
         assert old.feasible
         other = workshop.optimise(variant).motion
         assert new.feasible == other.feasible

@@ -154,9 +154,15 @@ def test_a_base_with_any_axes_gives_the_same_robot(turn: list[float], tmp_path: 
     np.testing.assert_allclose(robot.home[7:], plain.home[7:], atol=0.02)
 
 
-def test_toes_are_held_still_and_belong_to_the_sole(tmp_path: Path) -> None:
-    """A sole of two parts with a joint between them; ankles, which are no toes, move."""
+@pytest.mark.parametrize("waist", [False, True])
+def test_toes_are_held_still_and_belong_to_the_sole(waist: bool, tmp_path: Path) -> None:
+    """A sole of two parts with a joint between them; ankles, which are no toes, move, also below a waist."""
     text = biped_mjcf()
+    if waist:
+        start, end = text.index("<freejoint/>") + len("<freejoint/>"), text.rindex("</body>")
+        joints = '<joint name="turn" axis="0 0 1" range="-1 1"/><joint name="lean" axis="1 0 0" range="-1 1"/>'
+        text = f'{text[:start]}<geom size="0.1"/><body name="hips">{joints}{text[start:end]}</body>{text[end:]}'
+    plain = text
     for side in ("left", "right"):
         at = text.index("<geom", text.index(f'<body name="{side}_foot_link"'))
         toe = f"""<body name="{side}_toe_link" pos="0.12 0 -0.065">
@@ -165,13 +171,14 @@ def test_toes_are_held_still_and_belong_to_the_sole(tmp_path: Path) -> None:
         text = text[:at] + toe + text[at:]
     (tmp_path / "biped.xml").write_text(text)
     anatomy = find_anatomy(read_model(tmp_path / "biped.xml").spec.compile())
-    before = find_anatomy(mujoco.MjModel.from_xml_string(biped_mjcf()))
+    before = find_anatomy(mujoco.MjModel.from_xml_string(plain))
     assert anatomy.beyond == ("left_toe", "right_toe") and before.beyond == () and not anatomy.arms
     for found, foot in zip(anatomy.feet, before.feet, strict=True):
         assert found.body == foot.body and found.joints == foot.joints
         np.testing.assert_allclose(found.size, foot.size + [0.06, 0.0], atol=1e-6)
     assert robots.main(["--inspect", str(tmp_path / "biped.xml"), "--out", str(tmp_path / "biped")]) == 1
-    assert "locked_joints = { left_toe = 0, right_toe = 0 }" in (tmp_path / "biped" / "robot.toml").read_text()
+    held = "turn = 0, lean = 0, " * waist + "left_toe = 0, right_toe = 0"
+    assert f"locked_joints = {{ {held} }}" in (tmp_path / "biped" / "robot.toml").read_text()
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

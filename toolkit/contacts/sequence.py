@@ -88,7 +88,7 @@ class ContactSequence:
     @cached_property
     def identity(self) -> bytes:
         """Bytes that are equal for equal sequences: limbs, places, surfaces and timings, to the last bit."""
-        return b"|".join(each.identity for each in (*self.start.contacts, *self.transitions))
+        return b"|".join((self.start.identity, *self.identities))
 
     @cached_property
     def identities(self) -> tuple[bytes, ...]:
@@ -109,11 +109,13 @@ class Change:
         old: That part of the first sequence.
         new: The same of the second one, which ends in the same stance.
         first: Number of their first transition, in both sequences.
+        following: The transition after them, in both; None where they are the ends of the sequences.
     """
 
     old: ContactSequence
     new: ContactSequence
     first: int
+    following: ContactTransition | None
 
     @classmethod
     def between(cls, old: ContactSequence, new: ContactSequence, around: int) -> Change:
@@ -129,4 +131,5 @@ class Change:
             stance, after = new.transitions[len(b) - after].apply(stance), after - 1
         first, kept = max(0, before - around), max(0, after - around)
         part = old.part(first, len(a) - kept)
-        return cls(part, replace(part, transitions=new.transitions[first : len(b) - kept]), first)
+        changed = replace(part, transitions=new.transitions[first : len(b) - kept])
+        return cls(part, changed, first, old.transitions[-kept] if kept else None)

@@ -48,6 +48,15 @@ def rotation_about_z(angle: np.ndarray | float) -> np.ndarray:
     return rotation
 
 
+def rotation_to_z(direction: np.ndarray) -> np.ndarray:
+    """The smallest rotation (3, 3) that turns a direction (3,), of any length but zero, to z."""
+    x, y, z = direction / np.linalg.norm(direction)
+    if z < -1.0 + 1e-9:
+        return np.diag([1.0, -1.0, -1.0])
+    cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
+    return np.eye(3) + cross + cross @ cross / (1.0 + z)
+
+
 def rotation_exponential(vector: np.ndarray) -> np.ndarray:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad (Rodrigues)."""
     vector = np.asarray(vector, float)

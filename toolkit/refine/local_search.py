@@ -41,8 +41,8 @@ class RefineConfig:
     Attributes:
         starts: Number of the truly cheapest sequences from which it starts.
         usual: Transitions of a sequence of the usual length.
-        optimisations: Most motions to optimise for each of them, of longer sequences more in proportion. A quarter is
-            kept to find out in the end whether contacts can be left out.
+        optimisations: Most motions of whole sequences to optimise for each of them, of longer ones more in proportion.
+            A quarter is kept to find out in the end whether contacts can be left out.
         batch: Motions that are optimised before the cheapest of them is taken, if it is cheaper than the sequence is.
         gain: Least part of the true cost by which a variant has to be cheaper, of longer sequences that of their usual
             part: a variant differs in a few transitions, however many there are.
@@ -186,10 +186,10 @@ class LocalSearch:
             if best.identity not in fewer and (cost_of_best := guess(best)) <= most:
                 others[best.identity] = cost_of_best, best
         others.pop(sequence.identity, None)
-        ranked = [*((guess(each), each) for each in fewer.values()), *self._promising(sequence, others.values())]
+        ranked = [*((guess(each), each) for each in fewer.values()), *self._likeliest(sequence, others.values())]
         yield from (each for _, each in sorted(ranked, key=itemgetter(0)))
 
-    def _promising(
+    def _likeliest(
         self, sequence: ContactSequence, others: Iterable[tuple[float, ContactSequence]]
     ) -> list[tuple[float, ContactSequence]]:
         """Those variants with the least guesses, as many in each stretch of a long sequence."""
@@ -212,12 +212,10 @@ class LocalSearch:
         change = Change.between(plan.sequence, variant, self._config.around)
         if len(change.new.transitions) > _PART * len(variant.transitions) or variant.identity in self._known:
             return True
-        first, end = change.first, change.first + len(change.old.transitions)
-        following = next(iter(plan.sequence.transitions[end : end + 1]), None)
-        key = plan.sequence.identity, first, end
+        key = plan.sequence.identity, change.first, len(change.old.transitions)
         if key not in self._parts:
-            self._parts[key] = self._part(plan, change.old, first, following)
-        old, new = self._parts[key], self._part(plan, change.new, first, following)
+            self._parts[key] = self._part(plan, change.old, change.first, change.following)
+        old, new = self._parts[key], self._part(plan, change.new, change.first, change.following)
         if not (old.feasible and new.feasible):
             return not old.feasible
         goal, scale = plan.world.goal, plan.robot.scale
@@ -295,7 +293,7 @@ def _astray(plan: MotionPlan, screen: SequenceScreen) -> set[bytes]:
     """Identities of the transitions, with the stances before them, in which limbs do not reach in a plan's motion."""
     stances, transitions = plan.sequence.stances, plan.sequence.transitions
     return {
-        b"|".join(each.identity for each in (*stances[index].contacts, transitions[index]))
+        b"|".join((stances[index].identity, transitions[index].identity))
         for index in np.flatnonzero(screen.reach_codes(plan))
     }
 

@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from toolkit.geometry.pose import Pose
+from toolkit.geometry.pose import Pose, rotation_to_z
 from toolkit.robot.chain import bodies_above, joints_to
-from toolkit.robot.mend import box_corners, geom_points, upright
+from toolkit.robot.mend import box_corners, geom_points
 
 FLAT = 0.001  # m; points so near to the lowest one belong to the sole
 _AROUND = 48  # points around round shapes
@@ -93,25 +93,23 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
     base = max(roots, key=lambda b: float(model.body_subtreemass[b]))
     axes = data.xmat[base].reshape(3, 3)
     tips = _tips(model, base)
-    feet = _feet(model, data, tips)
-    if len(feet) != 2:
+    ends = _feet(model, data, tips)
+    if len(ends) != 2:
         others = tuple(model.body(b).name for b in roots if b != base)
         ahead = np.array([1.0, 0.0])
         return Anatomy(model.body(base).name, others, axes[2], ahead, ahead, (), (), (), (), (), ())
-    carrier = {foot: _foot_of_toe(model, data, foot) for foot in feet}
-    tips = [tip for tip in tips if tip not in feet or carrier[tip] == tip]
-    toe_joints = [j for foot, above in carrier.items() if above != foot for j in joints_to(model, foot)[-1:]]
-    tip_of = {carrier[foot]: foot for foot in feet}
-    feet = list(tip_of)
-    first, second = (joints_to(model, foot) for foot in feet)
+    first, second = (joints_to(model, end) for end in ends)
     shared = [j for j in first if j in second]
-    own = [[j for j in leg if j not in shared] for leg in (first, second)]
+    end_of = {_foot_of(model, data, end, [j for j in joints_to(model, end) if j not in shared]): end for end in ends}
+    feet, toes = list(end_of), [end for foot, end in end_of.items() if end != foot]
+    tips = [tip for tip in tips if tip not in toes]
+    own = [[j for j in joints_to(model, foot) if j not in shared] for foot in feet]
     bends = [_forward(model, data, base, leg) for leg in own]
     ahead = _ahead(model, data, feet)
     agree = bends[0] @ bends[1] > 0.0
     forward = bends[0] if agree or bends[0] @ ahead > 0.0 else bends[1]
     wrong = [] if agree else [leg[3] for leg, bend in zip(own, bends, strict=True) if bend @ forward < 0.0]
-    across = _left(forward)
+    across = left_of(forward)
     feet = sorted(feet, key=lambda b: -float(across @ data.xpos[b]))
     legs = {j for foot in feet for j in joints_to(model, foot)}
     arms = _arms(model, data, tips, legs, across, base)
@@ -124,13 +122,13 @@ def find_anatomy(model: mujoco.MjModel) -> Anatomy:
         others=tuple(model.body(b).name for b in roots if b != base),
         up=axes[2],
         forward=forward,
-        toes=(upright(axes[2]) @ axes.T @ np.append(forward, 0.0))[:2],
-        feet=tuple(_sole(model, data, foot, tip_of[foot], forward) for foot in feet),
+        toes=(rotation_to_z(axes[2]) @ axes.T @ np.append(forward, 0.0))[:2],
+        feet=tuple(_sole(model, data, foot, end_of[foot], forward) for foot in feet),
         palms=tuple(_palm(model, data, hand, legs, forward) for hand in hands),
         arms=tuple(_names(model, joints) for joints, _ in arms),
         backward=_names(model, wrong),
         shared=_names(model, shared),
-        beyond=_names(model, [*toe_joints, *fingers]),
+        beyond=_names(model, [*(joints_to(model, toe)[-1] for toe in toes), *fingers]),
     )
 
 
@@ -230,26 +228,24 @@ def _ahead(model: mujoco.MjModel, data: mujoco.MjData, feet: list[int]) -> np.nd
     return np.sum(ahead, axis=0)[:2] if ahead else np.zeros(2)
 
 
-def _foot_of_toe(model: mujoco.MjModel, data: mujoco.MjData, end: int) -> int:
-    """The foot that carries the end of a leg where that is a toe, which has to be held still; else the end itself."""
-    joints = joints_to(model, end)
-    foot = int(model.jnt_bodyid[joints[-2]])
-    if model.body_jntnum[end] != 1 or len(joints) < _LEG_JOINTS + 1 or foot != model.body_parentid[end]:
+def _foot_of(model: mujoco.MjModel, data: mujoco.MjData, end: int, leg: list[int]) -> int:
+    """The foot of a leg, given its joints: what carries its end where that is a toe, to be held still; else the end."""
+    foot = int(model.body_parentid[end])
+    if len(leg) <= _LEG_JOINTS or model.body_jntnum[end] != 1 or int(model.jnt_bodyid[leg[-2]]) != foot:
         return end
-    ground = min(_lowest(model, data, end), _lowest(model, data, foot))
-    hip, (ankle, toe) = data.xanchor[joints[0]], data.xanchor[joints[-2:]]
+    lows = [_lowest(model, data, body) for body in (foot, end)]
+    ground, (hip, ankle, toe) = min(lows), data.xanchor[[leg[0], *leg[-2:]]]
     tall = float(hip[2]) - ground
-    left = _left(_forward(model, data, end, joints))
     is_toe = (
-        abs(float(left @ data.xaxis[joints[-1]])) > _TOE_TURNS
+        abs(float(left_of(_forward(model, data, end, leg)) @ data.xaxis[leg[-1]])) > _TOE_TURNS
         and toe[2] - ground < _TOE_HEIGHT * (ankle[2] - ground)
         and float(np.hypot(*(toe - ankle)[:2])) > _TOE_AHEAD * tall
-        and abs(_lowest(model, data, foot) - _lowest(model, data, end)) < _TOE_LOW * tall
+        and float(np.ptp(lows)) < _TOE_LOW * tall
     )
     return foot if is_toe else end
 
 
-def _left(forward: np.ndarray) -> np.ndarray:
+def left_of(forward: np.ndarray) -> np.ndarray:
     """(3,) the level direction to the left of another (2,)."""
     return np.array([-forward[1], forward[0], 0.0])
 
@@ -295,7 +291,7 @@ def _downs(points: np.ndarray) -> list[np.ndarray]:
 def _area(points: np.ndarray, down: np.ndarray, forward: np.ndarray) -> float:
     """Area in m^2 of the rectangle around the points that are lowest in a direction."""
     sole = points[points @ down > (points @ down).max() - FLAT]
-    along = sole @ np.column_stack([np.append(forward, 0.0), [-forward[1], forward[0], 0.0]])
+    along = sole @ np.column_stack([np.append(forward, 0.0), left_of(forward)])
     return float(np.prod(np.ptp(along, axis=0)))
 
 

@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 import mujoco
 import numpy as np
 
-from toolkit.geometry.pose import Pose, rotation_about_z
+from toolkit.geometry.pose import Pose, rotation_about_z, rotation_to_z
 from toolkit.geometry.triangles import mesh_vertices
 from toolkit.robot.mend_table import Box, Mend
 from toolkit.robot.problems import Problems
@@ -40,8 +40,8 @@ def mended(source: ModelSource, mend: Mend, base: str, problems: Problems) -> Mo
     if mend.without_tendons:
         _leave_out_tendons(spec)
     if spec.body(base) is not None:
-        if mend.up is not None and np.linalg.norm(mend.up) > 0.0:
-            _turn(spec.body(base), upright(np.array(mend.up)))
+        if mend.up is not None:
+            _turn(spec.body(base), rotation_to_z(np.array(mend.up)))
         if mend.forward is not None:
             _turn(spec.body(base), rotation_about_z(-np.arctan2(mend.forward[1], mend.forward[0])))
     if mend.collision:
@@ -96,15 +96,6 @@ def _below(body: mujoco.MjsBody) -> Iterable[mujoco.MjsBody]:
     for child in body.bodies:
         yield child
         yield from _below(child)
-
-
-def upright(up: np.ndarray) -> np.ndarray:
-    """The smallest rotation (3, 3) that turns a direction (3,) to z."""
-    x, y, z = up / np.linalg.norm(up)
-    if z < -1.0 + 1e-9:
-        return np.diag([1.0, -1.0, -1.0])
-    cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
-    return np.eye(3) + cross + cross @ cross / (1.0 + z)
 
 
 def _turn(base: mujoco.MjsBody, back: np.ndarray) -> None:

@@ -71,6 +71,7 @@ def read_mend(reader: Reader, data: dict) -> Mend:
         up = reader.numbers(table, "up", "mend.", 3)
         if np.linalg.norm(up) < 1e-3:
             reader.problems.add("'mend.up' is no direction; it is (x, y, z) of what points up in the axes of the base")
+            up = None
     if "forward" in table:
         x, y = reader.numbers(table, "forward", "mend.", 2)
         if np.hypot(x, y) < 1e-3:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares, minimize_scalar
 
 from toolkit.geometry.pose import Pose
-from toolkit.robot.anatomy import Anatomy, FoundPatch
+from toolkit.robot.anatomy import Anatomy, FoundPatch, left_of
 
 _KNEE = 0.7  # rad; flexion of the knees
 _STRAIGHT = 0.3  # rad; a keyframe whose knees bend less has no room to step
@@ -105,7 +105,7 @@ def _hanging(
     address = model.jnt_qposadr[moved]
     low, high = _bounds(model, moved)
     start = np.clip(data.qpos[address], low + 1e-6, high - 1e-6)
-    ahead, out = np.append(forward, 0.0), side * np.array([-forward[1], forward[0], 0.0])
+    ahead, out = np.append(forward, 0.0), side * left_of(forward)
 
     def off(angles: np.ndarray, upper: np.ndarray) -> np.ndarray:
         data.qpos[address] = angles
@@ -152,7 +152,7 @@ class _Leg:
     def __init__(self, model: mujoco.MjModel, foot: FoundPatch, anatomy: Anatomy) -> None:
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
-        self.left = np.array([-anatomy.forward[1], anatomy.forward[0], 0.0])
+        self.left = left_of(anatomy.forward)
         self.ahead = np.append(anatomy.forward, 0.0)
         own = [model.joint(name).id for name in foot.joints if name not in anatomy.shared]
         self.joints = [j for j in own if abs(float(self.left @ data.xaxis[j])) > _PITCH]
